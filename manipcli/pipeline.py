@@ -32,6 +32,7 @@ from manipcli.task.controller_rows import controllers_of
 from manipcli.task.load_task import LoadOptions, load_task
 from manipcli.task.plan_task import Plan, plan_task, refused
 from manipcli.task.task import Task
+from manipcli.task.viewed import load_sight
 from manipcli.task.vocabulary import meanings
 
 __all__ = [
@@ -42,9 +43,11 @@ __all__ = [
     "controllers_of",
     "judge_log",
     "kind_of",
+    "load_sight",
     "load_task",
     "meanings",
     "plan_task",
+    "refused",
     "run_task",
     "schema",
     "verify_log",

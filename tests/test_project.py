@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -88,12 +91,13 @@ def test_reading_a_file_loads_no_arrays_and_no_physics() -> None:
         ("plan", "from manipcli.simulate import engine"),
         ("record", "from manipcli.simulate import engine"),
         ("report", "import manipcli.cli.app"),
+        ("cli", "from manipcli.plan import step"),
     ],
 )
-def test_an_import_that_points_down_fails_the_lint(tmp_path: Path, layer: str, line: str) -> None:
+def test_a_forbidden_import_fails_the_lint(tmp_path: Path, layer: str, line: str) -> None:
     shutil.copytree(PACKAGE, tmp_path / "manipcli", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    (tmp_path / "manipcli" / layer / "poison.py").write_text(f'"""Points down."""\n\n{line}\n')
+    (tmp_path / "manipcli" / layer / "poison.py").write_text(f'"""Forbidden."""\n\n{line}\n')
     broken = _lint(tmp_path)
     assert broken.returncode == 1, broken.stdout + broken.stderr
     assert f"manipcli.{layer}.poison" in broken.stdout
@@ -111,6 +115,42 @@ def _lint(folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=False, env=environment
     )
+
+
+def test_the_map_shows_every_package_in_the_order_of_the_layers() -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (layers,) = (contract["layers"] for contract in contracts if contract["id"] == "layers")
+    groups = [{name.strip(" ()") for name in layer.split("|")} for layer in reversed(layers)]
+    table = (ROOT / "ARCHITECTURE.md").read_text().partition("| package | holds |")[2].partition("\n\n")[0]
+    rows = re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE)
+    remaining = iter(rows)
+    assert [set(itertools.islice(remaining, len(group))) for group in groups] == groups
+    folders = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert sorted(rows) == sorted({*folders, "pipeline"})
+
+
+@pytest.mark.parametrize("page", ["ARCHITECTURE.md", "CONTRIBUTING.md"])
+def test_every_path_that_a_page_names_exists(page: str) -> None:
+    named = [*_named_paths((ROOT / page).read_text())]
+    assert named
+    assert [path for path in named if not _exists(path)] == []
+
+
+def _named_paths(text: str) -> Iterator[str]:
+    """Targets of links, and words in backticks and code blocks that have a slash or the suffix of a file."""
+    yield from re.findall(r"\]\((?!https?:)([^)#]+)", text)
+    code = re.findall(r"```\w*\n(.*?)```", text, flags=re.DOTALL)
+    for part in [*code, *re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))]:
+        for word in part.split():
+            is_path = re.fullmatch(r"\.?\w[\w.-]*(/[\w.-]+)+/?|\w+/|\w+\.(py|md|toml)", word)
+            # ROS types (`geometry_msgs/WrenchStamped`) look like paths; results and environments are not kept.
+            if is_path and not word.startswith((".venv/", "runs/")) and "_msgs/" not in word:
+                yield word
+
+
+def _exists(path: str) -> bool:
+    places = (ROOT / path, PACKAGE / path)
+    return any(place.exists() for place in places) or ("/" not in path and any(PACKAGE.rglob(path)))
 
 
 def test_the_readme_begins_with_two_commands_that_stand_alone() -> None:

@@ -1,1 +1,1 @@
-"""Many runs, each in a process of its own: which tasks there are, running them, what came of each."""
+"""Many runs, each in its own process: test discovery, processes with a watchdog, baselines."""

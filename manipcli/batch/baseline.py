@@ -1,7 +1,7 @@
-"""What a run of a task measured when it was good, beside the task (`pour.baseline.json`); and what is worse now.
+"""Baselines: measures of a good run, next to the task (`pour.baseline.json`), and comparison of later runs with them.
 
-A baseline holds how long the task and each step took, the work of the joints and every margin: nothing of the machine,
-so that it belongs into version control. How much worse a run may be is `baseline: {tolerance: ...}` of the task.
+A baseline holds the durations of task and steps, the work of the joints and every margin. It does not depend on the
+machine, so it belongs in version control. `baseline: {tolerance: ...}` of the task limits how much worse a run may be.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from manipcli.report.quantity import quantity
 from manipcli.spec.baseline import ToleranceSpec
 
 DIGITS: Final = 6
-"""Significant digits that are kept."""
+"""Significant digits in the file."""
 FLOORS: Final[Mapping[str, float]] = {"s": 0.05, "J": 1.0, "m": 1e-3, "rad": math.radians(0.5), "N": 0.5}
-"""Differences that never count, by unit."""
+"""Differences that are always ignored, by unit."""
 
 ALWAYS: Final = ("duration", "margins", "steps")
 """Keys that every baseline has."""
@@ -51,10 +51,10 @@ Measures = dict[Key, Measure]
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A number that is not what it was; `new` None: it is not measured any more. `worse` by more than is tolerated, or
-    not to be compared, which could hide that.
+    """A number that differs from the baseline; `new` is None where it is missing in the new run.
 
-    The margin of a condition of several parts has the unit of the one that decides, which may be another one now.
+    `worse`: by more than the tolerance, or not comparable, which could hide that. The margin of a combined condition
+    has the unit of the part that decides, which may change.
     """
 
     key: Key
@@ -64,9 +64,9 @@ class Change:
 
     @property
     def word(self) -> str:
-        """How the new one is, before the name of the old."""
+        """The comparison, to be followed by "the baseline"."""
         if self.new is not None and self.new.unit != self.old.unit:
-            return "unlike"
+            return "not comparable with"
         return "worse than" if self.worse else "better than"
 
     def __str__(self) -> str:
@@ -75,12 +75,10 @@ class Change:
         name = f"{what} '{self.key[1]}'" if len(self.key) > 1 else what
         old = self.old
         if self.new is None:
-            return f"{name} is in the baseline ({old}) and was not measured; `manipcli bless` writes a new one"
+            return f"{name} is missing; its baseline is {old}; `manipcli bless` writes a new baseline"
         if self.new.unit != self.old.unit:
-            why = (
-                "another part of it decides now, so that the two cannot be compared; `manipcli bless` writes a new one"
-            )
-            return f"{name} {verb} {self.new}; its baseline is {old}: {why}"
+            reason = "another part of the condition decides; `manipcli bless` writes a new baseline"
+            return f"{name} {verb} {self.new}; its baseline is {old}: {reason}"
         share = abs(self.new.value / self.old.value - 1.0) if self.old.value else math.inf
         by = f"{100.0 * share:{'.0f' if share > 0.1 else '.2g'}} % " if share < 10.0 else ""
         word = more if self.new.value > self.old.value else less
@@ -96,15 +94,15 @@ _WORDS: Final[Mapping[str, tuple[str, str, str, str]]] = {
 
 
 def baseline_path(task: Path) -> Path:
-    """Where the baseline of a task file is written."""
+    """The path at which the baseline of a task file is written."""
     return task.with_name(f"{own_stem(task)}.baseline.json")
 
 
 def kept_baseline(task: Path) -> Path:
-    """Where the baseline of a task file is read, if it has one.
+    """The path from which the baseline of a task file is read.
 
-    That is `baseline_path`, or else `a.baseline.json`, which earlier versions wrote for `a.yml`, too, where no other
-    task file beside it is meant by that.
+    This is `baseline_path`, or else `a.baseline.json`, which earlier versions also wrote for `a.yml`, unless it belongs
+    to another task file in the folder.
     """
     own, plain = baseline_path(task), task.with_name(f"{task.stem}.baseline.json")
     if own.exists() or not plain.exists():
@@ -114,7 +112,7 @@ def kept_baseline(task: Path) -> Path:
 
 
 def measured(verdict: Verdict, log: Path) -> Measures:
-    """What a run took.
+    """Durations, work and margins of a run.
 
     Args:
         verdict: of the run.
@@ -129,7 +127,7 @@ def measured(verdict: Verdict, log: Path) -> Measures:
         if step.started is not None and step.ended is not None:
             found["steps", step.id] = Measure(step.ended - step.started, "s")
     recording = open_recording(log)
-    works = [one.work for one in step_measures(recording, recorded_robot(recording, log), verdict.steps)]
+    works = [step.work for step in step_measures(recording, recorded_robot(recording, log), verdict.steps)]
     known = [work for work in works if work is not None]
     if known:
         found["energy",] = Measure(math.fsum(known), "J")
@@ -140,9 +138,9 @@ def measured(verdict: Verdict, log: Path) -> Measures:
 
 
 def compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> tuple[Change, ...]:
-    """What is worse or better than it was by more than is tolerated, and what is not or cannot be compared any more.
+    """Changes beyond the tolerance, worse or better, and numbers that cannot be compared.
 
-    A time or energy may grow, and a margin shrink, by its share of the old value, and by what `FLOORS` says.
+    A time or an energy may grow, and a margin shrink, by its share of the old value, or by `FLOORS` if that is more.
     """
     return tuple(_compared(old, new, tolerance))
 
@@ -162,27 +160,27 @@ def _compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> Iterato
 
 
 def write_baseline(path: Path, measures: Measures) -> None:
-    """Keys sorted, numbers rounded: the same run gives the same bytes.
+    """Writes a baseline, with sorted keys and rounded numbers: the same run gives the same bytes.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     tree: dict[str, object] = dict(zip(ALWAYS, (0.0, {}, {}), strict=True))
-    for key, one in measures.items():
-        value = float(f"{one.value:.{DIGITS}g}")
+    for key, measure in measures.items():
+        value = float(f"{measure.value:.{DIGITS}g}")
         inner = tree[key[0]] if len(key) > 1 else None
         if isinstance(inner, dict):
-            inner[key[1]] = {"unit": one.unit, "value": value} if key[0] == "margins" else value
+            inner[key[1]] = {"unit": measure.unit, "value": value} if key[0] == "margins" else value
         else:
             tree[key[0]] = value
     write_whole(path, (json.dumps(tree, indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode())
 
 
 def read_baseline(path: Path) -> Measures | None:
-    """None where there is none.
+    """The measures in a baseline file; None where the file is missing.
 
     Raises:
-        InvalidInput: this is no baseline.
+        InvalidInput: the file is not a baseline.
     """
     try:
         tree = json.loads(path.read_bytes(), parse_constant=_refuse)
@@ -192,15 +190,15 @@ def read_baseline(path: Path) -> Measures | None:
         raise InvalidInput([_no_baseline(path, str(error))]) from None
     lacking = [key for key in ALWAYS if isinstance(tree, dict) and key not in tree]
     if lacking:
-        raise InvalidInput([_no_baseline(path, f"it lacks {listed([f'`{key}`' for key in lacking])}")])
+        raise InvalidInput([_no_baseline(path, f"it has no {listed([f'`{key}`' for key in lacking])}")])
     try:
         return dict(_measures(tree))
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-        raise InvalidInput([_no_baseline(path, "keys or numbers are not those of a baseline")]) from None
+        raise InvalidInput([_no_baseline(path, "a key or a number is invalid")]) from None
 
 
 def is_baseline(path: Path) -> bool:
-    """Whether `read_baseline` reads one there."""
+    """Whether `path` is a valid baseline."""
     try:
         return read_baseline(path) is not None
     except InvalidInput:
@@ -208,7 +206,7 @@ def is_baseline(path: Path) -> bool:
 
 
 def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no number")
+    raise ValueError(f"{constant} is not a number")
 
 
 def _measures(tree: dict[str, object]) -> Iterator[tuple[Key, Measure]]:
@@ -219,10 +217,10 @@ def _measures(tree: dict[str, object]) -> Iterator[tuple[Key, Measure]]:
             case "energy", _:
                 yield (key,), Measure(_number(value), "J")
             case "steps", dict():
-                yield from (((key, str(name)), Measure(_number(one), "s")) for name, one in value.items())
+                yield from (((key, str(name)), Measure(_number(time), "s")) for name, time in value.items())
             case "margins", dict():
-                for name, one in value.items():
-                    yield (key, str(name)), Measure(_number(one["value"]), str(one["unit"]))
+                for name, margin in value.items():
+                    yield (key, str(name)), Measure(_number(margin["value"]), str(margin["unit"]))
             case _:
                 raise ValueError(key)
 
@@ -237,5 +235,5 @@ def _number(value: object) -> float:
 
 
 def _no_baseline(path: Path, why: str) -> Diagnostic:
-    hint = "`manipcli bless` writes a new one"
-    return Diagnostic("USE087", f"this is no baseline: {why}", Place(str(path), 0, 0), hint=hint)
+    hint = "run `manipcli bless` to write a new one"
+    return Diagnostic("USE087", f"the file is not a baseline: {why}", Place(str(path), 0, 0), hint=hint)

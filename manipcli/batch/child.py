@@ -1,4 +1,4 @@
-"""The process of one run: takes a job from its parent, runs it, and sends signs of life and the end back."""
+"""The process of one run: receives a job from its parent, runs it, and sends heartbeats and the result."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from manipcli.task.plan_task import PlannedStep
 
 BEAT_PERIOD = 0.25
-"""[s] of wall time between two signs of life while ticks go by."""
+"""[s] of wall time between two heartbeats during the simulation."""
 
 Parent: TypeAlias = "Connection[Message, Job]"
 
 
 def main(descriptor: int) -> None:
-    """One job, on the socket with this number."""
+    """Runs one job, received on the socket with this descriptor."""
     collector.spare()
     parent: Parent = Connection(descriptor)
     os.set_inheritable(descriptor, False)
-    os.dup2(2, 1)  # what libraries print is no result
-    # A crash of native code, and the signal of a parent that gives up on this process, leave where it was.
+    os.dup2(2, 1)  # libraries print to stderr: stdout has no result
+    # A crash of native code, and SIGUSR1 of a parent that stops this process, print where it was.
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR1)
-    # A terminal's Ctrl-C is for the parent to act upon.
+    # Ctrl-C of a terminal is handled by the parent.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = parent.recv()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
@@ -42,13 +42,13 @@ def main(descriptor: int) -> None:
 
 
 def _end_with(parent: Parent) -> None:
-    """Waits for the parent, which says nothing more, to be gone, and goes, too."""
+    """Ends this process when the parent ends, which sends no further message."""
     parent.poll(None)
     os._exit(ExitCode.INTERRUPTED)
 
 
 class _Beats:
-    """The progress of a run, as signs of life."""
+    """The progress of a run, sent as heartbeats."""
 
     def __init__(self, parent: Parent) -> None:
         self.warnings: tuple[Diagnostic, ...] = ()
@@ -59,19 +59,19 @@ class _Beats:
         self._next = 0.0
 
     def doing(self, what: str) -> None:
-        """Something that has no time of its own."""
+        """An activity outside of simulated time."""
         self._parent.send(Beat(what))
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
         self.warnings += tuple(findings)
-        self.doing("told of doubts")
+        self.doing("warnings reported")
 
     def judged(self) -> None:
-        """From here on the time is not that of the run."""
+        """The time limit of the run ends here."""
         self._parent.send(Beat("judged", judged=True))
 
     def told(self, text: str, *, detail: bool) -> None:
-        """A step was planned again, which may have taken long, or is tried again."""
+        """A step was re-planned, which may have taken long, or is retried."""
         self._parent.send(Beat(self._doing, self._at, written=self._written))
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
@@ -88,13 +88,13 @@ class _Beats:
             self._parent.send(Beat(doing, simulated_time, written=self._written))
 
     def step_ended(self, outcome: StepOutcome) -> None:
-        """The next one begins, or the run is judged."""
+        """The next step begins, or the run is judged."""
         self._doing = f"after {self._doing}"
         self._parent.send(Beat(self._doing, self._at, written=self._written))
 
 
 def _end_of(job: Job, beats: _Beats) -> End:
-    """Runs a job; its log, picture and page are written where they are wanted."""
+    """Runs a job; writes its log and, where requested, its picture and page."""
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
     from manipcli.batch.telling import against_baseline, draw, troubles, write_invalid_page, write_page
@@ -118,7 +118,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     except InvalidInput as invalid:
         unusable = invalid.findings
         return End(None, unusable, notes=_noted("no page", lambda: write_invalid_page(job, unusable)))
-    except RecordingFailed as failure:  # said to the parent: its words have no room on that disk either
+    except RecordingFailed as failure:  # sent to the parent: the disk may be full
         return End(None, troubles=(Trouble(str(failure), at=failure.time),), warnings=beats.warnings)
     beats.judged()
     found = troubles(job, report.verdict)
@@ -152,7 +152,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
 
 
 def _noted(what: str, make: Callable[[], None]) -> tuple[str, ...]:
-    """Makes something without which the verdict stands; a note where that is refused."""
+    """Makes something that does not affect the verdict; returns a note if that fails."""
     try:
         make()
     except (ManipcliError, OSError) as error:

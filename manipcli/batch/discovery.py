@@ -1,4 +1,4 @@
-"""The tests that a task file has, and why a file that was named has none."""
+"""The tests in a task file, and why a named file has none."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from manipcli.report.suite import Case
 
 
 def read_case(path: Path, *, shown: str | None = None) -> Case:
-    """The task in a file; of a file that cannot be read, why.
+    """The task in a file, or the findings of a file that cannot be read.
 
     Args:
         path: the file.
-        shown: what it is called; default `path` itself.
+        shown: its name in messages; default `path` itself.
     """
     from manipcli.spec.load import read_bytes
     from manipcli.spec.source.tree import MappingNode, ScalarNode, SequenceNode
@@ -30,12 +30,12 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
         return Case(name, path.stem, findings=invalid.findings)
     task = root.get("task") if isinstance(root, MappingNode) else None
     if not isinstance(root, MappingNode) or not isinstance(task, ScalarNode) or not isinstance(task.value, str):
-        message = "`task:` is no name; expected a text"
+        message = "`task:` is not a name; expected text"
         return Case(
             name, path.stem, findings=(Diagnostic("TASK200", message, task.place if task is not None else None),)
         )
     tags = root.get("tags")
-    words = [one.value for one in tags.items if isinstance(one, ScalarNode)] if isinstance(tags, SequenceNode) else []
+    words = [tag.value for tag in tags.items if isinstance(tag, ScalarNode)] if isinstance(tags, SequenceNode) else []
     tagged = tuple(word for word in words if isinstance(word, str) and TAG.fullmatch(word))
     simulation = root.get("simulation")
     engine = simulation.get("engine") if isinstance(simulation, MappingNode) else None
@@ -50,19 +50,20 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
 
 
 def samples_of(case: Case, count: int | None, named: Collection[str] = ()) -> tuple[Case, ...]:
-    """Samples 0 to `count` - 1 of a task with a `vary:`; else the task as it is written, and the samples whose names
-    (`pour[3]`) are among `named`."""
+    """Samples 0 to `count` - 1 of a task with a `vary:`; without `count` the task as written, and the samples whose
+    names (`pour[3]`) are in `named`."""
     if not case.varied:
         return (case,)
     if count is not None:
         return tuple(replace(case, sample=sample) for sample in range(count))
     numbers = (name.removeprefix(f"{case.task}[").removesuffix("]") for name in named)
-    samples = (replace(case, sample=int(one)) for one in numbers if one.isdecimal())
-    return (case, *sorted((one for one in samples if one.name in named), key=lambda one: one.sample or 0))
+    samples = (replace(case, sample=int(number)) for number in numbers if number.isdecimal())
+    chosen = (sample for sample in samples if sample.name in named)
+    return (case, *sorted(chosen, key=lambda sample: sample.sample or 0))
 
 
 def shown_path(path: Path) -> str:
-    """Below the working directory relative to it, else as it was given."""
+    """The path relative to the working directory if it is below it, else as given."""
     try:
         return str(path.absolute().relative_to(Path.cwd()))
     except ValueError:
@@ -70,7 +71,7 @@ def shown_path(path: Path) -> str:
 
 
 def is_named_task(path: Path) -> bool:
-    """Whether a file that somebody named as a task has the top-level key `task`, however that is written."""
+    """Whether a named file has the top-level key `task`, in any YAML form."""
     from manipcli.spec.load import read_bytes
     from manipcli.spec.source.tree import MappingNode
     from manipcli.spec.source.yaml import parse
@@ -87,7 +88,7 @@ def is_named_task(path: Path) -> bool:
 
 
 def refused_path(path: Path) -> tuple[Diagnostic, ...]:
-    """Why a file that was named cannot be run as a task; empty where it can."""
+    """Findings that prevent running a named file as a task; empty where there are none."""
     from manipcli.spec.load import read_bytes
 
     try:
@@ -96,5 +97,5 @@ def refused_path(path: Path) -> tuple[Diagnostic, ...]:
         return invalid.findings
     if is_named_task(path):
         return ()
-    message = "this is no task file: a YAML file with the top-level keys `task` and `robot` was expected"
+    message = "the file is not a task; expected a YAML file with the top-level keys `task` and `robot`"
     return (Diagnostic("USE105", message, Place(str(path), 1, 1)),)

@@ -1,4 +1,4 @@
-"""What the processes of a batch say to each other: a job there, signs of life and an end back."""
+"""Messages between the processes of a batch: a job to the child, heartbeats and the result back."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Case, Trouble
 
 FOLDER = Path("runs") / "test"
-"""Where logs of tests go, below the working directory."""
+"""Folder for the logs of tests, below the working directory."""
 
 
 def limit(seconds: float) -> float:
-    """Of a time as an option gives it: 0 means never."""
+    """A time limit [s] from the value of an option, where 0 means never."""
     return seconds if seconds > 0.0 else math.inf
 
 
 def own_stem(file: Path) -> str:
-    """What files about this task file are called, and about no other beside it; `@` is doubled.
+    """The stem of files about a task file, unique in its folder: `a` for `a.yaml`, `a@yml` for `a.yml`.
 
-    `a` of `a.yaml`, `a@yml` of `a.yml`.
+    An `@` in the name is doubled.
     """
     kind = "" if file.suffix == ".yaml" else f"@{file.suffix[1:]}"
     return f"{file.stem.replace('@', '@@')}{kind}"
@@ -32,14 +32,14 @@ def own_stem(file: Path) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What holds for all runs of a batch; as the options of `run`, and what is made of each.
+    """Settings of all runs of a batch: the options of `run`, and the files that are kept.
 
     Attributes:
-        pages: the folder that gets a page about each run; None for none.
-        keep_logs: also those of runs that passed.
-        baseline: a run of a task as it is written may not be worse than its baseline.
-        silence: a run that shows no progress for so long is ended [s].
-        timeout: a run that takes longer is ended [s]; of both, `inf` for never.
+        pages: folder for a page about each run; None for no pages.
+        keep_logs: keep the logs of passed runs, too.
+        baseline: compare a run of a task as written with its baseline.
+        silence: stop a run without progress for this time [s]; `inf` for never.
+        timeout: stop a run that takes longer [s]; `inf` for never.
     """
 
     overrides: tuple[str, ...] = ()
@@ -56,7 +56,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A case, the file that it stands in, and where its files go."""
+    """A case, its task file, and the paths of its output files."""
 
     case: Case
     path: Path
@@ -64,12 +64,12 @@ class Job:
 
     @property
     def log(self) -> Path:
-        """`tasks/pour.mcap` of `tasks/pour.yaml`, `tasks/pour@17.mcap` of its sample 17."""
+        """`tasks/pour.mcap` for `tasks/pour.yaml`, `tasks/pour@17.mcap` for its sample 17."""
         return self._beside(".mcap", self.settings.folder)
 
     @property
     def partial(self) -> Path:
-        """What the log is called before it is whole."""
+        """The path of the unfinished log."""
         return self.log.with_name(f"{self.log.name}.partial")
 
     @property
@@ -78,7 +78,7 @@ class Job:
 
     @property
     def output(self) -> Path:
-        """What the process says that is no result."""
+        """stdout and stderr of the process."""
         return self._beside(".txt", self.settings.folder)
 
     @property
@@ -87,18 +87,18 @@ class Job:
 
     @property
     def index(self) -> str:
-        """The link from its page to the one that leads to all; "" where no pages are written."""
+        """The link from its page to the index of all pages; "" without pages."""
         if self.page is None or self.settings.pages is None:
             return ""
         return link(self.settings.pages / "index.html", self.page.parent)
 
     @property
     def nominal(self) -> bool:
-        """Whether the task is run as it is written."""
+        """Whether the task is run as written."""
         return self.case.sample is None and not self.settings.overrides and self.settings.seed is None
 
     def command(self, verb: str = "run") -> str:
-        """What does the same again, for a shell; `test` compares with the baseline, too."""
+        """The shell command that repeats this run; `test` also compares with the baseline."""
         settings = self.settings
         file = self.case.file
         words = ["manipcli", verb, f"./{file}" if file.startswith("-") else file]
@@ -112,10 +112,10 @@ class Job:
         return shlex.join(words)
 
     def _beside(self, suffix: str, folder: Path) -> Path:
-        """Where a file of this job goes; no two jobs of a batch, nor the index of pages, share one.
+        """The path of an output file; unique among the jobs of a batch and the index of pages.
 
-        Names of folders that are nothing but `_` grow by two, which leaves `_` for the root and `__` for `..`. In a
-        stem a single `@` begins a suffix other than `.yaml`, or a sample.
+        A folder name of `_` only grows by two, which reserves `_` for the root and `__` for `..`. In a stem a single
+        `@` begins a suffix other than `.yaml`, or a sample.
         """
         file = Path(self.case.file)
         names = {file.anchor: "_", "..": "__"}
@@ -127,8 +127,14 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Beat:
-    """A sign of life: what is done, and at which time of the run [s]. `judged`: the run has its verdict, and what is
-    left is to tell of it. `written`: where the step stands that is on, as the log has it."""
+    """A heartbeat of a run.
+
+    Attributes:
+        doing: the current activity.
+        at: simulated time [s].
+        judged: the run has its verdict; only reports are left.
+        written: place of the current step, as in the log.
+    """
 
     doing: str
     at: float | None = None
@@ -136,7 +142,7 @@ class Beat:
     written: str = ""
 
     def place(self, file: str) -> Place | None:
-        """Of the step that is on, in the task file of this name; of one that an option wrote, None."""
+        """Place of the current step in the task file `file`; None for a step that an option defines."""
         _, line, column = self.written.rsplit(":", 2) if self.written else ("", "0", "0")
         return Place(file, int(line), int(column)) if int(line) > 0 else None
 
@@ -146,14 +152,14 @@ class Beat:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """A run that came to its end, or whose log could not be written.
+    """The result of a run that ended, or whose log could not be written.
 
     Attributes:
-        report: None where nothing was run, or not to its end.
+        report: None where nothing was run, or the run did not end.
         findings: why nothing was run.
         troubles: why it did not pass, with places in the task file.
-        warnings: what was doubted before it began.
-        notes: what could not be made of it.
+        warnings: of the files and the plan, before the run.
+        notes: pictures and pages that could not be made, and numbers better than the baseline.
     """
 
     report: RunReport | None

@@ -1,4 +1,4 @@
-"""One run in a process of its own, seen from its parent: start, watchdog, and what came of it."""
+"""One run in its own process, seen from its parent: start, watchdog, and report."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ sys.path[:] = json.loads(sys.argv[1])
 from manipcli.batch.child import main
 main(int(sys.argv[2]))
 """
-"""The child finds what its parent finds, however that was started; `-P`: and not what lies in the working directory."""
+"""The child has the module path of its parent, and not the working directory (`-P`)."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-"""Where nothing else is said: as many runs as there are cores leave none for threads of libraries."""
+"""Default environment: with one run per core, threads of libraries would compete for the cores."""
 DRAWING = """
 import json, sys
 sys.path[:], log, picture, packages, outside = json.loads(sys.argv[1])
@@ -41,26 +41,26 @@ from pathlib import Path
 from manipcli.batch.telling import draw
 draw(Path(log), Path(picture), package_path=[Path(path) for path in packages], allow_outside=outside)
 """
-"""The picture of what a run left that did not come to its end."""
+"""Draws the partial log of a run that did not end."""
 DRAWING_TIME = 30.0
-"""[s] that drawing may take."""
+"""[s] limit of the time for drawing."""
 LAST_WORDS = 0.5
-"""[s] that a process has to write down where it is, before it is ended."""
+"""[s] for a process to write its stack trace before it is killed."""
 TELLING_TIME = 60.0
-"""[s] that whatever is made of a run that is over may be silent, where the run itself may be so no longer."""
+"""[s] least limit of silence after the verdict, while pictures and pages are made."""
 HALF_SAID = 5.0
-"""[s] that a process may stop in the middle of a message, and take to be gone once it has said all."""
+"""[s] limit for a process to complete a message, and to exit after its last one."""
 LONGEST_WAIT = 60.0
-"""[s] between two looks at a run that says nothing."""
+"""[s] between two checks of a silent run."""
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
 
 
 def run_job(job: Job, *, observer: Callable[[Beat], None] | None = None, command: tuple[str, ...] = ()) -> CaseReport:
-    """What came of a job. An exception (an interrupt) ends the process and removes what it left.
+    """Runs a job and returns its report. An exception (an interrupt) kills the process and removes its files.
 
     Args:
         job: the run.
-        onlooker: called with each sign of life.
+        observer: callback for each heartbeat.
         command: another program instead of `batch/child.py`.
     """
     if job.case.findings:
@@ -68,10 +68,10 @@ def run_job(job: Job, *, observer: Callable[[Beat], None] | None = None, command
     try:
         process = Process(job, command=command)
     except Taken:
-        where = f"writes into '{job.settings.folder}', too"
-        return _no_process(job, f"another process is running this task, and {where}; nothing was run")
+        where = f"writes to '{job.settings.folder}'"
+        return _no_process(job, f"another process is running this task and {where}; nothing was run")
     except OSError as error:
-        return _no_process(job, f"it cannot be run: {error}")
+        return _no_process(job, f"the task cannot be run: {error}")
     try:
         while True:
             wait([process.connection], max(0.0, min(LONGEST_WAIT, process.patience)))
@@ -88,24 +88,24 @@ def run_job(job: Job, *, observer: Callable[[Beat], None] | None = None, command
 
 
 class Process:
-    """A job that is being done.
+    """A running job.
 
     Attributes:
-        job: which.
-        connection: readable when the process says something or is gone.
-        doing: the last that is known of it.
+        job: the job.
+        connection: readable when the process has sent a message or has exited.
+        doing: its last heartbeat.
     """
 
     def __init__(self, job: Job, *, command: tuple[str, ...]) -> None:
-        """Starts it.
+        """Starts the process.
 
         Args:
-            job: what it does.
-            command: another program that speaks with its parent as `batch/child.py` does.
+            job: the job.
+            command: another program with the messages of `batch/child.py`.
 
         Raises:
-            Taken: another process, of another batch, is doing it.
-            OSError: its files cannot be written, or there is no process to be had.
+            Taken: a process of another batch is running this job.
+            OSError: its files cannot be written, or no process can be started.
         """
         self.job = job
         job.output.parent.mkdir(parents=True, exist_ok=True)
@@ -115,8 +115,8 @@ class Process:
         self._judged: float | None = None
         self.connection: Connection[Job, Message]
         self.connection, childs = Pipe()
-        with socket(fileno=os.dup(self.connection.fileno())) as one:
-            one.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
+        with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
+            duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
         _remove(job.log, job.partial, job.picture, job.page)
         self._process = subprocess.Popen(
@@ -125,34 +125,34 @@ class Process:
             stdout=self._output,
             stderr=self._output,
             pass_fds=(childs.fileno(),),
-            start_new_session=True,  # no signal of a terminal reaches it: its parent decides
+            start_new_session=True,  # signals of the terminal reach only the parent
             env={**ONE_THREAD, **os.environ},
         )
         childs.close()
-        with suppress(ConnectionError):  # it is gone already, which is heard of
+        with suppress(ConnectionError):  # it has exited already, which `hear` finds
             self.connection.send(job)
 
     @property
     def elapsed(self) -> float:
-        """[s] since it was started, until it was judged."""
+        """[s] from its start to its verdict, or to now."""
         return (time.monotonic() if self._judged is None else self._judged) - self._began
 
     @property
     def patience(self) -> float:
-        """[s] until it will be given up on, as far as is known now."""
-        quiet = time.monotonic() - self._heard
+        """[s] until it will be stopped, unless it sends a message."""
+        silent = time.monotonic() - self._heard
         if self._judged is not None:
-            return self._silence - quiet
-        return min(self._silence - quiet, self.job.settings.timeout - self.elapsed)
+            return self._silence - silent
+        return min(self._silence - silent, self.job.settings.timeout - self.elapsed)
 
     @property
     def _silence(self) -> float:
-        """[s] that it may say nothing."""
+        """[s] limit of the time without a message."""
         silence = self.job.settings.silence
         return silence if self._judged is None else max(silence, TELLING_TIME)
 
     def hear(self) -> CaseReport | None:
-        """Takes what the process has said; what came of it once it is gone."""
+        """Receives the messages of the process; returns its report once it has exited."""
         try:
             while self.connection.poll():
                 message = self.connection.recv()
@@ -169,10 +169,10 @@ class Process:
         return None
 
     def give_up(self, why: str = "") -> CaseReport:
-        """Ends the process, which is taking too long or is silent for too long, or `why` else."""
+        """Kills the process: it exceeds its time or is silent for too long, or `why`."""
         timeout = self.job.settings.timeout
         over = self._judged is None and self.elapsed >= timeout
-        limit = f"it took longer than {timeout:g} s" if over else f"no progress for {self._silence:g} s"
+        limit = f"timeout after {timeout:g} s" if over else f"no progress for {self._silence:g} s"
         self._process.send_signal(signal.SIGUSR1)
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(LAST_WORDS)
@@ -180,13 +180,13 @@ class Process:
         return self._report("hung", f"hung: {why or limit}; {self.doing}")
 
     def end(self) -> None:
-        """Ends the process; nothing is made of it."""
+        """Kills the process, without a report."""
         self._process.kill()
         self._process.wait()
         self.connection.close()
 
     def forget(self) -> None:
-        """Ends the process, and removes what it left."""
+        """Kills the process, and removes its files."""
         self.end()
         _remove(self.job.log, self.job.partial, self.job.picture, self.job.output, self.job.page)
         self._output.close()
@@ -199,7 +199,7 @@ class Process:
         if end is None:
             if code < 0:
                 cause = f"crashed by {signal_name(-code)}"
-                hint = "; was there too little memory?" if -code == signal.SIGKILL else ""
+                hint = "; check that there is enough memory" if -code == signal.SIGKILL else ""
                 return self._report("crashed", f"{cause}; {self.doing}{hint}")
             return self._report("crashed", f"ended with exit code {code} before it was done: {self._last_line()}")
         if end.report is None and end.troubles:
@@ -207,7 +207,7 @@ class Process:
         if end.report is None:
             return self._report("invalid", "the task cannot be run", end=end)
         word = _WORDS.get(exit_code(end.report.verdict), "error")
-        if word == "passed" and end.troubles:  # it is worse than it was
+        if word == "passed" and end.troubles:  # worse than the baseline
             return self._report("failed", end.troubles[0].message, end=end, verb="test")
         return self._report(word, end.report.verdict.text, end=end)
 
@@ -246,7 +246,7 @@ class Process:
         return self._with_page(report) if unfinished else report
 
     def _with_page(self, report: CaseReport) -> CaseReport:
-        """With the page about it that its own process did not write, where one is wanted."""
+        """Adds the page that the child process did not write, where pages are requested."""
         page, index = self.job.page, self.job.index
         if page is None:
             return report
@@ -260,22 +260,22 @@ class Process:
         return replace(report, page=str(page))
 
     def _draw_what_is_left(self) -> None:
-        """The end of the log as far as it got, drawn where whatever went wrong cannot do so once more."""
+        """Draws the end of the partial log, in another process: it may crash for the same reason as the run."""
         if not self.job.partial.exists():
             return
         settings = self.job.settings
         packages = [str(path) for path in settings.package_path]
-        told = [sys.path, str(self.job.partial), str(self.job.picture), packages, settings.allow_outside]
+        arguments = [sys.path, str(self.job.partial), str(self.job.picture), packages, settings.allow_outside]
         with suppress(subprocess.TimeoutExpired):
             subprocess.run(
-                [sys.executable, "-P", "-c", DRAWING, json.dumps(told)],
+                [sys.executable, "-P", "-c", DRAWING, json.dumps(arguments)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                 timeout=DRAWING_TIME, check=False, start_new_session=True,
             )  # fmt: skip
 
     def _last_line(self) -> str:
         lines = self.job.output.read_text("utf-8", "replace").splitlines()
-        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "it printed nothing")
 
 
 def _no_process(job: Job, why: str) -> CaseReport:
@@ -306,10 +306,10 @@ def _unreadable(job: Job) -> CaseReport:
 
 
 def _locked(path: Path) -> BinaryIO:
-    """The file, empty, for this process alone, as long as it or a child that writes into it has it open.
+    """Opens the file, empty and locked, as long as this process or a child that writes to it has it open.
 
     Raises:
-        Taken: somebody else has it.
+        Taken: another process has locked it.
         OSError: it cannot be written.
     """
     while True:
@@ -324,7 +324,7 @@ def _locked(path: Path) -> BinaryIO:
         except (Taken, OSError):
             file.close()
             raise
-        file.close()  # who had it before has removed it meanwhile
+        file.close()  # its previous owner has removed it meanwhile
 
 
 def _remove(*files: Path | None) -> None:

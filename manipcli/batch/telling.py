@@ -1,4 +1,4 @@
-"""What is told of a run besides its verdict: why it did not pass and where that was written, a picture, a page."""
+"""Reports of a run besides its verdict: causes of a failure with their places, a picture, a page."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SIZE = (960, 720)
 
 
 def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
-    """What no step or expectation tells, then steps that went wrong, then expectations; none of what passed."""
+    """Causes of a failure: errors of the run, then failed steps, then unmet expectations; empty if it passed."""
     if verdict.verdict == "passed":
         return ()
     task = load.load_task(job.path, model=task_spec(), overrides=job.settings.overrides, seed=job.settings.seed)
@@ -43,21 +43,21 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
     ]
     refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
     unmet = [
-        Trouble(describe_expectation(one), _place(job, task, *key), one.at)
-        for key, one in zip(task.spec.judged_at, verdict.expectations, strict=False)
-        if one.outcome != "passed" and not refused
+        Trouble(describe_expectation(expectation), _place(job, task, *key), expectation.at)
+        for key, expectation in zip(task.spec.judged_at, verdict.expectations, strict=False)
+        if expectation.outcome != "passed" and not refused
     ]
     if verdict.verdict == "error" or verdict.ended_between:
-        told = [Trouble(finding.message, finding.place) for finding in verdict.errors]
-        return (*(told or [Trouble(verdict.text)]), *steps, *unmet)
+        errors = [Trouble(finding.message, finding.place) for finding in verdict.errors]
+        return (*(errors or [Trouble(verdict.text)]), *steps, *unmet)
     return (*steps, *unmet)
 
 
 def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], list[str]]:
-    """What is worse than the baseline of the task, and notes of what is better; nothing where it has none.
+    """What is worse than the baseline of the task, and notes about what is better; empty without a baseline.
 
     Raises:
-        InvalidInput: its baseline cannot be read.
+        InvalidInput: the baseline cannot be read.
     """
     old = read_baseline(kept_baseline(job.path))
     if old is None:
@@ -66,17 +66,17 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
     changes = compared(old, measured(verdict, job.log), task.spec.baseline.tolerance)
     loc: dict[Key, Loc] = {("steps", step.id): ("steps", k) for k, step in enumerate(verdict.steps)}
     judged = zip(task.spec.judged_at, verdict.expectations, strict=False)
-    loc |= {("margins", one.name): key for key, one in judged}
+    loc |= {("margins", expectation.name): key for key, expectation in judged}
     worse = tuple(
-        Trouble(f"{one.word} the baseline: {one}", _place(job, task, *loc.get(one.key, ("task",))))
-        for one in changes
-        if one.worse
+        Trouble(f"{change.word} the baseline: {change}", _place(job, task, *loc.get(change.key, ("task",))))
+        for change in changes
+        if change.worse
     )
-    return worse, [f"{one.word} the baseline: {one}" for one in changes if not one.worse]
+    return worse, [f"{change.word} the baseline: {change}" for change in changes if not change.worse]
 
 
 def _place(job: Job, task: Located[TaskSpec], *key: str | int) -> Place:
-    """Where something stands in the task file, under the name by which that is shown."""
+    """The place of a key in the task file, with the displayed name of the file."""
     found = task.place(*key)
     return Place(job.case.file, found.line, found.column)
 
@@ -90,10 +90,10 @@ def draw(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> None:
-    """The picture of a moment of a log, `at` [s], or of its end, with the files of `meshes`, where they are known.
+    """Draws a log at the time `at` [s], or at its end, with the known mesh files `meshes`.
 
     Raises:
-        ManipcliError: the log shows nothing, or a mesh is not there.
+        ManipcliError: the log has nothing to draw, or a mesh is missing.
     """
     playback = open_playback(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
     with Frames(playback, size=SIZE) as frames:
@@ -102,13 +102,14 @@ def draw(
 
 
 def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
-    """The page about the run, as `manipcli run --report` makes it. What is `found` to be worse than its baseline in a
-    run that passed is why the test failed.
+    """Writes the page about the run, as `manipcli run --report` does.
+
+    In a run that passed, `found` is what is worse than the baseline: the page shows it as the cause of the failure.
 
     Raises:
-        ManipcliError: the log shows nothing.
+        ManipcliError: the log has nothing to draw.
     """
-    assert job.page is not None, "a page is wanted"
+    assert job.page is not None, "pages are requested"
     settings = job.settings
     if report.log is None:
         task = load_task(
@@ -130,28 +131,28 @@ def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
 
 
 def write_invalid_page(job: Job, findings: Sequence[Diagnostic]) -> None:
-    """The page about a task that cannot be used, as `manipcli run --report` makes it, where pages are wanted.
+    """Writes the page about an invalid task, as `manipcli run --report` does, where pages are requested.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the page cannot be written.
     """
     if job.page is not None:
         _write(job, invalid_page(invalid_verdict(job.path, findings), findings))
 
 
 def _write(job: Job, page: RunPage) -> None:
-    assert job.page is not None, "a page is wanted"
+    assert job.page is not None, "pages are requested"
     job.page.parent.mkdir(parents=True, exist_ok=True)
     write_whole(job.page, render_page(replace(page, index=job.index)).encode())
 
 
 def _causes(page: RunPage, found: Sequence[Trouble]) -> tuple[Cause, ...]:
     """Troubles for a page, those of steps and expectations with their lines."""
-    lines = {one.place: one for one in (*page.steps, *page.expectations)}
+    lines = {line.place: line for line in (*page.steps, *page.expectations)}
 
     def written(place: Place | None) -> Written | None:
         if place is None:
             return None
         return lines.get(f"{Path(place.file).name}:{place.line}", Written(str(place)))
 
-    return tuple(Cause(one.message, "", one.at, written(one.place)) for one in found)
+    return tuple(Cause(trouble.message, "", trouble.at, written(trouble.place)) for trouble in found)

@@ -1,1 +1,1 @@
-"""The command line: parses arguments, calls the pipeline, prints what `report` rendered, returns an exit code."""
+"""The command line: parses arguments, calls the pipeline, prints what `report` renders, returns an exit code."""

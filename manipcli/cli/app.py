@@ -1,4 +1,4 @@
-"""The command line as a whole: its commands, and the one place where an error becomes a message and an exit code."""
+"""The command line: its commands, and the only place that turns an error into a message and an exit code."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ _COMPLETION = "_MANIPCLI_COMPLETE"
 
 _FULL = {
     errno.ENOSPC: "the disk is full",
-    errno.EDQUOT: "there is no space left on the disk",
-    errno.EFBIG: "the file may not grow",
+    errno.EDQUOT: "the disk quota is exceeded",
+    errno.EFBIG: "the file size limit is exceeded",
 }
 
 _EXIT_CODES = (
@@ -66,7 +66,7 @@ _JARGON = (
     ("Input should be greater than or equal to ", "must be at least "),
     ("Input should be less than or equal to ", "must be at most "),
 )
-"""What pydantic says for Typer, and what is told instead."""
+"""Wording of pydantic in messages of Typer, and its replacement."""
 
 COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "init": init.init,
@@ -92,14 +92,14 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
 
 
 def _app(words: Sequence[str]) -> typer.Typer:
-    """The commands, for a command line of these words.
+    """The Typer app for a command line of these words.
 
-    Typer reads the parameters of every command that it is given, at 2 ms each. Only the one that is called shows it
-    any, or all of them where a shell asks for completions; of the others the help has the names and first sentences.
+    Typer reads the parameters of every registered command, at 2 ms each. Only the called command is registered with
+    its parameters, or all of them where a shell asks for completions; the help needs only names and first sentences.
     """
     app = typer.Typer(
         name="manipcli",
-        help="Manipulation tasks as files: check, plan, simulate, record and judge them.",
+        help="Check, plan, simulate, record and judge manipulation tasks.",
         # Rich help doubles the time of --help; plain help is within 10 % of importing typer.
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
@@ -134,12 +134,12 @@ def _root(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command line and returns its exit code; shows no traceback unless MANIPCLI_DEBUG is set."""
+    """Runs one command line and returns its exit code; prints no traceback unless MANIPCLI_DEBUG is set."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if arguments is None:  # this process is that of the command
+    if arguments is None:  # the process of the command, not a call from Python
         collector.spare()
         if not os.environ.get("MANIPCLI_DEBUG"):
-            warnings.simplefilter("ignore")  # an overflow of numpy's tells users nothing that a finding does not
+            warnings.simplefilter("ignore")  # findings report what numpy warns of
     console.prepare()
     try:
         code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
@@ -151,14 +151,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Also one of which another error was made while a program starts: by Python 3.11 of what interrupts the making of
-    a class, by pydantic of what interrupts that of a model."""
+    """Whether this is Ctrl-C, or an error that it caused during start-up: Python 3.11 wraps an interrupt in the
+    creation of a class, pydantic one in the creation of a model."""
     of_a_model = type(error).__name__ == "SchemaError" and KeyboardInterrupt.__name__ in str(error)
     return of_a_model or isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
 
 
 def _fail(error: BaseException, *, format_: str) -> ExitCode:
-    """Tells an error: as text on stderr; or as the one JSON object, or SARIF, on stdout."""
+    """Prints an error: as text on stderr; or as one JSON object, or SARIF, on stdout."""
     from manipcli.report import json, text
 
     code, findings = _classify(error)
@@ -176,55 +176,57 @@ def _fail(error: BaseException, *, format_: str) -> ExitCode:
         else:
             console.talk("\n".join(map(text.describe, findings)))
     except OSError:
-        return ExitCode.INTERNAL  # there is nowhere left to say it
+        return ExitCode.INTERNAL  # no stream is left to print to
     return code
 
 
 def _classify(error: BaseException) -> tuple[ExitCode, tuple[Diagnostic, ...]]:
-    """The exit code of an error, and what to tell of it."""
+    """The exit code of an error, and its findings."""
     if isinstance(error, ManipcliError):
         return error.exit_code, error.findings
     if isinstance(error, TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "manipcli"
         finding = Diagnostic(
-            code="USE001", message=_without_jargon(error.format_message()), hint=f"`{command} --help` shows the usage"
+            code="USE001", message=_without_jargon(error.format_message()), hint=f"run `{command} --help` for the usage"
         )
         return ExitCode.USAGE, (finding,)
     if _is_interrupt(error):
         return ExitCode.INTERRUPTED, (Diagnostic(code="USE002", message="interrupted"),)
     if isinstance(error, OSError) and error.errno in _FULL:
-        where = "what was to be written" if error.filename is None else str(error.filename)
+        where = "output" if error.filename is None else str(error.filename)
         message = f"{where}: {_FULL[error.errno]} ({error.strerror})"
         return ExitCode.INTERNAL, (Diagnostic(code="INT001", message=message),)
     if isinstance(error, OSError) and error.filename is not None:
         return ExitCode.USAGE, (Diagnostic(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
-    if isinstance(error, FileNotFoundError):  # of no name: the working folder's was asked for, or `tempfile` says this
+    if isinstance(error, FileNotFoundError):  # without a name: of the working directory, or from `tempfile`
         if error.strerror == os.strerror(errno.ENOENT):
-            finding = Diagnostic("USE004", "the working folder has been removed", hint="enter it again, or another one")
+            finding = Diagnostic(
+                "USE004", "the working directory has been removed", hint="change to an existing directory"
+            )
         else:
-            finding = Diagnostic("USE006", str(error.strerror or error), hint="TMPDIR=FOLDER names another one")
+            finding = Diagnostic("USE006", str(error.strerror or error), hint="set TMPDIR to a writable folder")
         return ExitCode.USAGE, (finding,)
     if isinstance(error, UnicodeEncodeError) and error.encoding == sys.getfilesystemencoding() != "utf-8":
-        message = f"no file can be called '{error.object}': this locale knows {error.encoding} only"
+        message = f"'{error.object}' cannot be a file name: the encoding of the locale is {error.encoding}"
         return ExitCode.USAGE, (Diagnostic("USE005", message, hint="set LC_ALL=C.UTF-8"),)
     finding = Diagnostic(
         code=ManipcliError.code,
         message=f"{type(error).__name__}: {error}".replace("\n", " "),
-        hint="this is a bug in manipcli; MANIPCLI_DEBUG=1 shows where",
+        hint="this is a bug in manipcli; set MANIPCLI_DEBUG=1 for the traceback",
     )
     return ExitCode.INTERNAL, (finding,)
 
 
 def _without_jargon(message: str) -> str:
-    """Typer's message without what pydantic, which it uses, puts before its own, and in our words for numbers."""
-    for theirs, ours in _JARGON:
-        message = re.sub(theirs, ours, message, count=1)
+    """Typer's message without the prefix of pydantic, and with plain words for numbers."""
+    for pattern, replacement in _JARGON:
+        message = re.sub(pattern, replacement, message, count=1)
     return message
 
 
 def _wanted_format(words: Sequence[str]) -> str:
-    """What `--format` says in the command line: it holds for usage errors, too."""
+    """The value of `--format` in the words of a command line, which usage errors follow, too."""
     formats = [second for first, second in pairwise(words) if first == "--format"]
     formats += [word.removeprefix("--format=") for word in words if word.startswith("--format=")]
     return next((name for name in ("json", "sarif") if name in formats), "text")

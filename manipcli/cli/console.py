@@ -1,9 +1,8 @@
-"""The only file that prints. stdout is the result, stderr is talk.
+"""Printing: results to stdout, everything else to stderr. No other file prints.
 
-Text is made safe before it reaches a terminal (control characters escaped, what the encoding lacks written as `\\x..`),
-and coloured only on a terminal that wants it; colour never says what the words do not. A reader that goes away
-(`manipcli list | head`) ends nothing: the exit code stays that of the command. Only a file that goes to stdout must get
-there whole.
+Text is made safe for a terminal (control characters escaped, characters outside the encoding written as `\\x..`) and
+coloured only on a terminal without NO_COLOR; colour adds no information. A reader that closes the pipe
+(`manipcli list | head`) does not change the exit code. Only a file that is written to stdout must be complete.
 """
 
 from __future__ import annotations
@@ -20,23 +19,23 @@ from typing import TextIO
 from manipcli.core.text import escape
 
 MOST_NOT_DRAWN = 5
-"""Lines that are told of what a picture lacks."""
+"""Lines printed at most about parts that a picture lacks."""
 STDOUT = "standard output"
-"""What stdout is called where it cannot be written."""
+"""Name of stdout in errors."""
 _COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[": "36", "hint:": "36"}
 _PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
 
 
 def prepare() -> None:
-    """Once at the start: no character may fail to print, and no file may take the place of a closed stream.
+    """Prepares the streams, once: every character can be printed, and no file replaces a closed stream.
 
-    Started with `>&-`, the next file that is opened would get descriptor 1, and what others print would go there.
+    Started with `>&-`, the next opened file would get descriptor 1 and receive what libraries print.
     """
     for descriptor in (0, 1, 2):
         try:
             os.fstat(descriptor)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # the lowest that is free: this one
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free descriptor, which is this one
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -44,20 +43,20 @@ def prepare() -> None:
 
 
 def result(text: str) -> None:
-    """What the command was asked for, to stdout."""
+    """Prints a result to stdout."""
     _write(sys.stdout, f"{_dressed(text, sys.stdout)}\n")
 
 
 def result_is_terminal() -> bool:
-    """Whether somebody looks at what the command was asked for, and no file or program takes it."""
+    """Whether stdout is a terminal, and not a file or a pipe."""
     return _is_terminal(sys.stdout)
 
 
 def result_bytes(path: Path) -> None:
-    """A file that the command was asked for, to stdout as it is.
+    """Writes a file to stdout unchanged.
 
     Raises:
-        OSError: it did not get there whole, also where the reader went away.
+        OSError: not all of it could be written, also where the reader closed the pipe.
     """
     stream = sys.stdout
     if stream is None or stream.closed:
@@ -67,12 +66,12 @@ def result_bytes(path: Path) -> None:
 
 
 def talk(text: str) -> None:
-    """Everything else, to stderr."""
+    """Prints progress, notes and errors to stderr."""
     _write(sys.stderr, f"{_dressed(text, sys.stderr)}\n")
 
 
 def not_drawn(lines: Sequence[str]) -> None:
-    """What a picture lacks: some of it, and how much more."""
+    """Prints the first parts that a picture lacks, and the number of the others."""
     shown = lines if len(lines) <= MOST_NOT_DRAWN else lines[: MOST_NOT_DRAWN - 1]
     for line in shown:
         talk(f"not drawn: {line}")
@@ -81,7 +80,7 @@ def not_drawn(lines: Sequence[str]) -> None:
 
 
 def is_live() -> bool:
-    """Whether stderr is a terminal whose line can be drawn again."""
+    """Whether stderr is a terminal whose line can be redrawn."""
     return _is_terminal(sys.stderr) and os.environ.get("TERM") != "dumb"
 
 
@@ -121,9 +120,9 @@ def _write(stream: TextIO | None, text: str) -> None:
 
 @contextmanager
 def _through(stream: TextIO, *, whole: bool = False) -> Iterator[None]:
-    """What is written in the block goes through to the end: a full disk or a closed pipe is met here, not at exit.
+    """Flushes what the block writes, so that a full disk or a closed pipe is found here and not at exit.
 
-    `whole`: a reader that went away before is an error.
+    `whole`: a closed pipe is an error.
     """
     try:
         yield
@@ -136,7 +135,7 @@ def _through(stream: TextIO, *, whole: bool = False) -> Iterator[None]:
 
 
 def _abandon(stream: TextIO) -> None:
-    """Sends what is still buffered nowhere, or the interpreter would try again at exit and change the exit code."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
+    """Discards what is still buffered: the interpreter would flush it at exit and change the exit code."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, stream.fileno())
+    os.close(null)

@@ -1,4 +1,4 @@
-"""`run --log -`: the log to stdout, when it is whole; the text that would be there goes to stderr."""
+"""The log on stdout (`run --log -`), written when it is complete; the text report goes to stderr."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError
 
 
 class LogCut(ManipcliError):
-    """Whoever read the log went away before its end."""
+    """The reader of the log closed the pipe before its end."""
 
     code = "LOG201"
 
     def __init__(self) -> None:
-        super().__init__("standard output: the log is lost, its reader went away before the end")
+        super().__init__("standard output: the log is incomplete: its reader closed the pipe before the end")
 
 
 def refuse_stdout(format_: OutputFormat) -> None:
     """
     Raises:
-        InvalidInput: somebody else wants stdout, or it is a terminal.
+        InvalidInput: `--format json` writes to stdout, too, or it is a terminal.
     """
     if format_ == "json":
-        message = "--log - and --format json both want stdout"
-        raise InvalidInput([Diagnostic("USE051", message, hint="give the log a file, or leave out --format json")])
+        message = "--log - and --format json both write to stdout"
+        raise InvalidInput([Diagnostic("USE051", message, hint="write the log to a file, or omit --format json")])
     if console.result_is_terminal():
-        message = "the log would go to the terminal, which cannot show it"
+        message = "--log - would write the binary log to the terminal"
         raise InvalidInput([Diagnostic("USE048", message, hint="redirect it: --log - > run.mcap")])
 
 
 @contextmanager
 def stdout_or(log: Path | None) -> Iterator[Path | None]:
-    """Where a run may write its log: `log` itself, or for `-` a file that goes to stdout at the end, however that is.
+    """The file for the log of a run: `log` itself, or for `-` a temporary file that is copied to stdout at the end.
 
-    The log is judged from its file before it is finished, so a pipe cannot take its place.
+    The log is judged from its file before it is finished, so a pipe cannot replace the file.
 
     Raises:
-        LogCut: it did not get there whole. Typer would take the error of the pipe for an end without a word.
+        LogCut: not all of it could be copied. Typer would end without a message on the error of the pipe.
         OSError: the disk is full.
     """
     if log is None or str(log) != "-":
@@ -53,7 +53,7 @@ def stdout_or(log: Path | None) -> Iterator[Path | None]:
         try:
             yield path
         finally:
-            # Finished or not: of a run that broke off, what there is.
+            # Also the partial log of a run that did not finish.
             for written in (path, path.with_name(f"{path.name}.partial")):
                 if written.exists():
                     try:

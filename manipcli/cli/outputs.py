@@ -1,4 +1,4 @@
-"""Files that commands write besides what they print: where they may be, and `--report` and `--junit` of a run."""
+"""Output files of commands: checks of their paths, and `--report` and `--junit` of a run."""
 
 from __future__ import annotations
 
@@ -16,62 +16,59 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from manipcli.judge.verdict import Verdict
-    from manipcli.task.task import Task
+    from manipcli.pipeline import Task
 
 ReportFile = Annotated[
     Path | None,
-    typer.Option("--report", metavar="FILE.html", help="Write one page for a person: verdict, cause, replay, numbers."),
+    typer.Option("--report", metavar="FILE.html", help="Write an HTML report: verdict, cause, replay, numbers."),
 ]
-JunitFile = Annotated[
-    Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdict as JUnit XML, for CI.")
-]
+JunitFile = Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdict as JUnit XML.")]
 
 
 def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None] = ()) -> None:
-    """Before anything is run: each file that is to be written has a place of its own.
+    """Checks the output files of a command before anything is run.
 
     Args:
-        outputs: the option that names it, and where it goes; None: it is not asked for.
-        reads: what the same command reads, or writes under rules of its own.
+        outputs: the option and its path; None: the option is not given.
+        reads: files that the same command reads, or writes under other rules.
 
     Raises:
-        InvalidInput: the file of another option or one that is read is there, a folder is, or there is no folder, or
-            one that nothing can be written in; or it is `-`, where stdout has the answer.
+        InvalidInput: a path is used twice, is a folder or `-`, or its folder is missing or not writable.
     """
     taken = [os.path.realpath(path) for path in reads if path is not None]
     for option, path in outputs:
         if path is None:
             continue
         if str(path) == "-":
-            message = f"{option} '-': stdout has the answer of the command; expected the name of a file"
+            message = f"{option} '-': stdout holds the result of the command; expected a file name"
             raise InvalidInput([Diagnostic("USE083", message)])
         if os.path.realpath(path) in taken:
-            raise InvalidInput([Diagnostic("USE081", f"{option} '{path}': the same command has that file already")])
+            raise InvalidInput([Diagnostic("USE081", f"{option} '{path}': the command already uses this file")])
         if path.is_dir() or not path.parent.is_dir():
-            what = "is a folder" if path.is_dir() else f"there is no folder '{path.parent}'"
+            what = "is a folder" if path.is_dir() else f"folder '{path.parent}' does not exist"
             raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': {what}")])
         whole = path if path.exists() and not path.is_file() else Path(os.path.realpath(path)).parent
         if not os.access(whole, os.W_OK):
-            raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': nothing can be written in '{whole}'")])
+            raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': '{whole}' is not writable")])
         taken.append(os.path.realpath(path))
 
 
 def check_picture(path: Path | None) -> None:
     """
     Raises:
-        InvalidInput: its name is not that of a PNG file.
+        InvalidInput: its suffix is not `.png`.
     """
     if path is not None and path.suffix.lower() != ".png":
-        raise InvalidInput([Diagnostic("USE063", f"'{path}': a picture is a .png")])
+        raise InvalidInput([Diagnostic("USE063", f"'{path}' is not a .png file")])
 
 
 class Outputs:
-    """What is asked for; looked at before anything is run.
+    """The `--report` and `--junit` files of a command; their paths are checked before anything is run.
 
     Args:
-        report, junit: where each goes, or None.
+        report, junit: path of each, or None.
         others: files that the same command writes or reads.
-        quiet: tell nothing.
+        quiet: do not print which files are written.
 
     Raises:
         InvalidInput: a file cannot be written there.
@@ -85,7 +82,7 @@ class Outputs:
 
     @property
     def wanted(self) -> bool:
-        """Whether there is anything to write."""
+        """Whether one of the options is given."""
         return self._report is not None or self._junit is not None
 
     def of_log(
@@ -100,14 +97,14 @@ class Outputs:
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
     ) -> None:
-        """Writes what is asked for about a log; each file is there whole or not at all.
+        """Writes the requested files about a log; each is written completely or not at all.
 
         Args:
-            log: that was judged.
-            verdict: on it.
-            task, overrides: its file and what was set in it, where the command knows it.
-            warnings: what was doubted before it was run.
-            meshes, package_path, allow_outside: the meshes that are known, and where others may be.
+            log: the judged log.
+            verdict: of the log.
+            task, overrides: task file and its overrides, where the command knows them.
+            warnings: of the files and the plan, before the run.
+            meshes, package_path, allow_outside: known mesh files, and where others may be.
         """
         from manipcli.logs.report import file_places, log_page, log_places
         from manipcli.record.read.reading import open_recording
@@ -127,7 +124,7 @@ class Outputs:
             self._write(self._report, render_page(replace(page, warnings=tuple(warnings))).encode())
 
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Diagnostic]) -> None:
-        """Writes what is asked for about a task of which a step cannot be planned."""
+        """Writes the requested files about a task with a step that cannot be planned."""
         from manipcli.logs.report import refused_page, task_places
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
@@ -140,7 +137,7 @@ class Outputs:
             self._write(self._report, render_page(page).encode())
 
     def of_invalid(self, findings: Sequence[Diagnostic], *, task: Path | None = None, log: Path | None = None) -> None:
-        """Writes what is asked for about a task or a log that cannot be used: no page of an earlier run may stay."""
+        """Writes the requested files about an unusable task or log, so that no page of an earlier run is left."""
         file = task or log
         if file is None or not self.wanted:
             return
@@ -156,7 +153,7 @@ class Outputs:
             self._write(self._report, render_page(invalid_page(verdict, findings, log=name)).encode())
 
     def _forget(self) -> None:
-        """Removes what tells of an earlier run: where this one cannot be told (a full disk), it stands for none."""
+        """Removes the files of an earlier run, which must not be left where writing fails (a full disk)."""
         for path in (self._report, self._junit):
             if path is not None and path.is_file():
                 Path(os.path.realpath(path)).unlink(missing_ok=True)

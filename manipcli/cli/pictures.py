@@ -24,7 +24,7 @@ REDRAW_PERIOD = 0.2
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Pictures:
-    """The options that draw a run, None where one is not given; checked before anything is read or drawn.
+    """The options that draw a run, None where an option is not given; checked before anything is read or drawn.
 
     Raises:
         InvalidInput: an option has no effect or an unusable value, or the extra of the video is not installed.
@@ -48,7 +48,7 @@ class Pictures:
             ("--view", self.view, self.wanted, "--picture, --sheet or --video"),
         ):
             if value is not None and not drawn:
-                hint = f"give {needed}, too"
+                hint = f"add {needed}"
                 raise InvalidInput([Diagnostic("USE062", f"{option} has no effect without {needed}", hint=hint)])
         check_picture(self.picture)
         check_picture(self.sheet)
@@ -88,10 +88,10 @@ class Pictures:
         return default if self.size is None else parse_size(self.size)
 
     def make(self, playback: Playback) -> None:
-        """Draws everything that is asked for; each file is written whole or not at all.
+        """Draws the requested files; each is written completely or not at all.
 
         Raises:
-            InvalidInput: `--at` is no time and no step of the run.
+            InvalidInput: `--at` is neither a time nor a step of the run.
         """
         for path, draw in ((self.picture, self._picture), (self.sheet, self._sheet), (self.video, self._video)):
             if path is not None:

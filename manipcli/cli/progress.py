@@ -1,4 +1,4 @@
-"""How a run shows where it is: a live line on a terminal, one line a step elsewhere. All of it goes to stderr."""
+"""Progress of a run on stderr: a live line on a terminal, one line per step elsewhere."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.report.text import describe, describe_step
 
 REDRAW_PERIOD = 0.1
-"""[s] of wall time between two drawings: more would be felt at 1000 ticks a second, and seen by nobody."""
+"""[s] of wall time between two drawings: drawing more often would slow a run of 1000 ticks per second."""
 
 
 class NamedStep(Protocol):
-    """What is told of a step that begins."""
+    """A step that begins."""
 
     @property
     def id(self) -> str: ...
@@ -25,9 +25,9 @@ class NamedStep(Protocol):
 
 
 class StepProgress:
-    """The progress of one run; a context manager that leaves no half line behind.
+    """Prints the progress of one run; a context manager that clears the live line at its end.
 
-    Between two ticks is also where a run may be stopped: both `tick` and `step_started` raise what `interrupts` raises.
+    A run is interrupted between two ticks: both `tick` and `step_started` raise what `interrupts` raises.
     """
 
     def __init__(self, *, verbose: bool = False, quiet: bool = False, interrupts: Interrupts | None = None) -> None:
@@ -46,10 +46,10 @@ class StepProgress:
             console.redraw("")
 
     def doing(self, what: str) -> None:
-        """Is told to nobody: it soon is done."""
+        """Prints nothing: these activities are short."""
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
-        """What may go wrong, known before the first step."""
+        """Prints warnings before the first step."""
         for finding in findings:
             if not self._quiet:
                 console.talk(describe(finding))
@@ -63,7 +63,7 @@ class StepProgress:
             console.talk(f"{self._head}: started")
 
     def told(self, text: str, *, detail: bool) -> None:
-        """Something that was not planned happened in the step that is on; a `detail` is told to the verbose."""
+        """Prints an unplanned event of the current step; a `detail` only with --verbose."""
         if self._quiet or (detail and not self._verbose):
             return
         if self._live:
@@ -71,7 +71,7 @@ class StepProgress:
         console.talk(f"{self._head}: {text}")
 
     def tick(self, simulated_time: float, wall: float) -> None:
-        """Called often, so it does nothing unless a drawing is due. Both times in s from the start."""
+        """Redraws the live line if that is due. Both times in s from the start."""
         self._may_stop()
         if not self._live or wall < self._next_drawing:
             return
@@ -80,7 +80,7 @@ class StepProgress:
         console.redraw(f"{self._head}  {simulated_time:.2f} s  {speed}")
 
     def step_ended(self, outcome: StepOutcome) -> None:
-        """A step is over, well or not."""
+        """Prints the outcome of a step."""
         if self._live:
             console.redraw("")
         if not self._quiet and (self._verbose or not self._live):

@@ -1,7 +1,7 @@
-"""The plugin of pytest: task files are tests, and `run_task` runs one from a test in Python.
+"""The pytest plugin: it collects task files as tests, and its fixture `run_task` runs a task from a test in Python.
 
-`manipcli test` runs pytest with it, too. It is loaded into every run of pytest, so nothing of manipcli is imported
-before there is a task to run.
+`manipcli test` runs pytest with it, too. Every run of pytest loads it, so it imports nothing of manipcli before it has
+a task to run.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
     from manipcli.report.suite import Case, CaseReport
 
 SUFFIXES = (".yaml", ".yml")
-"""As `batch/first_look.py` has them, which is not imported for any other file."""
+"""The same as in `batch/first_look.py`, which is not imported for any other file."""
 MARKS_OF_PYTEST = frozenset(
     {"filterwarnings", "parametrize", "skip", "skipif", "tryfirst", "trylast", "usefixtures", "xfail"}
 )
-"""Marks that mean something to pytest itself: a tag of that name is a word for `-k` and nothing else."""
+"""Marks with a meaning in pytest itself: a tag with such a name is only a word for `-k`."""
 
 SETTINGS, PROGRESS = "settings", ".progress"
-"""Files in the folder of a session of `manipcli test`: the settings of all runs, and what each process is running."""
+"""Files in the folder of a session of `manipcli test`: settings of all runs, and the current test of each process."""
 REPORT = "manipcli_report"
-"""Attribute of pytest's report that brings a pickled `CaseReport` from a worker to the session."""
+"""Attribute of pytest's report that carries a pickled `CaseReport` from a worker to the session."""
 
 _SEEN = pytest.StashKey[dict[Path, Path]]()
-"""Task files that are tests, by what they are without links."""
+"""Collected task files, by their resolved paths."""
 _TORN = pytest.StashKey[dict[Path, str]]()
-"""Files that look like tasks and are none: what is told of each."""
+"""Files that look like tasks but are not, each with the reason."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -46,17 +46,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--manipcli-samples", type=_count, metavar="N", help="run samples 0 to N-1 of each task that has a `vary:`"
     )
     group.addoption(
-        "--manipcli-logs", type=Path, metavar="DIR", help="where logs and pictures go; runs/test when absent"
+        "--manipcli-logs", type=Path, metavar="DIR", help="write logs and pictures to DIR [default: runs/test]"
     )
     group.addoption(
-        "--manipcli-timeout", type=_limit, default=600.0, metavar="S", help="end a task that takes longer [s]; 0: never"
+        "--manipcli-timeout",
+        type=_limit,
+        default=600.0,
+        metavar="S",
+        help="stop a task after S seconds; 0: never [default: 600]",
     )
     group.addoption(
         "--manipcli-silence",
         type=_limit,
         default=60.0,
         metavar="S",
-        help="end a task that shows no progress for so long [s]; 0: never",
+        help="stop a task after S seconds without progress; 0: never [default: 60]",
     )
     group.addoption("--manipcli-session", type=Path, help=SUPPRESS)
 
@@ -67,8 +71,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """A worker of `manipcli test` says that it is there, and can be interrupted, once, even where a shell that starts
-    the command in the background lets it ignore that."""
+    """Announces a worker of `manipcli test`, and lets SIGINT interrupt it once, even where a shell that starts the
+    command in the background makes it ignore the signal."""
     folder = session.config.getoption("manipcli_session")
     if folder is not None and hasattr(session.config, "workerinput"):
         _progress(folder).touch()
@@ -88,27 +92,28 @@ def _progress(folder: Path) -> Path:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Gives the report of a test to `manipcli test`, with the line and the time of the task."""
+    """Passes the report of a test to `manipcli test`, with the line and the time of the task."""
     report = yield
     if isinstance(item, TaskItem) and item.report is not None and call.when == "call":
         done = item.report
         if item.config.getoption("manipcli_session") is not None:
             setattr(report, REPORT, pickle.dumps(done))
             report.duration = done.duration
-            places = (one.place for one in done.troubles if one.place is not None and one.place.file == done.case.file)
+            places = (trouble.place for trouble in done.troubles)
+            lines = (place.line for place in places if place is not None and place.file == done.case.file)
             report.location = (
                 report.location[0],
-                next((one.line for one in places if one.line), done.case.line),
+                next((line for line in lines if line), done.case.line),
                 item.name,
             )
     return report
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile | None:
-    """The files that `manipcli test` takes, and no others.
+    """Collects the same files as `manipcli test`.
 
-    That is one that is named, and has the top-level key `task`; of others, those with a name there and the key `robot`,
-    each once, whatever links lead to it.
+    A named file needs the top-level key `task`. Other files need a name under `task` and the key `robot`; each is
+    collected once, also if several links lead to it.
     """
     if file_path.suffix.lower() not in SUFFIXES:
         return None
@@ -124,7 +129,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
         return None
     stash = parent.config.stash
     if look in LEFT_OUT:
-        if any(map(parent.session.isinitpath, file_path.parents)):  # pytest asks of what lies beside a named file, too
+        if any(map(parent.session.isinitpath, file_path.parents)):  # pytest also offers the neighbours of a named file
             stash.setdefault(_TORN, {})[file_path] = LEFT_OUT[look]
         return None
     if stash.setdefault(_SEEN, {}).setdefault(file_path.resolve(), file_path) != file_path and not named:
@@ -135,13 +140,13 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
 
 
 def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
-    """What looks like a task and is left out."""
+    """Lines about files that look like tasks and are left out."""
     files = config.stash.get(_TORN, {})
     if not files:
         return []
     from manipcli.batch.discovery import shown_path
 
-    return [f"{shown_path(file)} {told}" for file, told in files.items()]
+    return [f"{shown_path(file)} {reason}" for file, reason in files.items()]
 
 
 class TaskFile(pytest.File):
@@ -151,14 +156,14 @@ class TaskFile(pytest.File):
         from manipcli.batch.discovery import read_case, samples_of, shown_path
 
         case = read_case(self.path, shown=shown_path(self.path))
-        for one in samples_of(case, self.config.getoption("manipcli_samples"), self._named()):
-            for tag in one.tags:
+        for sample in samples_of(case, self.config.getoption("manipcli_samples"), self._named()):
+            for tag in sample.tags:
                 if tag not in MARKS_OF_PYTEST and tag not in _registered(self.config):
                     _register(self.config, tag, "a tag of a task")
-            yield TaskItem.from_parent(self, name=one.name, case=one)
+            yield TaskItem.from_parent(self, name=sample.name, case=sample)
 
     def _named(self) -> set[str]:
-        """Names of tests in this file that were given as ids, or failed last where these are asked for."""
+        """Names of tests in this file that are given as ids, or that failed last with --last-failed."""
         ids = [*self.config.args]
         if self.config.getoption("lf", default=False) and self.config.cache is not None:
             ids += self.config.cache.get("cache/lastfailed", {})
@@ -168,10 +173,10 @@ class TaskFile(pytest.File):
 
 
 class TaskItem(pytest.Item):
-    """One run of a task, in a process of its own."""
+    """One run of a task, in its own process."""
 
     def __init__(self, *, name: str, parent: TaskFile, case: Case) -> None:
-        # Written out as text, from which pytest takes the number of a sample for parameters, as it does in its cache.
+        # A complete node id: pytest reads `[N]` of a sample as parameters, in its cache, too.
         super().__init__(name, parent, nodeid=f"{parent.nodeid}::{name}")
         self._case = case
         self.report: CaseReport | None = None
@@ -183,7 +188,7 @@ class TaskItem(pytest.Item):
     def runtest(self) -> None:
         """
         Raises:
-            TaskFailed: it did not pass.
+            TaskFailed: the task did not pass.
         """
         from manipcli.batch.process import run_job
         from manipcli.report.suite_text import judged_lines
@@ -216,7 +221,7 @@ class TaskItem(pytest.Item):
         return Job(self._case, Path(shown_path(self.path)), settings)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None) -> str:
-        """What `manipcli test` tells of it, instead of a traceback."""
+        """The text of `manipcli test` about the failure, instead of a traceback."""
         if isinstance(excinfo.value, TaskFailed):
             from manipcli.report.suite_text import case_lines, gist
 
@@ -227,7 +232,7 @@ class TaskItem(pytest.Item):
         return str(super().repr_failure(excinfo))
 
     def reportinfo(self) -> tuple[Path, int, str]:
-        """Its place, the line counted from 0: a test that is skipped is reported with it."""
+        """File, line counted from 0, and name: pytest reports a skipped test with them."""
         return self.path, self._case.line - 1, self.name
 
 
@@ -240,7 +245,7 @@ class TaskFailed(Exception):
 
 
 class RunTask(Protocol):
-    """What the fixture `run_task` gives."""
+    """The function that the fixture `run_task` returns."""
 
     def __call__(
         self, path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, sample: int | None = None
@@ -249,11 +254,11 @@ class RunTask(Protocol):
 
 @pytest.fixture
 def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
-    """Runs a task in a process of its own: `run = run_task("pour.yaml", overrides=["scene.cup.mass=80 g"])`.
+    """Runs a task in its own process: `run = run_task("pour.yaml", overrides=["scene.cup.mass=80 g"])`.
 
-    A relative path is looked for beside the file of the test, then below the root of pytest. The log is below
-    `tmp_path`, and `run.log` names it. A task that fails fails no test: `assert run.passed, run.text` does, and tells
-    what went wrong. A crash or a hang does, too, and a file that cannot be used raises `manipcli.InvalidInput`.
+    A relative path is searched next to the file of the test, then below the root of pytest. The log is below
+    `tmp_path`; `run.log` is its path. A failed task alone does not fail the test: `assert run.passed, run.text` does,
+    with the reason. A crash or a hang fails the test, and an invalid file raises `manipcli.InvalidInput`.
     """
     count = 0
 
@@ -299,7 +304,7 @@ def _settings(config: pytest.Config, folder: Path) -> Settings:
 
 
 def _is_looked_for(path: Path, session: pytest.Session) -> bool:
-    """Whether `manipcli test` would enter the folders between this file and what pytest was asked for."""
+    """Whether `manipcli test` would enter the folders between this file and a path that pytest was given."""
     from manipcli.batch.first_look import is_entered
 
     for place in (path, *path.parents):
@@ -312,7 +317,7 @@ def _is_looked_for(path: Path, session: pytest.Session) -> bool:
 
 def _count(word: str) -> int:
     if not word.isdecimal() or int(word) == 0:
-        raise ArgumentTypeError(f"'{word}' is no number from 1 on")
+        raise ArgumentTypeError(f"'{word}' is not an integer of 1 or more")
     return int(word)
 
 
@@ -322,7 +327,7 @@ def _limit(word: str) -> float:
     except ValueError:
         value = math.nan
     if not value >= 0.0:
-        raise ArgumentTypeError(f"'{word}' is no number of seconds, or 0 for never")
+        raise ArgumentTypeError(f"'{word}' is not a number of seconds (0: never)")
     return value
 
 

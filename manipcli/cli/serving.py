@@ -1,4 +1,4 @@
-"""Waiting for Ctrl-C while a page is served: `view` and `replay`."""
+"""Waiting for Ctrl-C while a page is served, for `view` and `replay`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def stay(url: str, *, open_: bool) -> None:
     """Prints the address, with `open_` opens it in a browser, and returns on Ctrl-C."""
     try:  # Ctrl-C may come as soon as the address is printed
         console.result(url)
-        console.talk("Ctrl-C ends it")
+        console.talk("Press Ctrl-C to stop.")
         if open_:
             import webbrowser
 

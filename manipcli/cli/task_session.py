@@ -1,8 +1,8 @@
-"""A pytest session over task files, as `manipcli test` and `bless` run it.
+"""A pytest session over task files, for `manipcli test` and `bless`.
 
-pytest finds, selects and runs the tests through `cli/pytest_plugin.py`, pytest-xdist runs several at a time. Nothing
-of the user's own pytest is picked up: no configuration, conftest, plugin or environment variable. pytest prints
-nothing; a report of each test arrives here as a `CaseReport`.
+pytest finds, selects and runs the tests through `cli/pytest_plugin.py`, pytest-xdist runs them in parallel. The user's
+own pytest configuration, conftest files, plugins and environment variables are ignored. pytest prints nothing; a report
+of each test arrives here as a `CaseReport`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from manipcli.report.suite import CaseReport, Suite, Trouble
 BLOCKED = (
     "terminal", "python", "doctest", "unittest", "faulthandler", "logging", "warnings", "stepwise", "pastebin",
 )  # fmt: skip
-"""Plugins of pytest itself that would print, collect what is not a task, or change signal handlers."""
+"""Plugins of pytest itself that would print, collect other files than tasks, or change signal handlers."""
 CACHE = ".cache"
 """Folder below the logs in which pytest remembers which tests failed."""
 VARIABLES = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DISABLE_PLUGIN_AUTOLOAD")
@@ -40,17 +40,17 @@ JUNIT = "junit.xml"
 
 
 class TaskSession:
-    """The tests below some paths. A context manager: collects them at once, and runs them with `run`.
+    """The tests below some paths. A context manager: the constructor collects them, `run` runs them.
 
     Args:
-        paths: files, folders, and ids as `tasks/pour.yaml::pour[3]`.
+        paths: files, folders, and ids such as `tasks/pour.yaml::pour[3]`.
         settings: of all runs.
-        keyword: an expression as of pytest's `-k`; "" for all.
-        samples: number of samples of each task with a `vary:`; None for the task as it is written.
-        last_failed: only those that failed last; all if none did.
+        keyword: an expression of pytest's `-k`; "" for all.
+        samples: number of samples of each task with a `vary:`; None for the task as written.
+        last_failed: only tests that failed last; all if none failed.
 
     Raises:
-        InvalidInput: a path does not exist or is not a task, or the expression is wrong.
+        InvalidInput: a path does not exist or is not a task, or the expression is invalid.
     """
 
     def __init__(
@@ -85,15 +85,15 @@ class TaskSession:
             *(str(cwd / path) for path in named),
         ]  # fmt: skip
         found = _Collected()
-        told = io.StringIO()
-        with redirect_stderr(told):
+        messages = io.StringIO()
+        with redirect_stderr(messages):
             code = _pytest([*self._words, "--collect-only"], found)
         if code == pytest.ExitCode.USAGE_ERROR:
-            message = told.getvalue().strip().removeprefix("ERROR: ")
-            hint = "for example: -k 'pour and not (slow or kinematic)'" if "'-k'" in message else None
+            message = messages.getvalue().strip().removeprefix("ERROR: ")
+            hint = "write, for example, -k 'pour and not (slow or kinematic)'" if "'-k'" in message else None
             raise InvalidInput([Diagnostic("USE085", message, hint=hint)])
         if code == pytest.ExitCode.INTERNAL_ERROR:
-            raise RuntimeError(told.getvalue())
+            raise RuntimeError(messages.getvalue())
         if found.interrupted:
             raise KeyboardInterrupt
         self.jobs = {item.nodeid: item.job for item in found.chosen}
@@ -113,7 +113,7 @@ class TaskSession:
     def running(self) -> list[tuple[str, str]]:
         """Id and progress of each test that is running."""
         texts = [file.read_text("utf-8") for file in self.folder.glob(f"*{pytest_plugin.PROGRESS}")]
-        return [(id_, doing) for id_, found, doing in (text.partition("\n") for text in texts) if found]
+        return [(id_, activity) for id_, found, activity in (text.partition("\n") for text in texts) if found]
 
     @property
     def junit(self) -> bytes:
@@ -124,15 +124,15 @@ class TaskSession:
         """Runs the tests.
 
         Args:
-            at_once: number of tests that run at a time.
-            ended: called with each report, in the order in which the tests end.
+            at_once: number of parallel tests.
+            ended: callback for each report, in the order in which the tests end.
             first: stop at the first failure.
         """
         began = time.monotonic()
         run = _Run(self, ended, first=first)
         at_once = min(at_once, max(1, len(self.jobs)))
         words = [*self._words, f"--junitxml={self.folder / JUNIT}", *(["-x"] if first else [])]
-        if at_once > 1:  # a worker that is ended because of `-x` needs no successor
+        if at_once > 1:  # a worker that ends because of `-x` is not replaced
             words += ["-p", "xdist.plugin", "-n", str(at_once), "--maxschedchunk=1"]
             words += ["--max-worker-restart=0"] if first else []
         if _pytest(words, run) == pytest.ExitCode.INTERNAL_ERROR:
@@ -148,22 +148,22 @@ class TaskSession:
         return Suite(reports, len(self.jobs), at_once, time.monotonic() - began, stopped, notes, undone)
 
     def _notes(self, found: _Collected, keyword: str) -> Iterator[str]:
-        """What a user would miss."""
+        """Notes about baselines, unreadable files and an expression without a match."""
         yield from found.errors
         if keyword and found.total and not found.chosen:
             yield f"-k '{keyword}' matches none of {number_of(found.total, 'test')}"
         owned = {os.path.realpath(kept_baseline(file)) for file in found.files}
         for file in found.baselines:
             if os.path.realpath(file) not in owned and is_baseline(file):
-                yield f"{shown_path(file)} is the baseline of no task here: rename it as its task, or remove it"
+                yield f"{shown_path(file)}: no task has this baseline; rename it after its task, or remove it"
         uncompared = sum(not job.nominal and kept_baseline(job.path).exists() for job in self.jobs.values())
         if uncompared and self._settings.baseline:
-            why = "it is that of the task as it is written, without --set, --seed and --samples"
-            yield f"{number_of(uncompared, 'test')} not compared with the baseline: {why}"
+            reason = "a baseline is for the task as written, without --set, --seed and --samples"
+            yield f"{number_of(uncompared, 'test')} not compared with the baseline: {reason}"
 
 
 class _Collected:
-    """A plugin: what pytest collects."""
+    """A plugin that records what pytest collects."""
 
     def __init__(self) -> None:
         self.chosen: list[pytest_plugin.TaskItem] = []
@@ -198,7 +198,7 @@ class _Collected:
 
 
 class _Run:
-    """A plugin: what comes of the tests."""
+    """A plugin that records the reports of the tests."""
 
     def __init__(self, session: TaskSession, ended: Callable[[CaseReport], None], *, first: bool) -> None:
         self.reports: dict[str, CaseReport] = {}
@@ -213,7 +213,7 @@ class _Run:
             return
         if known is not None:
             done: CaseReport = pickle.loads(known)
-        else:  # the worker itself is gone, or has a bug
+        else:  # the worker died, or has a bug
             job = self._session.jobs[report.nodeid]
             text = report.longreprtext
             done = CaseReport(job.case, "error", report.duration, job.command(), text, troubles=(Trouble(text),))
@@ -225,7 +225,7 @@ class _Run:
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         if excinfo.type is KeyboardInterrupt:
             self.interrupted = True
-            self.notes += [f"interrupted: {id_}: {doing}" for id_, doing in self._session.running]
+            self.notes += [f"interrupted: {id_}: {activity}" for id_, activity in self._session.running]
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionfinish(self) -> None:
@@ -233,7 +233,7 @@ class _Run:
             self._stop()
 
     def _stop(self) -> None:
-        """Ends what is running in the workers, of which each removes its files."""
+        """Interrupts the workers; each removes the files of its run."""
         self._stopped = True
         for file in self._session.folder.glob(f"*{pytest_plugin.PROGRESS}"):
             worker = int(file.stem)
@@ -249,7 +249,7 @@ def _pytest(words: Sequence[str], plugin: object) -> int:
 
 @contextmanager
 def _own_environment() -> Iterator[None]:
-    """Without options and plugins that the user's environment gives to pytest, here and in its workers."""
+    """Hides pytest options and plugins of the user's environment, here and in the workers."""
     before = {name: os.environ.pop(name) for name in VARIABLES if name in os.environ}
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     try:

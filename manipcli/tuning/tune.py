@@ -33,6 +33,8 @@ from manipcli.tuning.simulated_steps import simulated_answers
 if TYPE_CHECKING:
     from manipcli.replay.curves import Chart
 
+__all__ = ["Tuning", "Wish", "chart_of", "tune", "written"]
+
 RANDOM_CONFIGURATIONS: Final = 60
 """Number of random configurations within the limits, in addition to the named ones; always the same."""
 WIDE: Final = 2.0

@@ -205,7 +205,7 @@ def test_a_baseline_whose_task_was_renamed_is_found(folder: Path) -> None:
         file.write_text("task: t\nrobot: r.yaml\n")
     with TaskSession([Path("own")], Settings()) as session:
         (note,) = session.notes
-    assert note.startswith("own/b.baseline.json is the baseline of no task here: ")
+    assert note.startswith("own/b.baseline.json: no task has this baseline; ")
     with TaskSession(files[:1], Settings()) as session:
         assert session.notes == ()
 

@@ -316,7 +316,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     pipeline.plan_task = lambda _: SimpleNamespace(motions=())
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
-    assert "there is no folder" in capsys.readouterr().err
+    assert "' does not exist" in capsys.readouterr().err
 
 
 def test_a_reader_that_goes_away_is_no_error() -> None:
@@ -340,7 +340,7 @@ def test_a_working_folder_that_was_removed_is_told(tmp_path: Path) -> None:
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
     )
     assert done.returncode == 4
-    assert done.stderr.startswith("error[USE004]: the working folder has been removed\n")
+    assert done.stderr.startswith("error[USE004]: the working directory has been removed\n")
 
 
 def test_a_computer_without_a_folder_for_temporary_files_is_told(
@@ -351,7 +351,7 @@ def test_a_computer_without_a_folder_for_temporary_files_is_told(
     pipeline.run_task = lambda *_, **__: tempfile.gettempdir()
     assert main(["run", "t.yaml"]) == 4
     assert capsys.readouterr().err == (
-        "error[USE006]: No usable temporary directory found in ['/nowhere']\n  hint: TMPDIR=FOLDER names another one\n"
+        "error[USE006]: No usable temporary directory found in ['/nowhere']\n  hint: set TMPDIR to a writable folder\n"
     )
 
 
@@ -362,7 +362,7 @@ def test_a_name_that_the_locale_cannot_write_is_told(
     monkeypatch.setattr(sys, "getfilesystemencoding", lambda: "ascii")
     pipeline.run_task = _raising(UnicodeEncodeError("ascii", "t\xe4.mcap", 1, 2, "ordinal not in range(128)"))
     assert main(["run", "t.yaml"]) == 4
-    told = "error[USE005]: no file can be called 't\xe4.mcap': this locale knows ascii only\n"
+    told = "error[USE005]: 't\xe4.mcap' cannot be a file name: the encoding of the locale is ascii\n"
     assert capsys.readouterr().err.startswith(told)
 
 

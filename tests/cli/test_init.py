@@ -72,10 +72,10 @@ def test_a_folder_whose_name_is_no_text_is_a_project_all_the_same(tmp_path: Path
 @pytest.mark.parametrize(
     ("there", "words", "told"),
     [
-        ("p/tasks", ["p"], "'p/tasks' is a file where a folder is to be"),
-        ("p/tasks", ["p", "--force"], "'p/tasks' is a file where a folder is to be"),
-        ("p", ["p"], "'p' is a file where a folder is to be"),
-        ("p/robots/panda.yaml/x", ["p", "--force"], "'p/robots/panda.yaml' is a folder where a file is to be"),
+        ("p/tasks", ["p"], "'p/tasks' is a file; expected a folder"),
+        ("p/tasks", ["p", "--force"], "'p/tasks' is a file; expected a folder"),
+        ("p", ["p"], "'p' is a file; expected a folder"),
+        ("p/robots/panda.yaml/x", ["p", "--force"], "'p/robots/panda.yaml' is a folder; expected a file"),
     ],
 )
 def test_what_is_in_the_way_is_told_before_anything_is_written(
@@ -100,7 +100,7 @@ def test_what_a_folder_has_before_it_is_a_project_is_kept(
     assert main(["init"]) == 0
     out, err = capsys.readouterr()
     told = out.splitlines()
-    assert "note: .gitignore has no `runs/`, `report/`: git would take" in err
+    assert "note: .gitignore lacks `runs/`, `report/`: add it, or git shows" in err
     assert [line for line in told if line.startswith("kept: ")] == ["kept: README.md", "kept: .gitignore"]
     assert "written: README.md" not in told
     assert {(tmp_path / name).read_text() for name in ("README.md", ".gitignore")} == {"mine"}
@@ -128,8 +128,8 @@ def test_a_folder_below_the_top_of_a_repository_is_told_where_its_workflow_belon
     assert main(["init", "--", "-sub"]) == 0
     note, following = capsys.readouterr().err.splitlines()
     top = tmp_path / ".github" / "workflows" / "manipcli.yml"
-    assert note.startswith("note: GitHub runs workflows at the top of a repository alone: move -sub/.github/workflows/")
-    assert f"manipcli.yml to {top}, begin its job" in note
+    assert note.startswith("note: GitHub runs workflows only from the top of a repository: move -sub/.github/")
+    assert f"manipcli.yml to {top}, add to its job" in note
     assert "`defaults: {run: {working-directory: -sub}}`" in note
     assert following == "next: cd ./-sub && manipcli test"
 

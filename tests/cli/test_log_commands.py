@@ -198,7 +198,7 @@ def test_the_log_to_stdout_is_the_log_and_the_report_goes_to_stderr(
     assert "log: stdout" in written.err.decode()
     assert "wave passed" in written.err.decode()
     assert main(["run", str(task), "--log", "-", "--format", "json"]) == 4
-    assert b"both want stdout" in capfdbinary.readouterr().out
+    assert b"both write to stdout" in capfdbinary.readouterr().out
 
 
 @pytest.mark.slow
@@ -211,7 +211,7 @@ def test_a_log_whose_reader_goes_away_is_lost(task: Path) -> None:
         told = run.stderr.read().decode()
         assert run.wait(60) == 3
     assert told.rstrip().endswith(
-        "error[LOG201]: standard output: the log is lost, its reader went away before the end"
+        "error[LOG201]: standard output: the log is incomplete: its reader closed the pipe before the end"
     )
 
 

@@ -46,7 +46,7 @@ def test_no_command_writes_over_a_file_that_it_has(
 ) -> None:
     before = sorted(path.name for path in folder.iterdir())
     assert main([*words, output]) == 4
-    assert "the same command has that file already" in capsys.readouterr().err
+    assert "the command already uses this file" in capsys.readouterr().err
     assert (folder / "a.png").read_text() == "mine"
     assert sorted(path.name for path in folder.iterdir()) == before
 

@@ -34,7 +34,7 @@ def test_without_an_output_the_options_that_make_one_are_named(log: Path, capsys
     assert main(["plot", str(log)]) == 4
     told = capsys.readouterr()
     assert told.out == ""
-    assert "error[USE065]: no output is given" in told.err
+    assert "error[USE065]: an output is missing" in told.err
     assert all(option in told.err for option in ("-o FILE.svg", "--csv -", "--fields"))
 
 
@@ -133,7 +133,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in that time"),
         (["--from", "500"], "PLOT004", "no value in that time"),
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
-        (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': there is no folder 'absent'"),
+        (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': folder 'absent' does not exist"),
         (["gone.mcap"], "LOG300", "No such file"),
         (["joint_states.position"] * 31, "PLOT005", "more than 400 curves"),
     ],
@@ -177,4 +177,4 @@ def test_what_a_hint_says_of_a_body_can_be_plotted(log: Path, capsys: pytest.Cap
 
 def test_without_a_log_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", "joint_states.position"]) == 4
-    assert "error[USE060]: no log is given" in capsys.readouterr().err
+    assert "error[USE060]: LOG is missing" in capsys.readouterr().err

@@ -165,15 +165,19 @@ def test_silence_and_timeout_are_options(pytester: pytest.Pytester, word: str, s
 
 
 @pytest.mark.parametrize(
-    "words",
-    ["--manipcli-samples=0", "--manipcli-samples=-1", "--manipcli-timeout=-1", "--manipcli-silence=nan"],
+    ("words", "expected"),
+    [
+        ("--manipcli-samples=0", "an integer of 1 or more"),
+        ("--manipcli-samples=-1", "an integer of 1 or more"),
+        ("--manipcli-timeout=-1", "a number of seconds (0: never)"),
+        ("--manipcli-silence=nan", "a number of seconds (0: never)"),
+    ],
 )
-def test_a_number_that_means_nothing_is_wrong_usage(pytester: pytest.Pytester, words: str) -> None:
+def test_a_number_that_means_nothing_is_wrong_usage(pytester: pytest.Pytester, words: str, expected: str) -> None:
     result = pytester.runpytest_inprocess(*LOADED, *ALONE, words)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(
-        [f"*error: argument {words.partition('=')[0]}: '{words.partition('=')[2]}' is no number*"]
-    )
+    option, _, value = words.partition("=")
+    result.stderr.fnmatch_lines([f"*error: argument {option}: '{value}' is not {expected}"])
 
 
 Given = list[Job]

@@ -86,7 +86,7 @@ def test_only_earlier_results_are_replaced_by_results(
     write(folder, "a")
     (folder / name).write_text("task: a\nrobot: r.yaml\nsteps: [\n")
     assert main(["test", ".", "--junit", name]) == 4
-    assert f"error[USE089]: --junit '{name}': there is a file that is no JUnit XML" in capsys.readouterr().err
+    assert f"error[USE089]: --junit '{name}' exists and is not JUnit XML" in capsys.readouterr().err
     assert (folder / name).read_text() == "task: a\nrobot: r.yaml\nsteps: [\n"
 
 
@@ -99,7 +99,7 @@ def test_where_nothing_can_be_written_is_told_before_anything_is_run(
     monkeypatch.setattr(os, "access", lambda place, _: not str(place).endswith("ro"))  # root may write anywhere
     assert main(["test", option, "ro/x"]) == 4
     told = capsys.readouterr()
-    assert (told.out, "nothing can be written in '" in told.err) == ("", True)
+    assert (told.out, "' is not writable" in told.err) == ("", True)
 
 
 def test_a_result_that_cannot_be_written_takes_nothing_from_what_is_told(
@@ -120,7 +120,7 @@ def test_a_result_that_cannot_be_written_takes_nothing_from_what_is_told(
 def test_a_baseline_of_no_task_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "old.baseline.json").write_text('{"duration": 1.0, "margins": {}, "steps": {}}')
     assert main(["test"]) == 5
-    assert capsys.readouterr().out.startswith("old.baseline.json is the baseline of no task here: ")
+    assert capsys.readouterr().out.startswith("old.baseline.json: no task has this baseline; ")
 
 
 def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
@@ -137,7 +137,7 @@ def test_logs_go_where_something_can_be_written(folder: Path, capsys: pytest.Cap
     assert main(["test"]) == 4
     told = capsys.readouterr()
     assert (told.out, "error[USE086]: --logs 'runs/test': " in told.err) == ("", True)
-    assert "hint: --logs DIR names another place" in told.err
+    assert "hint: name another folder with --logs DIR" in told.err
     assert main(["test", "--logs", "else/where"]) == 4
     assert "✗ 1 invalid" in capsys.readouterr().out
     assert (folder / "else" / "where" / ".cache").is_dir()
@@ -397,7 +397,7 @@ def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, run_cli: Any
     write(folder, "a", wait="3600 s")
     ran = run_cli("test", "--timeout", "1 s", cwd=folder)
     assert ran.code == 1
-    assert "hung: it took longer than 1 s; " in ran.out
+    assert "hung: timeout after 1 s; " in ran.out
 
 
 @pytest.mark.slow

@@ -311,9 +311,9 @@ def test_where_nothing_can_be_written_is_told_before_the_run(
 ) -> None:
     task = ROOT / "tasks" / "home.yaml"
     ran = run_here("run", task, option, tmp_path / "nowhere" / "file", cwd=tmp_path)
-    assert ran.code == 4 and "there is no folder" in ran.err
+    assert ran.code == 4 and "' does not exist" in ran.err
     assert not (tmp_path / "runs").exists()
-    assert "has that file already" in run_here("run", task, option, task, cwd=tmp_path).err
+    assert "the command already uses this file" in run_here("run", task, option, task, cwd=tmp_path).err
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""`manipcli at LOG T`: a log at one moment."""
+"""`manipcli at LOG T`: a snapshot of a log."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ def at(
         str,
         typer.Argument(
             metavar="T",
-            help="From the beginning of the log: 3.2, '3.2 s', 250ms; or a step, as it ends.",
+            help="Time from the start of the log: 3.2, '3.2 s', 250ms; or a step, for its end.",
             show_default=False,
         ),
     ],
     *,
     format_: Format = "text",
 ) -> ExitCode:
-    """Show a log at one moment: step, joints, poses, contacts.
+    """Show a snapshot of a log: step, joints, poses, contacts.
 
-    Any ROS 2 log will do, as far as it goes.
+    Works with any ROS 2 log, as far as its topics allow.
     """
     from manipcli.logs.snapshot import moment
     from manipcli.report.snapshot import render_json, render_text
@@ -42,7 +42,7 @@ def _when(log: Path, word: str) -> float:
     """[s] A time, or the end of a step.
 
     Raises:
-        InvalidInput: it is neither.
+        InvalidInput: `word` is neither a time nor a step.
     """
     try:
         return seconds(word)

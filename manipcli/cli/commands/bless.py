@@ -1,4 +1,4 @@
-"""`manipcli bless [PATH...]`: what tasks take and by what margins they pass, kept beside them to compare with."""
+"""`manipcli bless [PATH...]`: baselines of tasks (durations, energy, margins), written next to their files."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 def bless(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[PATH]...", help="Task files, or folders; this one when absent.", show_default=False),
+        typer.Argument(metavar="[PATH]...", help="Task files or folders [default: .].", show_default=False),
     ] = None,
     *,
-    jobs: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs at a time.")] = 1,
+    jobs: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Number of parallel runs.")] = 1,
     format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Run tasks, and keep what they take as their baselines.
+    """Run tasks and write their baselines.
 
-    TASK.baseline.json, beside each task, is what `manipcli test` compares with: it fails where something is worse by
-    more than `baseline: {tolerance: ...}` of the task. A task that fails keeps the baseline that it has.
+    `manipcli test` compares a task with TASK.baseline.json next to its file, and fails where a value is worse by more
+    than `baseline: {tolerance: ...}` of the task. A task that fails keeps its baseline.
     """
     from manipcli.cli.interrupts import Interrupts
 
@@ -59,14 +59,14 @@ def bless(
                     lines = _blessed(session.jobs[done.case.id], done)
                     blessed[done.case.id] = _without_log(done, lines)
                 else:
-                    lines = [render_case(done), "  nothing is blessed"]
+                    lines = [render_case(done), "  baseline not written"]
                 if format_ == "text":
                     console.result("\n".join(lines))
 
             if not session.jobs and format_ == "text":
-                console.result("nothing to bless: there is no task file")
+                console.result("nothing to bless: no task file found")
             suite = session.run(at_once=jobs, ended=ended)
-        suite = replace(suite, reports=tuple(blessed.get(one.case.id, one) for one in suite.reports))
+        suite = replace(suite, reports=tuple(blessed.get(report.case.id, report) for report in suite.reports))
         if format_ == "json":
             console.result(render_suite(suite))
         elif suite.stopped:
@@ -75,13 +75,13 @@ def bless(
 
 
 def _without_log(done: CaseReport, lines: Sequence[str]) -> CaseReport:
-    """What was blessed, and what was said of it; its log was removed."""
+    """The report of a blessed run with the printed lines as notes; its log was removed."""
     run = None if done.run is None else replace(done.run, log=None)
     return replace(done, run=run, log=None, notes=(*done.notes, *(line.strip() for line in lines)))
 
 
 def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
-    """Writes the baseline; what to say about it."""
+    """Writes the baseline; returns the lines to print."""
     from manipcli.batch.baseline import (
         FLOORS,
         baseline_path,
@@ -106,11 +106,11 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     except InvalidInput:
         old = None  # it is replaced
     write_baseline(path, new)
-    told = [str(new[key]) for key in (("duration",), ("energy",)) if key in new]
-    told.append(number_of(sum(key[0] == "margins" for key in new), "margin"))
-    lines = [f"{PASS} {done.case.id} blessed: {', '.join(told)}; written: {shown_path(path)}"]
+    parts = [str(new[key]) for key in (("duration",), ("energy",)) if key in new]
+    parts.append(number_of(sum(key[0] == "margins" for key in new), "margin"))
+    lines = [f"{PASS} {done.case.id} blessed: {', '.join(parts)}; written: {shown_path(path)}"]
     exact = ToleranceSpec(duration=0.0, energy=0.0, margin=0.0)
     changes = compared(old, new, exact) if old is not None else ()
     if old is not None and not changes:
-        return [*lines, f"  as before, within {', '.join(quantity(one, unit) for unit, one in FLOORS.items())}"]
-    return [*lines, *(f"  {one.word} before: {one}" for one in changes)]
+        return [*lines, f"  unchanged within {', '.join(quantity(floor, unit) for unit, floor in FLOORS.items())}"]
+    return [*lines, *(f"  {change.word} the old baseline: {change}" for change in changes)]

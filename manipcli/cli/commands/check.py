@@ -1,4 +1,4 @@
-"""`manipcli check FILE...`: every finding of every file at once, nothing simulated."""
+"""`manipcli check FILE...`: all findings of all files at once, without simulation."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, S
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 UNREADABLE: Final = {"USE101", "USE102", "USE103"}
-"""Findings that say that a file is not there, or cannot be read."""
+"""Codes of findings about a missing or unreadable file."""
 
 
 def check(
     files: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE...", help="Tasks, robots, controllers, URDF and xacro.", show_default=False),
+        typer.Argument(metavar="FILE...", help="Task, robot, controllers, URDF or xacro files.", show_default=False),
     ],
     *,
     seed: Seed = None,
@@ -28,12 +28,11 @@ def check(
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Check files: all findings, nothing simulated.
+    """Check files and show all findings, without simulation.
 
-    The kind (task, robot, controllers) is read from each file; --set, --seed and --sample are of the tasks among
-    them. A task is planned, and gains, motors and grasps are looked at over the plan; a step that cannot be planned is
-    an error. A controllers file alone names no robot: its joints and gains are compared with one where a task names
-    both.
+    The kind (task, robot, controllers) is read from each file; --set, --seed and --sample apply to the tasks among
+    them. A task is planned, and gains, motors and grasps are examined over the plan; a step that cannot be planned is
+    an error. A controllers file does not name a robot: check a task that names both to compare joints and gains.
     """
     from manipcli import pipeline
     from manipcli.report import json, text
@@ -49,9 +48,7 @@ def check(
     failed = any(finding.severity == "error" for finding in findings)
     kinds = () if failed else [pipeline.kind_of(file) for file in files]
     if (overrides or seed is not None or sample is not None) and not failed and "task" not in kinds:
-        raise InvalidInput(
-            [Diagnostic("USE052", "--set, --seed and --sample are of a task; there is none among the files")]
-        )
+        raise InvalidInput([Diagnostic("USE052", "--set, --seed and --sample need a task; no file is a task")])
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings
     console.result(render(findings, names))

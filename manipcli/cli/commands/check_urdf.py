@@ -1,4 +1,4 @@
-"""`manipcli check-urdf FILE`: everything that is wrong with a robot description, before a simulator meets it."""
+"""`manipcli check-urdf FILE`: all findings in a robot description, URDF or xacro."""
 
 from __future__ import annotations
 
@@ -27,40 +27,42 @@ def check_urdf(
     arguments: XacroArguments = None,
     *,
     format_: Annotated[
-        Literal["text", "json", "sarif"], typer.Option("--format", help="Text, one JSON object, or SARIF 2.1.0.")
+        Literal["text", "json", "sarif"],
+        typer.Option("--format", help="Output format: text, one JSON object, or SARIF 2.1.0."),
     ] = "text",
     select: Annotated[
         Codes,
-        typer.Option("--select", metavar="CODES", help="Only these: URDF2,URDF031, or a tier; repeatable."),
+        typer.Option(
+            "--select", metavar="CODES", help="Show only these codes, prefixes or tiers: URDF2,URDF031; repeatable."
+        ),
     ] = None,
     ignore: Annotated[
-        Codes, typer.Option("--ignore", metavar="CODES", help="Not these: codes, their beginnings, tiers; repeatable.")
+        Codes, typer.Option("--ignore", metavar="CODES", help="Hide these codes, prefixes or tiers; repeatable.")
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Warnings fail, too.")] = False,
-    explain: Annotated[
-        str | None, typer.Option("--explain", metavar="CODE", help="What a code means, and why it matters.")
-    ] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Fail on warnings, too.")] = False,
+    explain: Annotated[str | None, typer.Option("--explain", metavar="CODE", help="Explain a code and exit.")] = None,
     fix: Annotated[
-        bool, typer.Option("--fix", help="Mend what is safe to mend, in NAME.fixed.urdf beside the file.")
+        bool, typer.Option("--fix", help="Apply safe fixes; write NAME.fixed.urdf next to the file.")
     ] = False,
-    in_place: Annotated[bool, typer.Option("--in-place", help="With --fix: in the file itself.")] = False,
+    in_place: Annotated[bool, typer.Option("--in-place", help="With --fix: change the file itself.")] = False,
     force: Annotated[bool, typer.Option("--force", help="With --fix: replace NAME.fixed.urdf if it exists.")] = False,
     tree: Annotated[bool, typer.Option("--tree", help="Print the tree of links and joints.")] = False,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw the robot.", show_default=False)
+        Path | None,
+        typer.Option("--picture", metavar="FILE.png", help="Draw the robot into FILE.png.", show_default=False),
     ] = None,
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
     allow_env: Annotated[
         list[str] | None,
-        typer.Option("--allow-env", metavar="NAME", help="Let $(env NAME) read this variable; repeatable."),
+        typer.Option("--allow-env", metavar="NAME", help="Allow $(env NAME) to read this variable; repeatable."),
     ] = None,
 ) -> ExitCode:
     """Check a robot description, URDF or xacro.
 
-    Its schema, topology, physics, assets, and whether it is ready to be simulated.
+    Checks schema, topology, physics, meshes, and readiness for simulation.
 
-    Exit code 0: no error. 1: errors (with --strict: or warnings). 4: no such file, or a wrong option.
+    Exit codes: 0 no error, 1 errors (with --strict also warnings), 4 missing file or wrong option.
     """
     from manipcli.description.lint import inspection as describe
     from manipcli.report import description
@@ -69,11 +71,11 @@ def check_urdf(
         console.result(description.render_explanation(describe.explained(explain)))
         return ExitCode.PASSED
     if file is None:
-        raise InvalidInput([Diagnostic("USE043", "no file is given", hint="`manipcli check-urdf FILE`")])
+        raise InvalidInput([Diagnostic("USE043", "FILE is missing", hint="run `manipcli check-urdf FILE`")])
     if in_place and not fix:
-        raise InvalidInput([Diagnostic("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
+        raise InvalidInput([Diagnostic("USE044", "--in-place has no effect without --fix", hint="add --fix")])
     if force and not fix:
-        raise InvalidInput([Diagnostic("USE044", "--force lets --fix replace a file", hint="give --fix, too")])
+        raise InvalidInput([Diagnostic("USE044", "--force has no effect without --fix", hint="add --fix")])
     check_picture(picture)
     path = describe.located(file, package_path=tuple(package_path or ()))
     check_outputs(("--picture", picture), reads=(path,))
@@ -92,10 +94,10 @@ def check_urdf(
     inspection = inspect(path)
     if fix:
         inspection = _mended(inspection, inspect, in_place=in_place, force=force)
-    told = inspection.told(codes)
-    grave = ("error", "warning") if strict else ("error",)
-    passed = not any(finding.severity in grave for finding in told)
-    console.result(_rendered(inspection, told, codes, format_, passed=passed, tree=tree))
+    findings = inspection.told(codes)
+    failing = ("error", "warning") if strict else ("error",)
+    passed = not any(finding.severity in failing for finding in findings)
+    console.result(_rendered(inspection, findings, codes, format_, passed=passed, tree=tree))
     if picture is not None:
         if inspection.examination.errors:
             console.talk(f"not drawn: {path} has errors")
@@ -110,19 +112,19 @@ def check_urdf(
 def _mended(
     inspection: Inspection, inspect: Callable[[Path], Inspection], *, in_place: bool, force: bool
 ) -> Inspection:
-    """What there is to say once the file is mended."""
+    """Applies safe fixes; returns the inspection of the fixed file."""
     from manipcli.description.lint import inspection as describe
 
     path, changes = describe.mend(inspection, in_place=in_place, force=force)
     for change in changes:
-        console.talk(f"mended: {change}")
-    console.talk(f"written: {path}" if changes else "nothing to mend: no file is written")
+        console.talk(f"fixed: {change}")
+    console.talk(f"written: {path}" if changes else "nothing to fix; no file written")
     return inspect(path) if changes else inspection
 
 
 def _rendered(
     inspection: Inspection,
-    told: Sequence[Diagnostic],
+    findings: Sequence[Diagnostic],
     codes: Collection[str],
     format_: str,
     *,
@@ -133,11 +135,11 @@ def _rendered(
     from manipcli.report import description, sarif
 
     if format_ == "sarif":
-        return sarif.render(told, CHECKS)
+        return sarif.render(findings, CHECKS)
     render = description.render_json if format_ == "json" else description.render_text
     return render(
         str(inspection.path),
-        told,
+        findings,
         inspection.summary,
         passed=passed,
         left_out=[(code, number) for code, number in inspection.examination.left_out if code in codes],

@@ -1,4 +1,4 @@
-"""`manipcli diff A B`: what is different about two runs."""
+"""`manipcli diff A B`: differences between two logs."""
 
 from __future__ import annotations
 
@@ -13,21 +13,19 @@ from manipcli.core.errors import ExitCode
 
 
 def diff(
-    a: Annotated[Path, typer.Argument(metavar="A", help="The log of a run.", show_default=False)],
-    b: Annotated[Path, typer.Argument(metavar="B", help="The log of another.", show_default=False)],
+    a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.", show_default=False)],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.", show_default=False)],
     *,
     tolerance: Annotated[
         float,
-        typer.Option(
-            "--tolerance", metavar="X", min=0.0, help="Numbers in messages that differ by no more are the same."
-        ),
+        typer.Option("--tolerance", metavar="X", min=0.0, help="Ignore differences of numbers in messages up to X."),
     ] = 0.0,
     format_: Format = "text",
 ) -> ExitCode:
-    """Compare two logs: how steps went, where messages differ.
+    """Compare two logs: outcomes of steps, differences of messages.
 
-    Exit code 0: the same happened; 1: something is different. What they were made from (files, seed, versions) is told,
-    but makes no difference by itself.
+    Exit codes: 0 the same, 1 different. Differences of files, seed and versions are shown, but do not change the exit
+    code.
     """
     from manipcli.logs.diff import diff_logs
     from manipcli.report import log_diff

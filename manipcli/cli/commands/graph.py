@@ -13,18 +13,18 @@ from manipcli.core.errors import ExitCode
 
 
 def graph(
-    file: Annotated[Path, typer.Argument(metavar="TASK|LOG", help="A task file, or a log.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="TASK|LOG", help="Task file or log.", show_default=False)],
     *,
     format_: Annotated[
         Literal["text", "mermaid", "json"],
-        typer.Option("--format", help="A tree, a flowchart for Mermaid, or one JSON object."),
+        typer.Option("--format", help="Output format: tree, Mermaid flowchart, or one JSON object."),
     ] = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
     """Show the data-flow graph, from the task to the topics.
 
-    Task, planner, controllers, joint limits, drives, engine, sensors, topics; of a log with how many messages each has.
+    Task, planner, controllers, joint limits, drives, engine, sensors, topics; for a log with the number of messages.
     """
     from manipcli.logs.graph import log_graph, task_graph
     from manipcli.record.records import begins_as_log

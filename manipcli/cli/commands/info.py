@@ -1,4 +1,4 @@
-"""`manipcli info LOG`: what a log holds."""
+"""`manipcli info LOG`: contents of a log."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from manipcli.core.errors import ExitCode
 
 
 def info(log: LogFile, *, format_: Format = "text") -> ExitCode:
-    """Show what a log holds: verdict, steps, topics, rates, sizes.
+    """Show the verdict, steps, topics, rates and sizes of a log.
 
-    Any MCAP file will do, also one that was cut or damaged; what is missing is told first.
+    Works with any MCAP file, also a truncated or damaged one; missing parts are shown first.
     """
     from manipcli.logs.log_info import log_info
     from manipcli.report.log_info import render_json, render_text

@@ -1,4 +1,4 @@
-"""`manipcli init [DIR]`: a small project that works: a robot, its controllers, a task, and how CI runs it."""
+"""`manipcli init [DIR]`: a small working project: a robot, its controllers, a task, and a CI workflow."""
 
 from __future__ import annotations
 
@@ -23,36 +23,34 @@ FILES: Final = {
     "robots/panda.yaml": "robots/panda.yaml",
     "controllers/panda.yaml": "controllers/panda.yaml",
 }
-"""What is written, and from which template."""
+"""Written files, each with its template."""
 MAY_BE_THERE: Final = ("README.md", ".gitignore")
-"""What a folder has before it is a project: kept as it is."""
+"""Existing files that are kept."""
 RESULTS: Final = ("runs", "report")
-"""Folders that no repository should hold."""
+"""Folders that belong in .gitignore."""
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where; this folder when absent.")] = Path(),
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Folder of the project.")] = Path(),
     *,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
 ) -> ExitCode:
-    """Write a small project that works.
+    """Create a small working project.
 
     A robot whose description comes with PyBullet, its controllers, a task with expectations, JSON schemas for editors
-    and a workflow for GitHub Actions. A README.md and a .gitignore that are there are kept; nothing is written where
-    another of the files is there already.
+    and a workflow for GitHub Actions. An existing README.md or .gitignore is kept; if another of the files exists,
+    nothing is written.
     """
     files = _files(folder)
     kept = [] if force else [path for name in MAY_BE_THERE if os.path.lexists(path := folder / name)]
     there = [] if force else [str(path) for path in files if path not in kept and os.path.lexists(path)]
     if there:
-        are = "is" if len(there) == 1 else "are"
-        message = f"{listed(there)} {are} there already; nothing was written"
-        raise InvalidInput(
-            [Diagnostic("USE088", message, hint="give another folder, or --force to replace what is there")]
-        )
-    wrong = sorted({told for path in files if path not in kept for told in _in_the_way(path)})
+        verb = "exists" if len(there) == 1 else "exist"
+        message = f"{listed(there)} already {verb}; nothing was written"
+        raise InvalidInput([Diagnostic("USE088", message, hint="name another folder, or add --force to replace them")])
+    wrong = sorted({conflict for path in files if path not in kept for conflict in _in_the_way(path)})
     if wrong:
-        raise InvalidInput([Diagnostic("USE088", f"{listed(wrong)}; nothing was written", hint="give another folder")])
+        raise InvalidInput([Diagnostic("USE088", f"{listed(wrong)}; nothing was written", hint="name another folder")])
     from manipcli.core.whole_file import write_whole
 
     for path, data in files.items():
@@ -71,39 +69,39 @@ def init(
 
 
 def _unignored(file: Path) -> Iterator[str]:
-    """What a .gitignore that was kept lacks."""
+    """What is missing in a .gitignore that was kept."""
     if not file.is_file():  # a link to nothing was kept
         return
     known = {line.strip().strip("/") for line in file.read_text("utf-8", "replace").splitlines()}
     lacking = [f"`{name}/`" for name in RESULTS if name not in known]
     if lacking:
-        yield f"{file} has no {listed(lacking)}: git would take logs and reports of runs for files of yours"
+        yield f"{file} lacks {listed(lacking)}: add it, or git shows logs and reports as untracked files"
 
 
 def _not_at_the_top(folder: Path) -> Iterator[str]:
-    """That GitHub does not see the workflow."""
+    """A note where the project is not at the top of its repository: GitHub does not see its workflow."""
     whole = Path(os.path.realpath(folder))
     top = next((place for place in (whole, *whole.parents) if (place / ".git").exists()), whole)
     if top != whole:
         workflow = Path(".github", "workflows", "manipcli.yml")
         yield (
-            f"GitHub runs workflows at the top of a repository alone: move {folder / workflow} to {top / workflow}, "
-            f"begin its job with `defaults: {{run: {{working-directory: {whole.relative_to(top)}}}}}`, "
-            "and the paths of its artifact with that folder"
+            f"GitHub runs workflows only from the top of a repository: move {folder / workflow} to {top / workflow}, "
+            f"add to its job `defaults: {{run: {{working-directory: {whole.relative_to(top)}}}}}`, "
+            "and prefix the paths of its artifact with that folder"
         )
 
 
 def _in_the_way(path: Path) -> Iterator[str]:
-    """What makes it impossible to write a file there, as far as can be seen."""
+    """Files and folders that prevent writing `path`."""
     if path.is_dir():
-        yield f"'{path}' is a folder where a file is to be"
+        yield f"'{path}' is a folder; expected a file"
     for parent in path.parents:
         if os.path.lexists(parent) and not parent.is_dir():
-            yield f"'{parent}' is a file where a folder is to be"
+            yield f"'{parent}' is a file; expected a folder"
 
 
 def _files(folder: Path) -> dict[Path, bytes]:
-    """Every file of the project, by its path."""
+    """Contents of every file of the project, by path."""
     from manipcli import pipeline
     from manipcli.report.json import dumps
 

@@ -1,4 +1,4 @@
-"""`manipcli judge LOG`: the verdict again, from the log alone."""
+"""`manipcli judge LOG`: the verdict, computed from the log alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manipcli.core.errors import ExitCode, InvalidInput
 
 
 def judge(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="An .mcap file of a run.", show_default=False)],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP file of a run.", show_default=False)],
     *,
     report: ReportFile = None,
     junit: JunitFile = None,
@@ -22,9 +22,9 @@ def judge(
     allow_outside: AllowOutside = False,
     format_: Format = "text",
 ) -> ExitCode:
-    """Judge the log of a run again.
+    """Judge a run from its log.
 
-    Nothing but the file is read, and the verdict stored in it is not looked at; for --report, the meshes, too.
+    Reads only the log, and ignores the verdict stored in it; --report also reads the meshes.
     """
     outputs = Outputs(report, junit, others=(log,))
     from manipcli import pipeline

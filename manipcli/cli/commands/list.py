@@ -1,4 +1,4 @@
-"""`manipcli list [KIND [TASK]]`: the files below this folder, the words that files may use, a task's controllers."""
+"""`manipcli list [KIND [TASK]]`: files below this folder, words that files may use, the controllers of a task."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 Kind = Literal["robots", "tasks", "controllers", "steps", "expectations", "conditions", "shapes", "engines", "checks"]
 FILES = {"robots": "robot", "tasks": "task", "controllers": "controllers"}
-"""The kinds that are files, and the word for one such file."""
+"""Kinds that are files, each with the kind of one such file."""
 
 
 def list_(
     kind: Annotated[
-        Kind | None, typer.Argument(metavar="KIND", help="Which; all when absent.", show_default=False)
+        Kind | None, typer.Argument(metavar="KIND", help="What to list [default: all].", show_default=False)
     ] = None,
     task: Annotated[
         Path | None,
-        typer.Argument(metavar="TASK", help="With `controllers`: those of this task.", show_default=False),
+        typer.Argument(metavar="TASK", help="With `controllers`: list those of this task.", show_default=False),
     ] = None,
     *,
     format_: Format = "text",
 ) -> ExitCode:
-    """List files and the words they may use.
+    """List files, and the words they may use.
 
-    Robots, tasks and controllers are files below this folder, checks the codes of `check-urdf`; the rest are words of
-    task files. `list controllers TASK` shows who claims what at the start of a task.
+    Robots, tasks and controllers are files below this folder, checks are the codes of `check-urdf`; the rest are words
+    of task files. `list controllers TASK` shows the interfaces that each controller claims at the start of a task.
     """
     from manipcli import pipeline
     from manipcli.report.json import dumps
@@ -44,18 +44,18 @@ def list_(
 
         console.result(render_checks(CHECKS))
         return ExitCode.PASSED
-    found = {one: _names(one) for one in (get_args(Kind) if kind is None else (kind,))}
+    found = {each: _names(each) for each in (get_args(Kind) if kind is None else (kind,))}
     if format_ == "json":
         console.result(dumps(found))
     elif kind is not None:
-        if told := pipeline.meanings(kind):
-            console.result(table(("word", "meaning"), [*told.items()]))
+        if meanings := pipeline.meanings(kind):
+            console.result(table(("word", "meaning"), [*meanings.items()]))
             return ExitCode.PASSED
         for name in found[kind]:
             console.result(name)
     else:
-        for one, names in found.items():
-            console.result(f"{one}: {', '.join(names) or '-'}")
+        for each, names in found.items():
+            console.result(f"{each}: {', '.join(names) or '-'}")
     return ExitCode.PASSED
 
 
@@ -64,7 +64,7 @@ def _controllers(kind: Kind | None, task: Path, format_: OutputFormat) -> ExitCo
     from manipcli.report.controllers import render_json, render_text
 
     if kind != "controllers":
-        message = f"'list {kind}' takes no file; only `list controllers TASK` does"
+        message = f"`list {kind}` does not take a file; only `list controllers TASK` does"
         raise InvalidInput([Diagnostic("USE058", message)])
     rows = pipeline.controllers_of(task)
     console.result(render_json(str(task), rows) if format_ == "json" else render_text(rows))
@@ -80,7 +80,7 @@ def _names(kind: str) -> tuple[str, ...]:
 
 
 def _yaml_files(folder: Path) -> list[Path]:
-    """The YAML files below `folder`, in the order of their names; hidden folders are not entered."""
+    """The YAML files below `folder`, sorted by path; hidden folders are not entered."""
     return sorted(
         path
         for path in folder.rglob("*.y*ml")

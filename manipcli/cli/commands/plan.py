@@ -1,4 +1,4 @@
-"""`manipcli plan TASK`: the whole task planned, nothing simulated."""
+"""`manipcli plan TASK`: the plan of a task, without simulation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def plan(
     task: TaskFile,
     *,
     csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write every point of every trajectory there.")
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write all points of all trajectories to FILE.")
     ] = None,
     seed: Seed = None,
     sample: Sample = None,
@@ -28,7 +28,7 @@ def plan(
 ) -> ExitCode:
     """Plan a task and show its motions.
 
-    How long each takes, and which joint limits it; nothing is simulated.
+    Shows the duration of each motion and the joint that limits it; simulates nothing.
     """
     from manipcli import pipeline
     from manipcli.report.plan import render_json, render_text, write_csv
@@ -48,9 +48,8 @@ def plan(
         if format_ != "json":
             raise
         from manipcli.report.json import render_verdict
-        from manipcli.task.plan_task import refused
 
-        console.result(render_verdict(refused(loaded, refusal)))
+        console.result(render_verdict(pipeline.refused(loaded, refusal)))
         return refusal.exit_code
     if csv is not None:
         from manipcli.core.whole_file import whole_file

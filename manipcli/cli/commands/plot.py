@@ -1,4 +1,4 @@
-"""`manipcli plot LOG... [TOPIC.FIELD...]`: curves of a log as a figure or a table."""
+"""`manipcli plot LOG... [TOPIC.FIELD...]`: curves of logs as a figure or a table."""
 
 from __future__ import annotations
 
@@ -23,48 +23,44 @@ def plot(
         list[str],
         typer.Argument(
             metavar="LOG... [TOPIC.FIELD]...",
-            help="MCAP logs of ROS 2 messages, and what of them: joint_states.position[joint_1], "
-            "tf[cup].translation.z, contacts.force; a panel each, or one for several with commas between. "
-            "An overview when absent.",
+            help="MCAP logs of ROS 2 messages, and the fields to plot: joint_states.position[joint_1], "
+            "tf[cup].translation.z, contacts.force; one panel each, or one panel for several joined by commas "
+            "[default: an overview].",
             show_default=False,
         ),
     ],
     *,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="A figure: .svg, .png or .pdf.", show_default=False),
+        typer.Option("--output", "-o", metavar="FILE", help="Write a figure: .svg, .png or .pdf.", show_default=False),
     ] = None,
     csv: Annotated[
-        str | None, typer.Option("--csv", metavar="FILE", help="A table; - is stdout.", show_default=False)
+        str | None, typer.Option("--csv", metavar="FILE", help="Write a table; - is stdout.", show_default=False)
     ] = None,
-    start: Annotated[
-        str | None, typer.Option("--from", metavar="T", help="Seconds, or the step with which it begins.")
-    ] = None,
-    end: Annotated[
-        str | None, typer.Option("--to", metavar="T", help="Seconds, or the step with which it ends.")
-    ] = None,
-    fields: Annotated[bool, typer.Option("--fields", help="List what the logs have to plot.")] = False,
+    start: Annotated[str | None, typer.Option("--from", metavar="T", help="Start: seconds, or a step.")] = None,
+    end: Annotated[str | None, typer.Option("--to", metavar="T", help="End: seconds, or a step.")] = None,
+    fields: Annotated[bool, typer.Option("--fields", help="List the fields that can be plotted.")] = False,
     format_: Format = "text",
 ) -> ExitCode:
-    """Plot numbers of one log, or of several over each other.
+    """Plot fields of one log, or of several logs over each other.
 
-    -o writes a figure, --csv a table, --fields lists the numbers of a log. Any ROS 2 log will do.
+    -o writes a figure, --csv a table, --fields lists the fields of a log. Works with any ROS 2 log.
     """
     logs = [Path(word) for word in words if _is_log(word)]
     asked = [word for word in words if not _is_log(word)]
     if not logs:
-        hint = "`manipcli plot LOG.mcap [TOPIC.FIELD]...`"
-        raise InvalidInput([Diagnostic("USE060", f"no log is given: '{words[0]}' is no file", hint=hint)])
+        hint = "run `manipcli plot LOG.mcap [TOPIC.FIELD]...`"
+        raise InvalidInput([Diagnostic("USE060", f"LOG is missing: '{words[0]}' is not a file", hint=hint)])
     if fields:
         _list_fields(logs, format_)
         return ExitCode.PASSED
     if format_ == "json":
-        message = "--format json is for --fields alone"
-        raise InvalidInput([Diagnostic("USE064", message, hint="`--csv -` gives the numbers")])
+        message = "--format json has no effect without --fields"
+        raise InvalidInput([Diagnostic("USE064", message, hint="add --fields, or use `--csv -` for the numbers")])
     if output is None and csv is None:
-        hint = "-o FILE.svg writes a figure, --csv - prints a table, --fields lists what can be plotted"
+        hint = "add -o FILE.svg for a figure, --csv - for a table, --fields for a list of fields"
         raise InvalidInput(
-            [Diagnostic("USE065", "no output is given: expected --output, --csv or --fields", hint=hint)]
+            [Diagnostic("USE065", "an output is missing: expected --output, --csv or --fields", hint=hint)]
         )
     check_outputs(("--output", output), ("--csv", Path(csv) if csv not in (None, "-") else None), reads=logs)
     kind = None
@@ -90,7 +86,7 @@ def plot(
 
 
 def _is_log(word: str) -> bool:
-    """Whether a word names a file; a topic has no ending, and no field is called mcap."""
+    """Whether a word names a file; no topic or field ends in `.mcap`."""
     return word.endswith(LOG_ENDINGS) or Path(word).is_file()
 
 
@@ -116,11 +112,11 @@ def _list_fields(logs: list[Path], format_: OutputFormat) -> None:
 
     found = {str(log): field_lines(log) for log in logs}
     if format_ == "json":
-        told: Json = [
+        listing: Json = [
             {"log": log, "fields": [{"name": line.name, "type": line.type, "messages": line.count} for line in lines]}
             for log, lines in found.items()
         ]
-        console.result(dumps({"logs": told}))
+        console.result(dumps({"logs": listing}))
         return
     for log, lines in found.items():
         if len(logs) > 1:

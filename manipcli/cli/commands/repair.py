@@ -1,4 +1,4 @@
-"""`manipcli repair LOG`: a clean file of what a killed run or a bad disk left."""
+"""`manipcli repair LOG`: a complete MCAP file from a truncated, damaged or unfinished one."""
 
 from __future__ import annotations
 
@@ -17,14 +17,16 @@ def repair(
     *,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="OUT", help="Where the clean file goes; LOG.repaired.mcap when absent."),
+        typer.Option(
+            "--output", "-o", metavar="OUT", help="Write the repaired log to OUT [default: LOG.repaired.mcap]."
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
     format_: Format = "text",
 ) -> ExitCode:
-    """Make a clean log of one that was cut or never finished.
+    """Repair a truncated, damaged or unfinished log.
 
-    Of a damaged one, too; what is lost is told. LOG itself is never changed.
+    Shows what is lost. LOG itself is never changed.
     """
     from manipcli.cli.interrupts import Interrupts
     from manipcli.record.foreign.repair import default_output

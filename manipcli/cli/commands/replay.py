@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 def replay(
     log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="An .mcap file, or the .partial of a killed run.", show_default=False)
+        Path, typer.Argument(metavar="LOG", help="MCAP file, or the .partial file of a killed run.", show_default=False)
     ],
     *,
     html: Annotated[
         Path | None,
-        typer.Option("--html", metavar="FILE", help="Write the page to FILE instead of serving it; it plays offline."),
+        typer.Option("--html", metavar="FILE", help="Write a page that plays offline to FILE instead of serving it."),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw the run at one time.")
@@ -42,7 +42,7 @@ def replay(
     ] = None,
     video: Annotated[
         Path | None,
-        typer.Option("--video", metavar="FILE", help="Write a video: .webp, .gif, or .mp4 with the extra 'video'."),
+        typer.Option("--video", metavar="FILE", help="Write a video: .webp, .gif, or .mp4 (needs manipcli[video])."),
     ] = None,
     size: Annotated[
         str | None,
@@ -65,16 +65,16 @@ def replay(
     ] = None,
     robot: Annotated[
         str | None,
-        typer.Option("--robot", metavar="NAMESPACE", help="Robot to show, where a log has several."),
+        typer.Option("--robot", metavar="NAMESPACE", help="Robot to show if the log has several."),
     ] = None,
     port: PagePort = None,
     open_: OpenPage = False,
     verify: Annotated[
         bool,
-        typer.Option("--verify", help="Simulate the run again from the log and compare every message."),
+        typer.Option("--verify", help="Simulate the run from the log and compare every message."),
     ] = False,
     allow_different: Annotated[
-        bool, typer.Option("--allow-different", help="With --verify: also with other versions or meshes.")
+        bool, typer.Option("--allow-different", help="With --verify: allow other versions or meshes.")
     ] = False,
     format_: Format = "text",
     package_path: PackagePath = None,
@@ -82,7 +82,8 @@ def replay(
 ) -> ExitCode:
     """Show a recorded run: robot and scene over time, curves.
 
-    Needs nothing but the log and the packages of its meshes. Ctrl-C ends it. With --verify: 0 identical, 1 not.
+    Needs only the log and the packages of its meshes. Press Ctrl-C to stop. Exit codes of --verify: 0 identical,
+    1 different.
     """
     files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
     drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
@@ -135,7 +136,7 @@ def _refuse(options: Sequence[tuple[str, object]], *, verify: bool) -> None:
 def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:
     """Prints what is missing and writes the requested files; without any, serves the page until Ctrl-C."""
     if playback.lost is not None:
-        console.talk(f"the log is not closed: {playback.lost}")
+        console.talk(f"the log is incomplete: {playback.lost}")
     for note in playback.notes:
         console.talk(f"note: {note}")
     pages = html is not None or not pictures.wanted

@@ -23,12 +23,12 @@ def run(
         typer.Option(
             "--log",
             metavar="PATH",
-            help="Where the log goes; runs/<task>.mcap when absent; - is stdout, the report stderr.",
+            help="Write the log to PATH; - is stdout, with the report on stderr [default: runs/<task>.mcap].",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a --log file that exists.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the --log file if it exists.")] = False,
     embed_meshes: Annotated[
-        bool, typer.Option("--embed-meshes", help="Put the mesh files into the log: it needs no package then.")
+        bool, typer.Option("--embed-meshes", help="Store the mesh files in the log, so that replay needs no packages.")
     ] = False,
     report_file: ReportFile = None,
     junit: JunitFile = None,
@@ -38,8 +38,8 @@ def run(
     format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Tell more.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Tell nothing but the result.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Verbose output.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the result.")] = False,
 ) -> ExitCode:
     """Validate, plan, simulate, record and judge a task."""
     from manipcli.cli.interrupts import Interrupts
@@ -72,9 +72,9 @@ def run(
                     progress=progress,
                 )
             except RecordingRefused:
-                raise  # nothing was run: what there is tells of the log that stays
+                raise  # nothing was run; existing reports belong to the log that is kept
             except RecordingFailed as failure:
-                with suppress(OSError):  # nor may there be room for this
+                with suppress(OSError):  # the disk may be full for these, too
                     outputs.of_invalid(failure.findings, task=task, log=failure.partial)
                 raise
             except InvalidInput as invalid:

@@ -1,4 +1,4 @@
-"""`manipcli schema KIND`: the JSON Schema of a kind of file, for editors and as the reference manual."""
+"""`manipcli schema KIND`: the JSON Schema of a kind of file, for editors and as a reference."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from manipcli.core.errors import ExitCode
 
 def schema(
     kind: Annotated[
-        Literal["task", "robot", "controllers"], typer.Argument(metavar="KIND", help="The kind of file.")
+        Literal["task", "robot", "controllers"], typer.Argument(metavar="KIND", help="Kind of file.")
     ] = "task",
 ) -> ExitCode:
     """Print the JSON Schema of a kind of file.
 
-    It says which keys there are, and types, limits and plain units of values; `check` finds everything, as unknown
-    names and what is computed. Controllers files in a form of ROS have no schema.
+    It has keys, types, limits and simple units; `check` also finds unknown names and invalid computed values.
+    Controllers files in ROS form have no schema.
     """
     from manipcli import pipeline
     from manipcli.report.json import dumps

@@ -1,4 +1,4 @@
-"""`manipcli test [PATH...]`: every task file below the paths, run as a test in a process of its own."""
+"""`manipcli test [PATH...]`: task files as tests, each run in its own process."""
 
 from __future__ import annotations
 
@@ -27,53 +27,53 @@ PERIOD = 0.1
 def test(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[PATH]...", help="Task files, or folders; this one when absent.", show_default=False),
+        typer.Argument(metavar="[PATH]...", help="Task files or folders [default: .].", show_default=False),
     ] = None,
     *,
     jobs: Annotated[
-        int | None, typer.Option("-n", metavar="N", min=1, help="Runs at a time; as many as there are cores.")
+        int | None, typer.Option("-n", metavar="N", min=1, help="Number of parallel runs [default: number of cores].")
     ] = None,
     keyword: Annotated[
-        str, typer.Option("-k", metavar="EXPR", help="Only those whose id or tags match: 'pour and not slow'.")
+        str, typer.Option("-k", metavar="EXPR", help="Run only tests whose id or tags match: 'pour and not slow'.")
     ] = "",
     last_failed: Annotated[
-        bool, typer.Option("--last-failed", "--lf", help="Only those that failed last; all if none did.")
+        bool, typer.Option("--last-failed", "--lf", help="Run only tests that failed last; all if none failed.")
     ] = False,
     samples: Annotated[
-        int | None, typer.Option("--samples", metavar="N", min=1, help="Samples 0 to N-1 of each task that varies.")
+        int | None,
+        typer.Option("--samples", metavar="N", min=1, help="Run samples 0 to N-1 of each task with a `vary:`."),
     ] = None,
     first: Annotated[bool, typer.Option("--exitfirst", "-x", help="Stop at the first failure.")] = False,
     timeout: Annotated[
-        str, typer.Option("--timeout", metavar="T", help="End a run that takes longer; 0: never.")
+        str, typer.Option("--timeout", metavar="T", help="Stop a run that takes longer than T; 0: never.")
     ] = "10 min",
     silence: Annotated[
-        str, typer.Option("--silence", metavar="T", help="End a run that shows no progress for so long; 0: never.")
+        str, typer.Option("--silence", metavar="T", help="Stop a run without progress for T; 0: never.")
     ] = "60 s",
-    junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML, for CI.")] = None,
+    junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML.")] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", metavar="DIR", help="Write a page about each run, and an index.html.")
+        Path | None, typer.Option("--report", metavar="DIR", help="Write an HTML page for each run, and an index.html.")
     ] = None,
     github: Annotated[
-        bool, typer.Option("--github", help="Annotate the lines that failed, for GitHub Actions.")
+        bool, typer.Option("--github", help="Print annotations for GitHub Actions at the lines that failed.")
     ] = False,
     logs: Annotated[
         Path | None,
-        typer.Option("--logs", metavar="DIR", help="Where logs and pictures go; runs/test when absent."),
+        typer.Option("--logs", metavar="DIR", help="Write logs and pictures to DIR [default: runs/test]."),
     ] = None,
-    keep_logs: Annotated[bool, typer.Option("--keep-logs", help="Keep the logs of runs that passed, too.")] = False,
+    keep_logs: Annotated[bool, typer.Option("--keep-logs", help="Keep the logs of passed runs, too.")] = False,
     seed: Seed = None,
     overrides: Overrides = None,
     format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Tell only what fails, and the summary.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only failures and the summary.")] = False,
 ) -> ExitCode:
-    """Run tasks as tests, each in a process of its own.
+    """Run tasks as tests, each in its own process.
 
     Tests are the YAML files with a name under the top-level key `task`, and the key `robot`; hidden folders, virtual
-    environments, runs, build, dist and node_modules are not entered. Logs and pictures of what failed go to
-    runs/test. Tasks that are run as they are written, without --set, --seed and --samples, are compared with their
-    baselines, see `bless`.
+    environments, runs, build, dist and node_modules are not entered. Logs and pictures of failed tests go to runs/test.
+    Without --set, --seed and --samples, tasks are compared with their baselines, see `bless`.
     """
     from manipcli.cli.interrupts import Interrupts
 
@@ -95,7 +95,7 @@ def test(
         check_outputs(("--junit", junit))
         _check_replaced(junit)
         _check_folder("--report", report)
-        _check_folder("--logs", settings.folder, hint=None if logs else "--logs DIR names another place")
+        _check_folder("--logs", settings.folder, hint=None if logs else "name another folder with --logs DIR")
         places = paths or [Path()]
         with TaskSession(places, settings, keyword=keyword, samples=samples, last_failed=last_failed) as session:
             with _Lines(session, text=format_ == "text", quiet=quiet) as lines:
@@ -106,7 +106,7 @@ def test(
 
 
 class _Lines:
-    """What is shown meanwhile: a line for each test that ends, and on a terminal what is running."""
+    """Progress of the tests: a line for each test that ends, and on a terminal the running tests."""
 
     def __init__(self, session: TaskSession, *, text: bool, quiet: bool) -> None:
         from manipcli.report.suite_text import id_width
@@ -143,7 +143,7 @@ class _Lines:
 
     def _watch(self) -> None:
         while not self._over.wait(PERIOD):
-            running = (f"{id_.partition('::')[2]}: {doing}" for id_, doing in self._session.running)
+            running = (f"{id_.partition('::')[2]}: {activity}" for id_, activity in self._session.running)
             with self._lock:
                 console.redraw(f"[{self._done}/{len(self._session.jobs)}] {'   '.join(running)}")
 
@@ -154,13 +154,13 @@ def _show(suite: Suite, format_: str, *, github: bool) -> None:
 
     if github and not all(report.passed for report in suite.reports):
         workspace = os.environ.get("GITHUB_WORKSPACE")
-        told = render_annotations(suite.reports, workspace=Path(workspace) if workspace else None)
-        (console.result if format_ == "text" else console.talk)(told)
+        annotations = render_annotations(suite.reports, workspace=Path(workspace) if workspace else None)
+        (console.result if format_ == "text" else console.talk)(annotations)
     console.result(suite_json.render_suite(suite) if format_ == "json" else suite_text.render_suite(suite))
 
 
 def _write(suite: Suite, session: TaskSession, junit: Path | None, report: Path | None) -> list[str]:
-    """Writes the files that are asked for; why one could not be written."""
+    """Writes the requested files; returns why some could not be written."""
     from manipcli.core.whole_file import write_whole
     from manipcli.report.suite_page import render_page
 
@@ -182,51 +182,49 @@ def _write(suite: Suite, session: TaskSession, junit: Path | None, report: Path 
 def _time(option: str, word: str) -> float:
     """
     Raises:
-        InvalidInput: it is no time, or below 0.
+        InvalidInput: it is not a time, or below 0.
     """
     value = seconds(word)
     if value < 0.0:
-        message = f"{option} {word}: this is below 0"
+        message = f"{option} {word} is below 0"
         raise InvalidInput([Diagnostic("USE049", message, hint="write '10 min', 90, or 0 for never")])
     return value
 
 
 def _check_replaced(junit: Path | None) -> None:
-    """Before anything is run: no file of the tasks, nor any other that somebody wrote, is replaced by a result.
+    """Checks before the run that --junit replaces only JUnit XML.
 
     Raises:
-        InvalidInput: there is a file, which is not JUnit XML.
+        InvalidInput: the file exists and is not JUnit XML.
     """
     if junit is not None and junit.is_file():
         with junit.open("rb") as file:
             head = file.read(4096)
         if head and b"<testsuite" not in head:
-            message = f"--junit '{junit}': there is a file that is no JUnit XML; it is not replaced"
+            message = f"--junit '{junit}' exists and is not JUnit XML; it is not replaced"
             raise InvalidInput([Diagnostic("USE089", message)])
 
 
 def _check_folder(option: str, folder: Path | None, *, hint: str | None = None) -> None:
-    """Before anything is run.
+    """Checks before the run that a folder can be written.
 
     Raises:
-        InvalidInput: a file is where the folder should be, nothing can be written there, or it is `-`.
+        InvalidInput: a file has its place, it is not writable, or it is `-`.
     """
     if folder is None:
         return
     if str(folder) == "-":
-        raise InvalidInput([Diagnostic("USE083", f"{option} '-': expected the name of a folder")])
+        raise InvalidInput([Diagnostic("USE083", f"{option} '-': expected a folder name")])
     there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
     if not there.is_dir():
-        message = f"{option} '{folder}': '{there}' is a file; a folder was expected"
+        message = f"{option} '{folder}': '{there}' is a file; expected a folder"
         raise InvalidInput([Diagnostic("USE086", message, hint=hint)])
     if not os.access(there, os.W_OK):
-        raise InvalidInput(
-            [Diagnostic("USE086", f"{option} '{folder}': nothing can be written in '{there}'", hint=hint)]
-        )
+        raise InvalidInput([Diagnostic("USE086", f"{option} '{folder}': '{there}' is not writable", hint=hint)])
 
 
 def _cores() -> int:
-    """That this process may use."""
+    """Number of cores that this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     else:

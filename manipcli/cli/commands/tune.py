@@ -1,4 +1,4 @@
-"""`manipcli tune ROBOT CONTROLLERS`: gains for a bandwidth and a damping ratio, and what they do."""
+"""`manipcli tune ROBOT CONTROLLERS`: gains for a bandwidth and a damping ratio, and their step response."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ if TYPE_CHECKING:
 
 
 def tune(
-    robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="The robot file.", show_default=False)],
-    controllers: Annotated[
-        Path, typer.Argument(metavar="CONTROLLERS", help="The controllers file.", show_default=False)
-    ],
+    robot: Annotated[Path, typer.Argument(metavar="ROBOT", help="Robot file.", show_default=False)],
+    controllers: Annotated[Path, typer.Argument(metavar="CONTROLLERS", help="Controllers file.", show_default=False)],
     *,
     bandwidth: Annotated[
         str, typer.Option("--bandwidth", metavar="F", help="Natural frequency of the loops: 5, '5 Hz'.")
@@ -32,14 +30,14 @@ def tune(
             metavar="Z",
             min=0.05,
             max=10.0,
-            help="Damping ratio that p and d give; from 1 on, only an i makes a step overshoot.",
+            help="Damping ratio of p and d; from 1 on, a step overshoots only because of i.",
         ),
     ] = 1.0,
     joint: Annotated[
         list[str] | None,
-        typer.Option("--joint", metavar="JOINT", help="Only this one; repeatable.", show_default=False),
+        typer.Option("--joint", metavar="JOINT", help="Tune only this joint; repeatable.", show_default=False),
     ] = None,
-    period: Annotated[str, typer.Option("--period", metavar="T", help="The control period: 0.001, 1ms.")] = "1 ms",
+    period: Annotated[str, typer.Option("--period", metavar="T", help="Control period: 0.001, 1ms.")] = "1 ms",
     step: Annotated[
         float,
         typer.Option(
@@ -47,41 +45,43 @@ def tune(
             metavar="S",
             min=1e-6,
             max=10.0,
-            help="The step [rad] that is tried, a tenth of it [m] where a joint slides; the gains ask for no more "
-            "effort in it than there is.",
+            help="Size of the step [rad], a tenth of it [m] for prismatic joints; the gains are limited so that it "
+            "does not saturate the effort.",
         ),
     ] = 0.02,
     simulate: Annotated[
-        bool, typer.Option("--simulate", help="Try it in the engine: the whole robot, under gravity.")
+        bool, typer.Option("--simulate", help="Simulate the step response of the whole robot under gravity.")
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="A figure of the steps: .svg, .png or .pdf."),
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="Write a figure of the step responses: .svg, .png or .pdf."
+        ),
     ] = None,
     write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", help="The controllers file with these gains.")
+        Path | None, typer.Option("--write", metavar="FILE", help="Write the controllers file with these gains.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file of --write if it exists.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the --write file if it exists.")] = False,
     format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Propose gains, and show how joints answer a step with them.
+    """Propose gains, and show the step response of the joints.
 
-    As much of bandwidth and damping as is stable at the control period in all postures looked at, and as efforts allow.
-    """  # fmt: skip
+    Uses as much of the bandwidth and damping as is stable at the control period in all examined configurations, and as
+    the efforts allow.
+    """
     kind, control_period = _checked(robot, output, write, force=force), seconds(period)
     if not 1e-6 <= control_period <= 1.0:
-        raise InvalidInput([Diagnostic("USE071", f"a control period of {period}; expected 1 us to 1 s")])
-    from manipcli.control.tuning import Wish
+        raise InvalidInput([Diagnostic("USE071", f"--period {period}: expected 1 us to 1 s")])
     from manipcli.core.whole_file import write_whole
     from manipcli.report.tuning import render_json, render_text
-    from manipcli.tuning import tune as flow
+    from manipcli.tuning import tune as gains
 
-    tuning = flow.tune(
+    tuning = gains.tune(
         robot,
         controllers,
-        Wish(hertz(bandwidth), damping, control_period),
+        gains.Wish(hertz(bandwidth), damping, control_period),
         joints=tuple(joint or ()),
         step=step,
         package_path=tuple(package_path or ()),
@@ -93,23 +93,23 @@ def tune(
     if output is not None and kind is not None:
         from manipcli.replay.figure import render as draw
 
-        write_whole(output, draw(flow.chart_of(tuning), kind))
+        write_whole(output, draw(gains.chart_of(tuning), kind))
         console.talk(f"drawn: {output}")
     if write is not None:
-        write_whole(write, flow.written(tuning, controllers).encode())
+        write_whole(write, gains.written(tuning, controllers).encode())
         console.talk(f"written: {write}")
     return ExitCode.PASSED
 
 
 def _checked(robot: Path, output: Path | None, write: Path | None, *, force: bool) -> Kind | None:
-    """What kind of figure `output` is to be, once there is a place for all that is written.
+    """The kind of the figure `output`, after checks of all output files.
 
     Raises:
-        InvalidInput: a file cannot be written there, or `write` is there and not to be replaced, or no such figure.
+        InvalidInput: a file cannot be written, `write` exists and is not replaced, or the kind is unknown.
     """
     if write is not None and write.exists() and not force:
         message = f"'{write}' exists"
-        raise InvalidInput([Diagnostic("USE070", message, hint="--force replaces it; or say another name")])
+        raise InvalidInput([Diagnostic("USE070", message, hint="add --force to replace it, or name another file")])
     check_outputs(("--write", write), ("--output", output), reads=(robot,))
     if output is None:
         return None

@@ -1,4 +1,4 @@
-"""`manipcli replay LOG --verify`: a run simulated again from its log alone, and compared."""
+"""`manipcli replay LOG --verify`: a run simulated from its log alone, and compared with it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def verify(
     format_: OutputFormat,
     interrupts: Interrupts,
 ) -> ExitCode:
-    """0: everything in the log came out again."""
+    """Exit code 0 where the new log is identical."""
     from manipcli import pipeline
     from manipcli.cli.progress import StepProgress
     from manipcli.report import verification

@@ -31,18 +31,18 @@ def view(
 ) -> ExitCode:
     """Show a robot, or a task's scene at its start, in the browser.
 
-    Joints by sliders, named poses, collision shapes, frames, inertia boxes. Ctrl-C ends it.
+    With joint sliders, named poses, collision shapes, frames, inertia boxes. Press Ctrl-C to stop.
     """
     with Interrupts():
         given = xacro_arguments(arguments or [])
+        from manipcli import pipeline
         from manipcli.description.lint.inspection import located
         from manipcli.replay.view import View
         from manipcli.report import text
-        from manipcli.task.viewed import load_sight
 
         places = tuple(package_path or ())
         path = located(file, package_path=places)
-        sight = load_sight(path, arguments=given, package_path=places, allow_outside=allow_outside)
+        sight = pipeline.load_sight(path, arguments=given, package_path=places, allow_outside=allow_outside)
         for finding in sight.findings:
             console.talk(text.describe(finding))
         with View(sight.robot, sight.scene, q=sight.q, port=port) as page:
