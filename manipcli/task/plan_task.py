@@ -129,8 +129,8 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
     try:
         if state.at_start:
             planner.outside(state)
-        if grasps and member.regrasp is not None:
-            return member.regrasp(step.body, planner, state, grasps)
+        if grasps and member.alternative is not None:
+            return member.alternative(step.body, planner, state, grasps)
         return member.plan(step.body, planner, state)
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
@@ -144,15 +144,15 @@ def start_position(task: Task) -> Array:
 def _steps(task: Task, planner: Planner, start: PlanningState, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
     """Every step from the predicted end of the one before; with another grasp where one leads nowhere."""
     done: list[PlannedStep] = []
-    regrasps = GraspBacktracking(planner)
+    backtracking = GraspBacktracking(planner)
     while (k := len(done)) < len(task.spec.steps):
-        grasps = regrasps.of(k)
+        grasps = backtracking.of(k)
         again = ", with another grasp" if grasps else ""
         doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{again}")
         try:
             done.append(_planned(task, planner, k, done[-1].plan.end if done else start, grasps))
         except NotPlannable as refusal:
-            del done[regrasps.back(refusal, [(one.verb, one.plan.end) for one in done]) :]
+            del done[backtracking.back(refusal, [(one.verb, one.plan.end) for one in done]) :]
     return tuple(done)
 
 
