@@ -8,7 +8,8 @@ velocity and acceleration limits bound s'^2 and s'' along the path; TOPP-RA find
 points s'' is constant, so s(t) is a parabola there. Jerk is not part of that problem: where a jerk limit is set, s(t)
 is first averaged over a sliding window, which bounds the slope of s'' and leaves the path as it is. The motion then
 takes longer by the window. Where the window is a large part of the motion, smaller accelerations need a shorter
-window and are quicker. The samples are then checked at the control rate, and time is stretched by what they still exceed.
+window and are quicker. The samples are then checked at the control rate, and time is stretched by what they still
+exceed.
 """
 
 from __future__ import annotations

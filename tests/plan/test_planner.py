@@ -158,7 +158,7 @@ def test_a_later_step_that_begins_in_something_is_told_what_lets_it_leave(bench:
     refusal = arm.refused("move", {"pose": above})
     assert "'desk' and 'robot/" in refusal.cause
     assert "already, before it moves" in refusal.cause
-    assert refusal.hint == "`touch: [desk]` of the `move` that leaves it lets it"
+    assert refusal.hint == "add `touch: [desk]` to the `move` that leaves it"
     arm.do("move", {"pose": above, "path": "linear", "touch": ["desk"]})
 
 
@@ -167,7 +167,7 @@ def test_a_hand_that_hits_something_on_its_move_is_told_how_it_may_and_an_arm_is
     above = {"xyz": [0.7, -0.2, 0.54], "rpy": [0, "90 deg", 0]}
     arm.do("move", {"pose": above})
     hint = arm.refused("move", {"pose": {**above, "xyz": [0.7, -0.2, 0.43]}, "path": "linear"}).hint or ""
-    assert hint.endswith("; or `touch: [desk]`, where the hand shall push it or press on it")
+    assert hint.endswith("; or add `touch: [desk]`, if the hand is to push it or press on it")
     arm.now = replace(arm.now, carried=Carried("cup", "palm", Transform.identity()))
     held = CollisionHit("cup", "desk", -0.002, time=0.3)
     assert "`touch: [desk]`" in (arm.planner.refusal(arm.now, held, "would come", "", move=True).hint or "")

@@ -64,7 +64,7 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
     [
         (
             "  - switch_controllers: soft_rm\n",
-            "TASK232 6 steps[0].switch_controllers.to[0]: there is no controller 'soft_rm' in the controllers file | "
+            "TASK232 6 steps[0].switch_controllers.to[0]: controller 'soft_rm' is not in the controllers file | "
             "did you mean 'soft_arm'?",
         ),
         (
@@ -134,7 +134,7 @@ def test_a_hand_is_moved_by_the_gripper_that_is_active(tmp_path: Path) -> None:
     assert told(task_file(tmp_path, grasp, more=GRIPPERS)) == []
     assert told(task_file(tmp_path, f"  - switch_controllers: other\n{grasp}", more=GRIPPERS)) == []
     (problem,) = told(task_file(tmp_path, "  - switch_controllers: {deactivate: [hand]}\n" + grasp, more=GRIPPERS))
-    assert "controller 'hand', which opens and closes a hand with joint 'finger_1_proximal', is not active" in problem
+    assert "controller 'hand' is not active here; it opens and closes a hand with joint 'finger_1_proximal'" in problem
 
 
 def test_a_run_switches_and_the_log_tells_of_it(tmp_path: Path) -> None:
