@@ -97,7 +97,7 @@ def test_no_other_grasp_is_tried_for_a_value_that_is_wrong_with_each(tmp_path: P
     with pytest.raises(NotPlannable) as refused:
         plan_task(task, doing=told.append)
     assert len(told) == 3
-    assert refused.value.cause == "[1.5, 0] m is outside  'table', whose centre is at  [0.55, 0] m"
+    assert refused.value.cause == "[1.5, 0] m is outside 'table', whose centre is at [0.55, 0] m"
     assert refused.value.hint == "`at` is in the world frame; 'table' offers 0.6 m x 0.8 m about its centre"
     assert refused.value.place is not None and (refused.value.place.line, refused.value.place.column) == (
         12,

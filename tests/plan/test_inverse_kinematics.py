@@ -66,7 +66,9 @@ def test_a_goal_near_the_seed_gives_positions_near_the_seed(solver: InverseKinem
     assert np.max(np.abs(q - middle)) < 0.1
 
 
-@pytest.mark.parametrize(("joints", "leaving"), [(3, "turn"), (4, "turn"), (5, "spin"), (7, "spin"), (7, "turn")])
+@pytest.mark.parametrize(
+    ("joints", "leaving"), [(3, "rotation"), (4, "rotation"), (5, "spin"), (7, "spin"), (7, "rotation")]
+)
 def test_what_a_goal_leaves_open_does_not_count_and_the_rest_does(
     solver: InverseKinematics, middle: Array, joints: int, leaving: Open
 ) -> None:
@@ -95,7 +97,7 @@ def test_a_point_that_is_reached_and_not_in_that_direction_is_told_so(solver: In
     assert refused.value.hint == "remove `pointing`: the tool then reaches the point, pointing 57 deg off"
 
 
-@pytest.mark.parametrize("leaving", ["nothing", "spin", "turn"])
+@pytest.mark.parametrize("leaving", ["nothing", "spin", "rotation"])
 def test_the_jacobian_is_that_of_the_error_at_the_goal(solver: InverseKinematics, middle: Array, leaving: Open) -> None:
     """Central differences of the error; away from the goal the one of a rotation vector is another."""
     own = solver.leaving(leaving)
@@ -148,7 +150,9 @@ def test_an_arm_of_few_joints_is_told_of_points(
     two = InverseKinematics(Kinematics(make_arm7()), ARM[:2], "link_7", X_LT=X_LT)
     with pytest.raises(NotPlannable) as refused:
         two.solve(goal, middle, np.random.default_rng(0))
-    assert "an arm of 2 joints reaches few orientations: leave it open with `move: {point: ...}`" in (refused.value.hint or "")
+    assert "an arm of 2 joints reaches few orientations: leave it open with `move: {point: ...}`" in (
+        refused.value.hint or ""
+    )
     with pytest.raises(NotPlannable) as refused:
         solver.solve(Transform.of(xyz=(3.0, 0.0, 0.8)), middle, np.random.default_rng(0))
     assert "few" not in (refused.value.hint or "")

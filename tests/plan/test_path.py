@@ -59,7 +59,7 @@ def test_the_tool_stays_on_its_straight_line_also_between_the_points(
 
 def test_a_line_out_of_reach_says_how_far_it_goes(solver: InverseKinematics, middle: Array) -> None:
     start = solver.forward(middle)
-    with pytest.raises(NotPlannable, match=r"ends \d+ mm and 0 deg along the line: the nearest pose is"):
+    with pytest.raises(NotPlannable, match=r"unreachable at \d+ mm and 0 deg along the line: the nearest pose is"):
         linear_path(solver, middle, Transform(R=start.R, p=start.p + np.array([1.5, 0.0, 0.0])))
 
 

@@ -50,4 +50,7 @@ def test_written_trajectories_and_slow_hands_are_no_longer(
     spec = {"joint_names": ["joint_1"], "points": [{"positions": [0.5], "time_from_start": LONGEST + 1.0}]}
     assert "the trajectory takes 601 s" in arm.refused("follow", spec).cause
     monkeypatch.setattr(arm.planner, "gripper_speed", 1e-9)
-    assert "the hand takes more than 600 s at its controller's speed of 1e-09 rad/s" in arm.refused("move", {"to": "wrap"}).cause
+    assert (
+        "the hand takes more than 600 s at its controller's speed of 1e-09 rad/s"
+        in arm.refused("move", {"to": "wrap"}).cause
+    )

@@ -56,7 +56,7 @@ def test_a_refusal_tells_the_commonest_reasons_with_the_hint_of_the_commonest() 
     with pytest.raises(NotPlannable) as refusal:
         first_feasible(attempt, reasons, what="no way")
     assert refusal.value.cause == (
-        "no way, 7 ways tried: off by -0.5 mm (3 of 7); joint 'joint_4' goes to 2.5 at t = 0.1 s (2 of 7); "
+        "no way, all 7 candidates failed: off by -0.5 mm (3 of 7); joint 'joint_4' goes to 2.5 at t = 0.1 s (2 of 7); "
         "joint 'joint_2' goes to 2.5 at t = 0.1 s (1 of 7); and 1 other reason"
     )
     assert refusal.value.hint == "nearer"

@@ -38,7 +38,7 @@ def turned(arm: Any, **change: Any) -> Planner:
         ((0.3, 0.3, 0.3), None),
         ((2 * QUARTER, 0, 0), "seems to point back into the hand"),
         ((0, 2 * QUARTER, 0), "seems to point back into the hand"),
-        ((0, QUARTER, 0), "seems to point aside"),
+        ((0, QUARTER, 0), "seems to point sideways"),
         ((0, 0, QUARTER), "align the tool's y with the direction in which the fingers close"),
         ((0, 0, QUARTER / 2), "align the tool's y with the direction in which the fingers close"),
     ],
@@ -60,7 +60,7 @@ def test_a_tool_frame_at_the_flange_is_told(bench: Make) -> None:
     arm = bench("panda")
     hint = misplaced(turned(arm, link="panda_link8"), arm.start, "open", "closed")
     assert hint is not None
-    assert "seems to lie 58 mm behind the fingers: `tool: {link: ..., pose: " in hint
+    assert "seems to be 58 mm behind the fingers): `tool: {link: ..., pose: " in hint
 
 
 @pytest.mark.slow

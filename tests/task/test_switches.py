@@ -69,7 +69,7 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
         ),
         (
             "  - switch_controllers: {deactivate: [arm], activate: [soft_am]}\n",
-            "TASK232 6 steps[0].switch_controllers.activate[0]: there is no controller 'soft_am' in the controllers "
+            "TASK232 6 steps[0].switch_controllers.activate[0]: controller 'soft_am' is not in the controllers "
             "file | did you mean 'soft_arm'?",
         ),
         (
@@ -90,19 +90,19 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
         ),
         (
             "  - switch_controllers: {deactivate: [arm]}\n" + MOVE,
-            "TASK232 7 steps[1].move.to: controller 'arm', which follows trajectories of joint 'joint_1', is not "
-            "active here | add a step before it: `switch_controllers: arm`",
+            "TASK232 7 steps[1].move.to: controller 'arm' is not active here; it follows trajectories "
+            "of joint 'joint_1' | add a step before it: `switch_controllers: arm`",
         ),
         (
             "  - move: {to: {finger_1_distal: 0.1}}\n",
             "TASK232 6 steps[0].move.to: no controller follows trajectories of joint 'finger_1_distal' | "
-            "add the joint to a controller of a type that does, in the controllers file: `joint_trajectory`, "
-            "`computed_torque` or `cartesian_impedance`",
+            "add the joint to a controller of type `joint_trajectory`, "
+            "`computed_torque` or `cartesian_impedance` in the controllers file",
         ),
-        ("  - switch_controllers: {}\n", "TASK208 6 steps[0].switch_controllers: say either `to`"),
+        ("  - switch_controllers: {}\n", "TASK208 6 steps[0].switch_controllers: needs either `to`"),
         (
             "  - switch_controllers: {to: arm, activate: [soft_arm]}\n",
-            "TASK208 6 steps[0].switch_controllers: say either `to`",
+            "TASK208 6 steps[0].switch_controllers: needs either `to`",
         ),
         ("  - switch_controllers: {to: arm, strictness: auto}\n", "TASK203 6 steps[0].switch_controllers.strictness"),
     ],
