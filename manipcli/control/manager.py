@@ -3,10 +3,10 @@
     manager = build_controllers(spec, robot, period)       # factory.py; or ControllerManager([...], joints=..., ...)
     command = manager.update(time, state, contact_force)   # a JointCommand, before limits, until the next update
 
-where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState`, for example),
-and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves (see `Controller`); it
-need only be up to date while `senses_contact`. Send goals to the controllers: `manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` is the
-active controller that claims them.
+where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState`, for
+example), and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves (see
+`Controller`); it need only be up to date while `senses_contact`. Send goals to the controllers:
+`manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` is the active controller that claims them.
 
 A controller is unconfigured when loaded, inactive when configured, and active when switched on, as in ros2_control. A
 switch is done as a whole or not at all, between two updates, so it has no timeout.
@@ -199,7 +199,7 @@ class ControllerManager:
     def switch_to(
         self, names: Collection[str], *, strictness: Strictness = "strict", time: float = 0.0
     ) -> SwitchResult:
-        """Activate all of `names`, and deactivate all others on their joints; active ones are unchanged. See `switch`."""
+        """Activate `names` and deactivate all others on their joints; active ones are unchanged. See `switch`."""
         return self.carry_out(Switch(to=names_of(names), strictness=strictness_of(strictness)), time=time)
 
     def carry_out(self, switch: Switch, *, time: float) -> SwitchResult:

@@ -59,7 +59,7 @@ class JointTrajectoryController:
     Args:
         name: of the controller.
         joints: (n) distinct names.
-        command_interfaces: interfaces of the command, one row each: [position], [position, velocity], [position, velocity,
+        command_interfaces: of the command, one row each: [position], [position, velocity], [position, velocity,
             acceleration], [velocity], [effort] or [position, effort]; a single interface needs no list.
         state_interfaces: measured values: [position], and velocity, and acceleration; as the commands need.
         gains: by joint name, a `GainsSpec` or its fields; needed for [effort] and [velocity].
@@ -71,7 +71,7 @@ class JointTrajectoryController:
         allow_partial_joints_goal: accept goals that leave joints out.
         allow_nonzero_velocity_at_trajectory_end: accept goals that do not end at rest; their last position is held.
         allow_integration_in_goal_trajectories: accept points with only velocities or accelerations.
-        allow_trajectory_replacement: a new goal continues from the previous trajectory; otherwise that ends at the present reference.
+        allow_trajectory_replacement: a new goal continues from the previous trajectory; otherwise that ends at once.
         interpolation_method: `splines`, or `none` to step to the next point.
         interpolate_from_desired_state: goals start from the reference; otherwise from the measured state.
         cmd_timeout: [s] after its end, when a goal that is not reached is aborted, and its last position held; 0:

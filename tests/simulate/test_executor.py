@@ -243,7 +243,7 @@ def test_a_hand_that_never_comes_to_an_end_is_given_up(
 
     session = session_of(scripted(swing))
     handles: list[Any] = []
-    end = Executor(session, told=lambda _, one: handles.append(one)).run(close(), until=None, deadline=None)
+    end = Executor(session, on_goal=lambda _, one: handles.append(one)).run(close(), until=None, deadline=None)
     assert end.outcome == "timeout"
     assert [handle.status for handle in handles] == ["canceled"]
     assert session.time == pytest.approx(0.2 + 2.0, abs=0.002)
@@ -269,7 +269,7 @@ def test_an_alarm_ends_a_motion_a_wait_and_a_hold_in_the_tick_that_sets_it_off(s
 def test_a_stop_cancels_what_is_on_and_holds_still_deaf_to_alarms(session_of: SessionOf) -> None:
     session = session_of()
     handles: list[Any] = []
-    executor = Executor(session, told=lambda _, one: handles.append(one), alarm=lambda s: "!" if s.time >= 0.25 else "")
+    executor = Executor(session, on_goal=lambda _, one: handles.append(one), alarm=lambda s: "!" if s.time >= 0.25 else "")
     with pytest.raises(Alarmed):
         executor.run(move(), until=None, deadline=None)
     assert [handle.status for handle in handles] == ["active"]
@@ -290,7 +290,7 @@ def test_a_joint_that_fails_takes_the_rest_of_the_motion_with_it(session_of: Ses
         engine.state.velocity[1:] = 1.0 if engine.tick % 40 < 20 else -1.0
 
     handles: list[Any] = []
-    executor = Executor(session_of(scripted(swing)), told=lambda _, handle: handles.append(handle))
+    executor = Executor(session_of(scripted(swing)), on_goal=lambda _, handle: handles.append(handle))
     both = Motion("both", move().trajectory, close().grip, 0.5)
     assert executor.run(both, until=None, deadline=None).outcome == "failed"
     assert [handle.status for handle in handles] == ["aborted", "canceled"]
@@ -309,7 +309,7 @@ def test_a_controller_that_fails_stops_the_motions_of_the_others(session_of: Ses
 
     hand.update = broken  # type: ignore[method-assign]
     handles: list[Any] = []
-    executor = Executor(session, told=lambda _, handle: handles.append(handle))
+    executor = Executor(session, on_goal=lambda _, handle: handles.append(handle))
     end = executor.run(move(), until=None, deadline=None)
     assert end.outcome == "failed"
     assert "controller 'hand' failed" in end.text
