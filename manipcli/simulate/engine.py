@@ -61,7 +61,7 @@ class Engine(Protocol):
         ...
 
     def touches_changed(self) -> bool:
-        """Whether the set of touching parts changed since the last call of `contacts`, or the force at a contact point of
+        """Whether parts touch or part since the last call of `contacts`, or the force at a contact point of
         the robot grew a lot; cheaper than `contacts`."""
         ...
 

@@ -481,7 +481,7 @@ def test_points_that_make_no_trajectory_are_refused_where_they_are_read() -> Non
         (follow({**good, "accelerations": [0, 0]}), "accelerations need velocities"),
         (follow(good, good), "1 s is not after 1 s"),
         (follow({**good, "time_from_start": 0}), "the trajectory has no duration"),
-        (follow(good, joints=("joint_1", "joint_1")), "stands twice"),
+        (follow(good, joints=("joint_1", "joint_1")), "duplicate joint"),
     ):
         with pytest.raises(ValidationError, match=text):
             spec.model_validate(wrong)

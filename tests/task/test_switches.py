@@ -74,8 +74,8 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
         ),
         (
             "  - switch_controllers: {activate: [soft_arm]}\n",
-            "TASK233 6 steps[0].switch_controllers: a joint cannot be commanded on all of these at once: "
-            "joint_1/velocity (arm), joint_1/effort (soft_arm); the same of joint_2, joint_3, joint_4, and 3 more | "
+            "TASK233 6 steps[0].switch_controllers: conflicting command interfaces of one joint: "
+            "joint_1/velocity (arm), joint_1/effort (soft_arm); likewise for joint_2, joint_3, joint_4, and 3 more | "
             "say `to` for those that shall be active: it deactivates who is in their way",
         ),
         (
