@@ -33,7 +33,7 @@ class Tolerances:
     """Greatest errors of position, velocity and acceleration: `path`, `goal` (3, n), infinite where not enforced.
 
     Attributes:
-        path: on the way.
+        path: before the end.
         goal: at the end.
         goal_time: [s] of grace after the end; infinite: no limit.
     """
