@@ -242,7 +242,7 @@ def test_the_rate_that_the_hint_names_is_taken(rate, period, ticks):
     with pytest.raises(InvalidArgument) as refused:
         ticks_between(rate, period)
     hint = refused.value.findings[0].hint
-    assert ticks_between(float(hint.removeprefix("say ").removesuffix(" Hz")), period) == ticks
+    assert ticks_between(float(hint.removeprefix("use ").removesuffix(" Hz")), period) == ticks
 
 
 @pytest.mark.parametrize("wrong", [0.0, -5.0, math.nan, math.inf])
@@ -273,7 +273,7 @@ def test_measured_vectors_are_arrays_of_one_number_a_joint(wrong):
     manager = manager_of(Spring("one"), active=["one"])
     world = World()
     world.velocity = wrong
-    with pytest.raises(InvalidArgument, match=r"measured velocity: .* expected an array of 3 numbers"):
+    with pytest.raises(InvalidArgument, match=r"measured velocity is .*; expected an array of 3 numbers"):
         manager.update(0.0, world)
     assert manager.faults == ()
 

@@ -190,7 +190,7 @@ def test_two_controllers_on_one_joint_are_refused_with_both_names():
         ControllerManager([controller("one", "effort"), controller("two", "effort")], joints=["a"], period=0.001)
     with pytest.raises(InvalidInput, match="is not a moving joint"):
         ControllerManager([controller("one", "effort")], joints=["b", "c"], period=0.001)
-    with pytest.raises(InvalidInput, match="follows another joint"):
+    with pytest.raises(InvalidInput, match="mimics another joint"):
         ControllerManager([controller("one", "effort")], joints=["a"], period=0.001, following=["a"])
 
 
@@ -275,7 +275,7 @@ def test_gains_of_no_joint_of_the_controller_point_to_a_joint_without_gains():
     ("changes", "text"),
     [
         ({"command_interface": "velocity", "gains": {}}, "on the velocity interface it would not move"),
-        ({"command_interface": "position", "gravity_compensation": True}, "gravity_compensation adds an effort"),
+        ({"command_interface": "position", "gravity_compensation": True}, "gravity_compensation needs the effort interface"),
         ({"constraints": {"joints": {"sholder": {"goal": 0.1}}}}, "'sholder' has tolerances"),
         (
             {"joints": ["shoulder", "elbow", "left_1"], "gains": gains(["shoulder", "elbow", "left_1"])},

@@ -204,7 +204,7 @@ def test_velocities_and_accelerations_of_a_goal_have_tolerances():
         handle = controller.send_goal(TrajectoryGoal(goal, path_tolerance=(tolerance,)))
         run(controller, 100, first=1)
         assert handle.result.code is ErrorCode.PATH_TOLERANCE_VIOLATED
-        assert f"joint 'j' left its {text}" in handle.result.text
+        assert f"joint 'j' exceeds its {text}" in handle.result.text
     # The frozen joint misses 1.5 rad/s (3 (t - t^2) 2) at most, and 6 rad/s2 at the start.
     controller = made()
     run(controller, 1)
