@@ -223,7 +223,7 @@ def test_positions_in_steps_that_the_limits_of_accelerations_cut_are_a_warning(i
     for joints, expected in ((quick, told), (model.joints, False)):
         found = controller_findings(written, replace(model, joints=joints), 0.001)
         texts = [f.message for f in found if (f.code, f.severity) == ("CTRL170", "warning")]
-        assert [("once in 10 control ticks" in text, "shoulder" in text) for text in texts] == [(True, True)] * expected
+        assert [("only every 10 control ticks" in text, "shoulder" in text) for text in texts] == [(True, True)] * expected
 
 
 def test_all_findings_of_a_file_come_at_once_each_with_its_place():
