@@ -1,4 +1,4 @@
-"""Knows joints and references, not physics: controllers, their manager, PID, limits, and the goals they take."""
+"""Controllers, their manager, PID, joint limits and goals; independent of the physics engine."""
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejected, GoalResult, GripperGoal
 from manipcli.control.controller import Controller, ControllerOutput, JointState

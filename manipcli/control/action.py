@@ -1,7 +1,7 @@
-"""Goals, feedback and results of controllers, as FollowJointTrajectory and GripperCommand know them.
+"""Goals, feedback and results of controllers, in the sense of FollowJointTrajectory and GripperCommand.
 
-`controller.send_goal(...)` returns a `GoalHandle`; the controller ends it in one of its next updates. The session that
-owns the stepping, and the Python API, hold the same handles.
+`controller.send_goal(...)` returns a `GoalHandle`; the controller ends it in a later update. The session and the Python
+API use the same handles.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from manipcli.core.geometry import Array
 
 GoalStatus = Literal["active", "succeeded", "aborted", "canceled"]
 FingerStop = Literal["contact", "stalled", "reached"]
-"""Why a finger stopped: the force was met, it was blocked, or it came to its target without either."""
+"""Why a finger stopped: it met the force, it was blocked, or it reached its target without either."""
 
 
 class ErrorCode(IntEnum):
@@ -33,7 +33,7 @@ class ErrorCode(IntEnum):
 
 
 class GoalRejected(InvalidArgument):
-    """A goal that no controller will carry out; `error_code` says in ROS's numbers what is wrong with it."""
+    """A goal that the controller refuses; `error_code` is ROS's result code."""
 
     def __init__(
         self, code: str, message: str, *, hint: str | None = None, error_code: ErrorCode = ErrorCode.INVALID_GOAL
@@ -46,7 +46,7 @@ class GoalRejected(InvalidArgument):
 class GoalResult:
     """How a goal ended: code, a text that names joint, value, limit and time, and the `time` [s].
 
-    `fingers` says of a gripper goal why each finger stopped, in the order of the goal's fingers.
+    `fingers`: for a gripper goal, why each finger stopped, in the order of the goal's fingers.
     """
 
     status: GoalStatus
@@ -57,25 +57,25 @@ class GoalResult:
 
     @property
     def reached_goal(self) -> bool:
-        """Of a gripper goal: whether every finger came to its target."""
+        """For a gripper goal: whether every finger reached its target."""
         return bool(self.fingers) and all(stop == "reached" for stop in self.fingers)
 
     @property
     def stalled(self) -> bool:
-        """Of a gripper goal: whether something stopped a finger, which is how an object is grasped."""
+        """For a gripper goal: whether something stopped a finger, as when it grasps an object."""
         return any(stop in ("stalled", "contact") for stop in self.fingers)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feedback:
-    """A goal on its way.
+    """Progress of an active goal.
 
     Attributes:
         elapsed: [s] of the goal's own clock since it began; negative before its start time.
-        desired, actual: (n) copies of what is wanted and what is; rad or m. Of a continuous joint, `actual` is told in
-            the turn of `desired`.
-        index: the point of the goal that comes next, or its last.
-        desired_velocity, actual_velocity: (n), per second; empty where a controller does not tell.
+        desired, actual: (n) copies of the desired and the measured position; rad or m. For a continuous joint, `actual`
+            is within half a turn of `desired`.
+        index: the next point of the goal, or its last.
+        desired_velocity, actual_velocity: (n), per second; empty if the controller does not report them.
     """
 
     elapsed: float
@@ -96,7 +96,7 @@ class GoalHandle:
 
     Attributes:
         result: None while the goal is active, then how it ended.
-        notes: what of the goal was not taken as it was said, and why.
+        notes: which parts of the goal were not adopted, and why.
     """
 
     __slots__ = ("_cancel", "_feedback", "notes", "result")
@@ -126,21 +126,21 @@ class GoalHandle:
         return self._feedback()
 
     def cancel(self) -> None:
-        """Ends the goal as canceled, and lets the controller stop and hold; nothing happens to a goal that ended."""
+        """Ends the goal as canceled; the controller stops and holds. No effect on a goal that has ended."""
         if self.result is None:
             self._cancel(self)
 
     def end(
         self, status: GoalStatus, code: ErrorCode, text: str, time: float, fingers: tuple[FingerStop, ...] = ()
     ) -> None:
-        """For the controller: the goal ends; the first end counts."""
+        """Ends the goal; called by the controller. Only the first call has an effect."""
         if self.result is None:
             self.result = GoalResult(status=status, code=code, text=text, time=time, fingers=fingers)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GripperGoal:
-    """Where the hand shall go, and what may stop it.
+    """Target of a hand, and what may stop it.
 
     Attributes:
         target: (n) rad or m, in the order of the controller's joints; one number: for all of them.

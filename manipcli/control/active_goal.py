@@ -1,4 +1,4 @@
-"""The active goal of a trajectory controller: its tolerances, and when it ends."""
+"""Active goal of a trajectory controller: its tolerances, and when it ends."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
 
 DISABLED: Final = -1.0
-"""A tolerance that says so is not enforced."""
+"""Value of a tolerance that is not enforced."""
 
 QUANTITIES: Final = (("", ""), ("velocity ", "/s"), ("acceleration ", "/s^2"))
-"""The rows of errors and tolerances (3, n): what they are called, and their unit after that of the position."""
+"""Rows of errors and tolerances (3, n): name, and suffix of the unit after that of the position."""
 PATH: Final = ("path tolerance", "path velocity tolerance", "path acceleration tolerance")
 GOAL: Final = ("goal tolerance", "stopped velocity tolerance", "goal acceleration tolerance")
 
@@ -33,9 +33,9 @@ class Tolerances:
     """Greatest errors of position, velocity and acceleration: `path`, `goal` (3, n), infinite where not enforced.
 
     Attributes:
-        path: on the way.
+        path: before the end.
         goal: at the end.
-        goal_time: [s] of grace after the end; infinite: without end.
+        goal_time: [s] of grace after the end; infinite: no limit.
     """
 
     path: Array
@@ -49,7 +49,7 @@ class Tolerances:
         Args:
             joints: (n).
             constraints: of the controller.
-            patient: whether a `goal_time` of 0 means to wait without end.
+            patient: whether a `goal_time` of 0 means no limit.
 
         Raises:
             InvalidArgument: a tolerance of a joint that is not one of them.
@@ -59,17 +59,17 @@ class Tolerances:
             raise InvalidArgument("CTRL104", f"tolerances of '{unknown[0]}', which is not a joint of the controller")
         each = [constraints.joints.get(joint, JointConstraintSpec()) for joint in joints]
         path, goal = np.full((2, 3, len(joints)), np.inf)
-        path[0] = [one.trajectory or math.inf for one in each]
-        goal[0] = [one.goal or math.inf for one in each]
+        path[0] = [constraint.trajectory or math.inf for constraint in each]
+        goal[0] = [constraint.goal or math.inf for constraint in each]
         goal[1] = constraints.stopped_velocity_tolerance or math.inf
         endless = patient and constraints.goal_time == 0.0
         return Tolerances(path, goal, math.inf if endless else constraints.goal_time)
 
     @property
     def bound(self) -> float:
-        """Errors of position and velocity whose norm is less are inside every path tolerance.
+        """Bound on the norm of the position and velocity errors below which every path tolerance is kept.
 
-        0 where an acceleration counts, too, there or at the end: they tell nothing of that.
+        0 if an acceleration has a tolerance, on the path or at the end, which these errors do not determine.
         """
         if self.needs_acceleration:
             return 0.0
@@ -77,31 +77,32 @@ class Tolerances:
 
     @property
     def needs_acceleration(self) -> bool:
-        """Whether an acceleration is to be judged."""
+        """Whether an acceleration has a tolerance."""
         return bool(np.isfinite([self.path[2], self.goal[2]]).any())
 
     def adopted(self, goal: TrajectoryGoal, joints: tuple[str, ...]) -> tuple[Tolerances, tuple[str, ...]]:
-        """With those of a goal, and notes of what was not taken.
+        """The tolerances with those of a goal, and notes on what was not adopted.
 
-        Above 0 replaces, 0 leaves, -1 disables. Any other negative number or an unknown joint, and none of the goal's
-        tolerances is taken: ROS 2's rule.
+        A value above 0 replaces, 0 keeps, -1 disables. With any other negative number or an unknown joint, all of the
+        goal's tolerances are ignored, as in ROS 2.
         """
         path, goal_rows = np.array(self.path), np.array(self.goal)
         for rows, given, which in ((path, goal.path_tolerance, "path"), (goal_rows, goal.goal_tolerance, "goal")):
             for tolerance in given:
                 wrong = _wrong(tolerance, joints)
                 if wrong:
-                    return self, (f"{which} tolerance: {wrong}; the controller's own tolerances hold",)
+                    return self, (f"{which} tolerance: {wrong}; the controller's own tolerances apply",)
                 j = joints.index(tolerance.name)
                 for k, value in enumerate((tolerance.position, tolerance.velocity, tolerance.acceleration)):
                     rows[k, j] = _chosen(value, rows[k, j])
         time = goal.goal_time_tolerance
         if not (time >= 0.0 or time == DISABLED):
-            return self, (f"goal time tolerance {time:g} s; the controller's own tolerances hold",)
+            wrong = f"goal time tolerance is {time:g} s; expected 0 or more, or -1"
+            return self, (f"{wrong}; the controller's own tolerances apply",)
         return replace(self, path=path, goal=goal_rows, goal_time=_chosen(time, self.goal_time)), ()
 
     def outside_path(self, errors: Sequence[Array]) -> bool:
-        """Whether some joint is outside its path tolerance; `errors` of position, velocity and, if known, more."""
+        """Whether a joint is outside its path tolerance; `errors` of position, velocity and, if known, acceleration."""
         return any(bool((np.abs(error) > limit).any()) for error, limit in zip(errors, self.path, strict=False))
 
     def inside_goal(self, errors: Sequence[Array]) -> bool:
@@ -110,12 +111,12 @@ class Tolerances:
 
     def path_text(self, facts: JointFacts, errors: Sequence[Array], time: float, elapsed: float) -> str:
         joint, what = _worst(facts, errors, self.path, PATH)
-        return f"joint '{joint}' left its {what}, at t = {time:.3f} s ({elapsed:.3f} s into the goal)"
+        return f"joint '{joint}' exceeds its {what}, at t = {time:.3f} s ({elapsed:.3f} s into the goal)"
 
     def goal_text(self, facts: JointFacts, errors: Sequence[Array], time: float, late: float) -> str:
         joint, what = _worst(facts, errors, self.goal, GOAL)
-        grace = "without end" if math.isinf(self.goal_time) else f"{self.goal_time:.6g} s"
-        grace += "" if self.goal_time > 0.0 else ": no grace; `compat: ros2` waits without end"
+        grace = "unlimited" if math.isinf(self.goal_time) else f"{self.goal_time:.6g} s"
+        grace += "" if self.goal_time > 0.0 else ": no grace; with `compat: ros2`: unlimited"
         return (
             f"joint '{joint}' is outside its {what}, at t = {time:.3f} s, "
             f"{late:.3f} s after the end (goal_time {grace})"
@@ -123,7 +124,7 @@ class Tolerances:
 
 
 def _worst(facts: JointFacts, errors: Sequence[Array], limits: Array, called: Sequence[str]) -> tuple[str, str]:
-    """The joint whose error is the largest multiple of its limit, and what that is."""
+    """The joint whose error is the largest multiple of its limit, and a text on both."""
     shares = np.array([np.abs(error) / limit for error, limit in zip(errors, limits, strict=False)])
     k, j = (int(i) for i in np.unravel_index(np.argmax(shares), shares.shape))
     quantity, per = QUANTITIES[k]
@@ -133,7 +134,7 @@ def _worst(facts: JointFacts, errors: Sequence[Array], limits: Array, called: Se
 
 
 def _wrong(tolerance: JointTolerance, joints: tuple[str, ...]) -> str:
-    """Why a tolerance cannot be taken; empty where it can."""
+    """Why a tolerance is invalid; empty if it is valid."""
     if tolerance.name not in joints:
         near = did_you_mean(tolerance.name, joints, kind="joints")
         return f"'{tolerance.name}' is not a joint of the controller" + (f" ({near})" if near else "")
@@ -146,24 +147,24 @@ def _wrong(tolerance: JointTolerance, joints: tuple[str, ...]) -> str:
 
 
 def _chosen(value: float, default: float) -> float:
-    """Above 0 itself, 0 the default, -1 none."""
+    """The value if above 0, the default if 0, infinite if -1."""
     if value == DISABLED:
         return math.inf
     return value if value > 0.0 else float(default)
 
 
 Then = Literal["go on", "let go", "hold measured"]
-"""What the controller does after it was judged."""
+"""What the controller does after the tolerances were checked."""
 
 
 @dataclass(slots=True, eq=False)
 class ActiveGoal:
-    """Its trajectory in the order of the controller's joints, its tolerances, and how patient it is.
+    """A goal's trajectory in the order of the controller's joints, its tolerances and its timeout.
 
     Attributes:
         controller: name, for texts.
-        timeout: [s] after its end it is given up.
-        begin: [s] its time 0 in the clock of the active trajectory, once it is followed.
+        timeout: [s] after its end, when it is aborted.
+        begin: [s] of its time 0 in the clock of the active trajectory, once it is followed.
     """
 
     controller: str
@@ -180,7 +181,7 @@ class ActiveGoal:
     def judge_path(
         self, errors: Array, acceleration: Array, measured_velocity: Array, time: float, clock: float
     ) -> Then:
-        """Ends it where a joint left its path tolerance.
+        """Aborts the goal if a joint exceeds its path tolerance.
 
         Args:
             errors: (2, n) of position and velocity.
@@ -196,7 +197,7 @@ class ActiveGoal:
         return self._abort(ErrorCode.PATH_TOLERANCE_VIOLATED, text, time)
 
     def judge_end(self, errors: Array, acceleration: Array, measured_velocity: Array, time: float, late: float) -> Then:
-        """Ends it, `late` [s] after its end, where it is reached or its patience is over.
+        """Ends the goal, `late` [s] after its end, if it is reached or its goal time is over.
 
         Args:
             errors, acceleration, measured_velocity, time: as for `judge_path`.
@@ -218,7 +219,7 @@ class ActiveGoal:
     def _judged(self, errors: Array, acceleration: Array, measured_velocity: Array, time: float) -> list[Array]:
         """Errors of position, velocity and, where the goal has a tolerance for it and it is known, acceleration.
 
-        What is measured of an acceleration is the change of the velocity since the tick before.
+        The measured acceleration is the change of the velocity since the previous tick.
         """
         judged = [errors[0], errors[1]]
         if self.tolerances.needs_acceleration:
@@ -233,14 +234,13 @@ class ActiveGoal:
         return "hold measured"
 
     def preempt(self, time: float, *, as_canceled: bool) -> None:
-        """Another goal takes its place."""
         if as_canceled:
             self.handle.end("canceled", ErrorCode.SUCCESSFUL, "preempted by a new goal", time)
         else:
             self.handle.end("aborted", ErrorCode.INVALID_GOAL, "preempted by a new goal", time)
 
     def next_point(self, clock: float) -> int:
-        """The point of its trajectory that comes next, or its last."""
+        """Index of the next point of its trajectory, or of its last."""
         times = self.trajectory.times
         # bisect: numpy would copy all times first, where they are a column of something.
         return min(bisect_right(times, clock - self.begin + INSTANT), len(times) - 1)

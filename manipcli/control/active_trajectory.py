@@ -1,4 +1,4 @@
-"""The trajectory that a controller follows: for each joint the one that began last, in one clock, and its samples."""
+"""Active trajectory of a controller: for each joint the latest trajectory, on one clock, and its samples."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Columns = slice | npt.NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A trajectory of the joints at `columns`, from `begin` [s] of its clock on; its joints rest at its end."""
+    """A trajectory of the joints at `columns`, which begins at `begin` [s] of the clock; its joints rest at its end."""
 
     columns: Columns
     trajectory: JointTrajectory
@@ -41,21 +41,21 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActiveTrajectory:
-    """`rest` (4, n) holds for each joint until a part has it; a later part takes joints over from an earlier one."""
+    """`rest` (4, n) applies to each joint until a part begins; a later part takes joints over from an earlier one."""
 
     rest: Array
     parts: tuple[Part, ...] = ()
 
     @staticmethod
     def hold(position: Array, effort: Array | float = 0.0) -> ActiveTrajectory:
-        """At rest."""
+        """A trajectory at rest at `position` (n)."""
         rest = np.zeros((4, len(position)))
         rest[POSITION], rest[EFFORT] = position, effort
         return ActiveTrajectory(rest)
 
     @property
     def end(self) -> float:
-        """[s] from when on all rests."""
+        """[s] Time from which all joints rest."""
         ends = np.zeros(self.rest.shape[1])
         for part in self.parts:
             ends[part.columns] = part.end
@@ -91,7 +91,7 @@ class ActiveTrajectory:
         return self.sample(np.arange(count + 2, dtype=np.float64) * period)
 
     def from_time(self, now: float) -> ActiveTrajectory:
-        """The same, with `now` as its time 0."""
+        """The same trajectory with `now` as its time 0."""
         if self.end <= now:
             return ActiveTrajectory(self.sample(np.array([now]))[0])
         return ActiveTrajectory(
@@ -99,14 +99,14 @@ class ActiveTrajectory:
         )
 
     def with_part(self, part: Part) -> ActiveTrajectory:
-        """With one that takes its joints over; parts that have no joint left are forgotten."""
+        """With a part that takes its joints over; parts without a joint left are dropped."""
         kept: list[Part] = []
         taken = np.zeros(self.rest.shape[1], dtype=np.bool_)
-        for one in (part, *reversed(self.parts)):
-            if not taken[one.columns].all():
-                kept.insert(0, one)
-            if one.begin <= INSTANT:
-                taken[one.columns] = True
+        for candidate in (part, *reversed(self.parts)):
+            if not taken[candidate.columns].all():
+                kept.insert(0, candidate)
+            if candidate.begin <= INSTANT:
+                taken[candidate.columns] = True
         return ActiveTrajectory(self.rest, tuple(kept))
 
 
@@ -116,8 +116,8 @@ def decelerating(row: Array, times: Array) -> ActiveTrajectory:
     It ends at q0 + v0 T / 2.
 
     Args:
-        row: what is followed now.
-        times: (n) T [s] of each joint; 0: it stops at once.
+        row: the reference now.
+        times: (n) T [s] of each joint; 0 stops it at once.
     """
     velocity = row[VELOCITY]
     active = ActiveTrajectory.hold(row[POSITION], row[EFFORT])
@@ -133,16 +133,16 @@ def decelerating(row: Array, times: Array) -> ActiveTrajectory:
 def stopping_in(row: Array, duration: float) -> ActiveTrajectory:
     """From a moving `row` (4, n) to rest in `duration` T [s], as ROS 1 stops.
 
-    The curve is the first half of the quintic that turns the joint round within 2 T, from (q0, v0, 0) to (q0, -v0, 0):
-    it ends at q0 + 5/8 v0 T.
+    The curve is the first half of the quintic that reverses the joint within 2 T, from (q0, v0, 0) to (q0, -v0, 0): it
+    ends at q0 + 5/8 v0 T.
     """
     n = row.shape[1]
     position, velocity, still = row[POSITION], row[VELOCITY], np.zeros(n)
     round_trip = JointTrajectory.of_arrays(
         [str(k) for k in range(n)], [0.0, 2.0 * duration], [position, position], [velocity, -velocity], [still, still]
     )
-    turn, _, bend = round_trip.sample(duration)
-    part = _part(np.arange(n), duration, (position, turn), (velocity, still), (still, bend), row[EFFORT])
+    middle, _, bend = round_trip.sample(duration)
+    part = _part(np.arange(n), duration, (position, middle), (velocity, still), (still, bend), row[EFFORT])
     return ActiveTrajectory.hold(position, row[EFFORT]).with_part(part)
 
 
@@ -154,7 +154,7 @@ def _part(
     accelerations: Sequence[Array] | None,
     effort: Array,
 ) -> Part:
-    """Two points, and an effort that stays."""
+    """A part of two points, with a constant effort."""
     names = [str(k) for k in columns]
     efforts = np.tile(effort[columns], (2, 1))
     return Part(
@@ -167,19 +167,19 @@ def _part(
 
 
 ON_TICK: Final = 1e-3
-"""A time nearer than this, in periods, to a sampled tick is that tick."""
+"""A time within this tolerance, in periods, of a sampled tick counts as that tick."""
 BLOCK: Final = 32
-"""Ticks that are sampled at once where they were not before."""
+"""Number of ticks that are sampled at once if no samples exist."""
 
 
 class Reference:
-    """Follows one active trajectory after the other, in a clock that runs `speed` seconds a second.
+    """Follows successive active trajectories, on a clock that runs `speed` seconds per second.
 
-    At full speed and at the ticks of the period with which a trajectory began, its samples are made beforehand;
-    otherwise they are made a block at a time.
+    At full speed and at the ticks of the period with which a trajectory began, it is sampled in advance; otherwise it
+    is sampled in blocks.
 
-    It also gives the part of a command that does not depend on the error, one period ahead, because a command is what
-    the joint is to have when the next tick measures it: the position, velocity or acceleration of the trajectory; with
+    It also gives the part of a command that does not depend on the error, one period ahead, because the joint executes
+    a command by the time the next tick measures it: the position, velocity or acceleration of the trajectory; with
     a PID `velocity_scale` times its velocity; and its effort.
 
     Args:
@@ -194,7 +194,7 @@ class Reference:
         ended: whether the trajectory is over.
         end: [s] of the trajectory's clock.
         speed: of the clock.
-        scales: whether `rescale` changes it; a stop does not wait.
+        scales: whether `rescale` has an effect; a stop is not scaled.
     """
 
     __slots__ = (
@@ -210,7 +210,7 @@ class Reference:
         self.hold(ActiveTrajectory.hold(np.zeros(rows.shape[1])), time=0.0)
 
     def hold(self, active: ActiveTrajectory, *, time: float) -> None:
-        """From now on what `active` rests at."""
+        """From now on, hold the rest position of `active`."""
         self._active = active
         self.rows[:] = active.rest[:EFFORT]
         feed = self._feed(active.rest[None])
@@ -224,7 +224,7 @@ class Reference:
     def follow(
         self, active: ActiveTrajectory, samples: Array, *, time: float, period: float, speed: float | None = None
     ) -> None:
-        """From now on `active`, which begins at `time`; `samples` are its `ticks` of `period`; `speed` None: 1."""
+        """From now on, follow `active`, which begins at `time`; `samples`: its `ticks` of `period`; `speed` None: 1."""
         self._active = active
         self.scales = speed is not None
         self.end = active.end
@@ -236,11 +236,11 @@ class Reference:
         self.moving, self.ended = True, False
 
     def clock(self, time: float) -> float:
-        """[s] of the trajectory at `time`."""
+        """Time [s] of the trajectory at `time`."""
         return self._before + (time - self._since) * self.speed
 
     def rescale(self, speed: float, *, time: float) -> None:
-        """From `time` on the clock runs so fast; the samples made beforehand are of no use any more."""
+        """From `time` on the clock runs at this speed; samples made in advance are dropped."""
         if self.moving and self.scales and speed != self.speed:
             self._before, self._since = self.clock(time), time
             self._last = -1
@@ -259,7 +259,7 @@ class Reference:
         self.ended = row >= self._end_row
 
     def _look_ahead(self, time: float, period: float) -> None:
-        """Samples of the next ticks, for a time that is none of those that were sampled before."""
+        """Samples the next ticks, for a time that is not sampled yet."""
         step = self.speed * period
         clocks = np.maximum(self.clock(time) + step * np.arange(BLOCK + 1), 0.0)
         self._take(self._sample(clocks), time, period)
@@ -291,9 +291,9 @@ class Reference:
         return rows
 
     def row(self, time: float) -> Array:
-        """(4, n) what is followed at `time`, a second of real time."""
+        """(4, n) the reference at `time`, with derivatives per second of real time."""
         return np.asarray(self._sample(np.array([max(0.0, self.clock(time))]))[0])
 
     def now(self, time: float) -> ActiveTrajectory:
-        """What is left of the trajectory at `time`."""
+        """The remaining trajectory at `time`."""
         return self._active.from_time(max(0.0, self.clock(time)))

@@ -1,6 +1,6 @@
-"""What actuators make of effort commands: the way from a joint to its motor and back, once a control tick.
+"""Actuator model: effort commands from joints to motors and back, once per control tick.
 
-joint_to_actuator -> latency -> what the motor can give -> friction and losses -> actuator_to_joint
+joint_to_actuator -> latency -> effort and velocity limits -> friction and losses -> actuator_to_joint
 """
 
 from __future__ import annotations
@@ -16,32 +16,32 @@ from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
 
 STIFFNESS: Final = 0.25
-"""How much of an actuator's velocity its friction may take away in a tick; with 2 it would ring without end."""
+"""Largest share of an actuator's velocity that friction removes per tick; at 2 it would oscillate for ever."""
 _PLENTY: Final = 1e9
-"""Stands for an unlimited effort where numbers are added [N m or N]."""
+"""Represents an unlimited effort in sums [N m or N]."""
 
 
 class Actuation:
     """The actuators of a robot.
 
-    An actuator gives tau = what was commanded `latency` ticks ago, at most its effort limit, and nothing that drives it
-    further beyond its velocity limit. Of that reaches the gear
+    An actuator applies tau, the effort commanded `latency` ticks ago, at most its effort limit, and 0 if that drives it
+    further beyond its velocity limit. The gear receives
 
         tau - b v - clip(g v, -+(c + (1 - efficiency) |tau|)),
 
     v the actuator's velocity, b its viscous and c its Coulomb friction: away from rest the Coulomb friction, and a
     share of the effort that is lost where the motor drives and added where it brakes; near rest a damping g that is as
-    stiff as one tick can bear, so that nothing chatters. A load below c makes the joint creep at load / g instead
-    of sticking.
+    stiff as is stable for one tick, so that the joint does not chatter. A load below c makes the joint creep at
+    load / g instead of sticking.
 
-    Only joints that are commanded by effort go this way; those by position or velocity are the engine's motors, whose
-    force `motor_effort_limits` caps. Of a pair, both must be commanded by effort.
+    This applies only to joints commanded by effort; those commanded by position or velocity are the engine's motors,
+    whose force `motor_effort_limits` caps. Both joints of a pair must be commanded by effort.
 
     Attributes:
         names: (a) of the actuators.
-        ideal: whether every actuator is: then `apply` gives the command back, at once.
-        saturations: (a) int, in how many ticks each actuator could not give what was asked of it.
-        saturated: (a) bool, in the last tick.
+        ideal: whether every actuator is ideal; `apply` then returns the command.
+        saturations: (a) int, number of ticks in which each actuator was saturated.
+        saturated: (a) bool, whether it was in the last tick.
 
     Args:
         robot: the robot.
@@ -81,7 +81,7 @@ class Actuation:
         self._past = np.zeros((int(latency.max(initial=0)) + 1, a))
         self._past_flat = self._past.reshape(-1)
         self._at = np.zeros(a, dtype=np.intp)
-        self._row = -1  # where the last command stands in `_past`; -1: there was none
+        self._row = -1  # index of the last command in `_past`; -1: there was none
 
         width = 2 if self._sees_velocity else 1
         self._seen = np.zeros(width * n)
@@ -96,7 +96,7 @@ class Actuation:
         self.select(["effort"] * len(robot.joint_names))
 
     def select(self, modes: Sequence[str | None]) -> None:
-        """From now on each joint (n) obeys this; of anything but "effort" the entries of a command pass as they are."""
+        """Set the modes (n) of the joints; entries of a command pass unchanged in any mode but "effort"."""
         n, a = len(self._robot.joint_names), len(self.names)
         maps = self.drivetrain.transmission.maps
         joints = list(self.drivetrain.joints)
@@ -125,7 +125,7 @@ class Actuation:
         self.saturated[:] = False
 
     def apply(self, command: Array, position: Array, velocity: Array) -> Array:
-        """What the joints really get of a command.
+        """The efforts that a command produces at the joints.
 
         Args:
             command: (n) after the joint limits [N m or N where it is an effort].
@@ -133,7 +133,7 @@ class Actuation:
 
         Returns:
             (n) the efforts at the joints; entries of other joints as in `command`. Valid until the next call, and
-            `command` itself where no actuator changes anything.
+            `command` itself if no actuator changes it.
         """
         if self.ideal:
             return command
@@ -164,7 +164,7 @@ class Actuation:
         return self._applied
 
     def _delayed(self, wanted: Array) -> Array:
-        """What was wanted `latency` ticks ago; before the first tick, what is wanted in it."""
+        """The effort commanded `latency` ticks ago; before the first tick, that of the first."""
         rows, a = self._past.shape
         if self._row < 0:
             self._past[:] = wanted
@@ -178,7 +178,7 @@ class Actuation:
         return self._wanted
 
     def _limited(self, wanted: Array, speed: Array) -> Array:
-        """Cut to what the motors can give; counted where that is less than wanted."""
+        """Clamped to the limits of the motors; ticks with saturation are counted."""
         most, least, given = self._effort, self._pull, self._given
         if len(speed):
             np.abs(speed, out=self._friction)
@@ -196,7 +196,7 @@ class Actuation:
         return given
 
     def _rubbed(self, given: Array, speed: Array, position: Array) -> Array:
-        """Less friction and losses."""
+        """The efforts minus friction and losses."""
         if self._damping is None:
             self._damping = self._stable_damping(position)
         damping, a = self._damping, len(given)
@@ -214,7 +214,7 @@ class Actuation:
         return given
 
     def _stable_damping(self, position: Array) -> Array:
-        """g and b (2 a): what friction per velocity a tick can bear at `position`.
+        """g and b (2 a): the friction per velocity that is stable for a tick at `position`.
 
         Efforts on the actuators change their velocities by L = T M^-1 T^T period per unit in a tick, M the mass matrix
         with rotors and velocity_a = T velocity_j. With m the sums of the rows of |L| and g = STIFFNESS / m, no
@@ -231,10 +231,10 @@ class Actuation:
 
 
 def motor_effort_limits(robot: RobotModel) -> Array:
-    """(n) what an engine's own motor may apply to each joint [N m or N]; infinite where nothing limits it.
+    """(n) the largest effort of an engine's own motor at each joint [N m or N]; infinite where unlimited.
 
-    The least of the joint's limit and of what its actuator gives while it drives, losses and Coulomb friction taken
-    off. The two joints of a pair get the largest multiple of what each could have alone that both can have at once.
+    The smaller of the joint's limit and the output of its actuator while it drives, less losses and Coulomb friction.
+    The two joints of a pair get the largest common multiple of their individual limits that both can have at once.
     """
     limits = np.array(
         [math.inf if joint.limits.effort is None else joint.limits.effort for joint in robot.moving_joints],

@@ -1,4 +1,4 @@
-"""Who claims what: an interface of a joint belongs to one active controller."""
+"""Claims of controllers: a command interface of a joint belongs to one active controller."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manipcli.spec.controllers import Interface
 
 
 class Claimant(Protocol):
-    """A controller, as far as claims go."""
+    """The attributes of a controller that matter for claims."""
 
     @property
     def name(self) -> str: ...
@@ -25,13 +25,13 @@ class Claimant(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """`joint/interface` -> the name of the controller that claims it, in the order of claiming."""
+    """Name of the controller that claims each (joint, interface), in the order of claiming."""
 
     owners: dict[tuple[str, Interface], str]
 
     @staticmethod
     def of(controllers: Sequence[Claimant]) -> Claims:
-        """Of these controllers; where two claim the same, the first has it."""
+        """The claims of these controllers; of two that claim the same, the first owns it."""
         owners: dict[tuple[str, Interface], str] = {}
         for controller in controllers:
             for joint in controller.joints:
@@ -40,25 +40,25 @@ class Claims:
         return Claims(owners)
 
     def interfaces(self, joint: str) -> tuple[Interface, ...]:
-        """What is claimed of a joint."""
+        """The claimed interfaces of a joint."""
         return tuple(interface for name, interface in self.owners if name == joint)
 
 
 def conflicts(
     controllers: Sequence[Claimant], joints: Collection[str], following: Collection[str]
 ) -> tuple[Diagnostic, ...]:
-    """Everything for which these controllers cannot be active at once.
+    """Every conflict that keeps these controllers from being active together.
 
     Args:
-        controllers: in the order in which they would claim.
+        controllers: in the order of claiming.
         joints: all moving joints of the robot.
-        following: those that follow others.
+        following: joints that follow others (mimic).
     """
     findings = []
     names = [controller.name for controller in controllers]
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
-            findings.append(Diagnostic("CTRL141", f"two controllers are named '{name}'"))
+            findings.append(Diagnostic("CTRL141", f"duplicate controller name '{name}'"))
     claims = Claims.of(controllers)
     twice: dict[tuple[str, str], list[str]] = {}
     excluded: dict[tuple[tuple[Interface, str], ...], dict[str, None]] = {}
@@ -79,18 +79,18 @@ def conflicts(
         findings.append(Diagnostic("CTRL142", f"controllers '{owner}' and '{name}' both claim {listed(what, most=3)}"))
     for claimed, (first, *others) in excluded.items():
         all_of = ", ".join(f"{first}/{interface} ({owner})" for interface, owner in claimed)
-        more = f"; the same of {listed(others, most=3)}" if others else ""
-        findings.append(Diagnostic("CTRL148", f"a joint cannot be commanded on all of these at once: {all_of}{more}"))
+        more = f"; likewise for {listed(others, most=3)}" if others else ""
+        findings.append(Diagnostic("CTRL148", f"conflicting command interfaces of one joint: {all_of}{more}"))
     return tuple(findings)
 
 
 def _unfit(controller: Claimant, joint: str, joints: Collection[str], following: Collection[str]) -> Diagnostic | None:
-    """Why a controller could have a joint under no circumstances."""
+    """Why a controller can never claim a joint."""
     name = controller.name
     if joint not in joints:
-        message = f"controller '{name}' wants joint '{joint}', but the robot has no such moving joint"
+        message = f"controller '{name}': joint '{joint}' is not a moving joint of the robot"
         return Diagnostic("CTRL144", message, hint=did_you_mean(joint, joints, kind="joints"))
     if joint in following and controller.interfaces:
         what = f"{joint}/{controller.interfaces[0]}"
-        return Diagnostic("CTRL143", f"controller '{name}' claims {what}, but joint '{joint}' follows another joint")
+        return Diagnostic("CTRL143", f"controller '{name}' claims {what}, but joint '{joint}' mimics another joint")
     return None

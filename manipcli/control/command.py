@@ -1,4 +1,4 @@
-"""What goes to the joints in one control tick: one block of numbers, and what of it each joint obeys."""
+"""Joint command of one control tick: one block of numbers, and the control mode of each joint."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ import numpy as np
 from manipcli.spec.controllers import Interface
 
 Mode = Literal["effort", "velocity", "position", "brake", "free"]
-"""What a joint obeys. `brake`: nobody commands it, so it is held at rest by as much effort as it has; `free`: it
-follows another joint (mimic)."""
+"""Control mode of a joint. `brake`: uncommanded, so it is held at rest with up to its full effort; `free`: it follows
+another joint (mimic)."""
 
 TOGETHER: Final[tuple[frozenset[Interface], ...]] = (
     frozenset({"position", "velocity", "acceleration"}),
     frozenset({"position", "effort"}),
 )
-"""Which interfaces of one joint may be commanded at once: any part of one of these, or one alone."""
+"""Interfaces of one joint that may be commanded together: any subset of one of these, or a single interface."""
 
 
 class JointCommand:
     """Commands of all joints, arrays (n); overwritten every tick.
 
-    A joint in the mode `position` is also told a `velocity` and an `effort` to add, which are 0 where nobody says.
+    A joint in the mode `position` also gets a feed-forward `velocity` and `effort`, 0 by default.
 
     Attributes:
-        modes: (n) what each joint obeys.
+        modes: (n) of the joints.
         version: grows when `modes` change.
         position, velocity, acceleration, effort: (n) the commands.
-        reference_position, reference_velocity: (n) what the controllers follow; an ideal engine makes it come true.
+        reference_position, reference_velocity: (n) references of the controllers; an ideal engine tracks them exactly.
     """
 
     __slots__ = (
@@ -46,7 +46,7 @@ class JointCommand:
         self.reference_position, self.reference_velocity = rows[4:]
 
     def obey(self, modes: Sequence[Mode]) -> None:
-        """From now on each joint obeys this; what it was told before is forgotten."""
+        """Set the modes of the joints and clear all commands."""
         if tuple(modes) != self.modes:
             self.modes = tuple(modes)
             self.version += 1
@@ -55,7 +55,7 @@ class JointCommand:
 
 
 def mode_of(interfaces: Collection[Interface]) -> Mode:
-    """What a joint obeys that is commanded on these interfaces."""
+    """The mode of a joint that is commanded on these interfaces."""
     if "position" in interfaces:
         return "position"
     if "velocity" in interfaces:

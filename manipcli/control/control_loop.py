@@ -1,7 +1,7 @@
-"""What a type of controller declares of its control law, for whoever examines gains before anything moves.
+"""Declarations of control laws, for checks of gains before a run and for tuning.
 
-Each member of the seam chooses: a PID loop per joint, inverse dynamics with a prescribed error, or no loop that can be
-examined, with the reason. There is no default, so that a new controller cannot go unchecked by omission.
+Each controller type declares one of: a PID loop per joint, inverse dynamics with a prescribed error, or no loop to
+examine, with the reason. There is no default, so that a new controller type cannot go unchecked by omission.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ class PidLoop:
     """u = p e + d de/dt + I for each joint on one interface, effort or velocity; de/dt uses measured velocities.
 
     Attributes:
-        gains: by joint, as in the field `gains` of the spec; a joint that is missing has gains of zero.
-        carries_weight: gravity is fed forward, so that the gains do not hold it.
+        gains: by joint, as in the field `gains` of the spec; a missing joint has gains of zero.
+        carries_weight: gravity is fed forward, so the gains need not hold it.
         tolerances: by joint, the error [rad or m] at which a goal fails.
         tunable: `manipcli tune` proposes its gains.
     """
@@ -37,7 +37,7 @@ class InverseDynamicsLoop:
     Attributes:
         bandwidth: [Hz], as in the field `bandwidth` of the spec.
         damping_ratio: of the error.
-        gains: by joint, instead of the two, as in the field `gains` of the spec.
+        gains: by joint, instead of bandwidth and ratio, as in the field `gains` of the spec.
     """
 
     bandwidth: float
@@ -47,7 +47,7 @@ class InverseDynamicsLoop:
 
 @dataclass(frozen=True, slots=True)
 class NoLoop:
-    """No loop whose gains can be examined; `reason` completes "controller NAME: ..." in a note of `manipcli tune`."""
+    """No loop to examine; `reason` completes "controller NAME: ..." in a note of `manipcli tune`."""
 
     reason: str
 
@@ -57,7 +57,7 @@ ControlLoop = PidLoop | InverseDynamicsLoop | NoLoop
 
 @dataclass(frozen=True, slots=True)
 class HandSettings:
-    """What limits a controller of the role `hand`.
+    """Limits of a controller of the role `hand`.
 
     Attributes:
         interface: what it commands of each joint.

@@ -1,8 +1,7 @@
-"""The contract of controllers: measured joints in, references and commands out, once per control period.
+"""Contract of controllers: measured joints in, references and commands out, once per control period.
 
-A controller owns one block of numbers, its `ControllerOutput.rows`, and writes into it at every update; nobody
-allocates in the loop. What its model of the robot has to add to an effort (gravity, inverse dynamics), the manager
-adds, for all controllers at once.
+A controller owns one block of numbers, its `ControllerOutput.rows`, and writes into it at every update; the loop does
+not allocate. The manager adds the model-based efforts (gravity, inverse dynamics), for all controllers at once.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from manipcli.model.kinematics import Kinematics
 
 FeedForward = Literal["none", "gravity", "inverse_dynamics"]
-"""What a controller wants added to its effort command."""
+"""What the manager adds to a controller's effort command."""
 
 REFERENCE_ROWS = 3
 
@@ -53,7 +52,7 @@ def distinct(name: str, joints: Sequence[str]) -> tuple[str, ...]:
 def refuse_not_finite(name: str, joints: Sequence[str], measured: JointState, time: float) -> None:
     """
     Raises:
-        InvalidArgument: a measured position or velocity is no finite number; names the joint and the time [s].
+        InvalidArgument: a measured position or velocity is not finite; names the joint and the time [s].
     """
     for what, values in (("position", measured.position), ("velocity", measured.velocity)):
         bad = np.flatnonzero(~np.isfinite(values))
@@ -64,13 +63,13 @@ def refuse_not_finite(name: str, joints: Sequence[str], measured: JointState, ti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControllerOutput:
-    """What a controller wants now. The arrays are only valid until its next update: copy to keep.
+    """Reference and commands of a controller. The arrays are only valid until its next update: copy to keep.
 
     Attributes:
         rows: (3 + k, n) everything below in one block: the reference, then a command for each of k interfaces.
         position, velocity, acceleration: (n) the reference; rad or m and its derivatives.
         commands: k arrays (n), one for each of the controller's interfaces, in their order; before limits.
-        wanted_acceleration: (n) what inverse dynamics shall bring about; the reference's, unless the law asks more.
+        wanted_acceleration: (n) input of inverse dynamics; that of the reference, unless the law adds to it.
     """
 
     rows: Array
@@ -82,14 +81,14 @@ class ControllerOutput:
 
     @classmethod
     def of(cls, joints: int, interfaces: int, *, wanted_acceleration: Array | None = None) -> ControllerOutput:
-        """Zeros for so many joints and interfaces."""
+        """Zeros for this number of joints and interfaces."""
         rows = np.zeros((REFERENCE_ROWS + interfaces, joints))
         wanted = rows[2] if wanted_acceleration is None else wanted_acceleration
         return cls(rows, rows[0], rows[1], rows[2], tuple(rows[REFERENCE_ROWS:]), wanted)
 
     @classmethod
     def published(cls, count: int) -> ControllerOutput:
-        """Of a broadcaster, which commands nothing: `rows` (1, count) are what it publishes; all else is empty."""
+        """Output of a broadcaster, which commands nothing: `rows` (1, count) are published; all else is empty."""
         none = np.zeros(0)
         return cls(np.zeros((1, count)), none, none, none, (), none)
 
@@ -104,9 +103,9 @@ class SensorRequest:
     """A sensor that a controller reads.
 
     Attributes:
-        type: the member of the seam `simulate/sensors/`.
-        joint: between whose links it is.
-        frame: the link in whose frame it measures.
+        type: its type, from `simulate/sensors/`.
+        joint: the sensor is between its links.
+        frame: the link whose frame it measures in.
     """
 
     type: str
@@ -115,7 +114,7 @@ class SensorRequest:
 
 
 class Controller(Protocol):
-    """A controller claims `joints` on `interfaces`; `feed_forward` says what it wants added to its effort."""
+    """A controller claims `joints` on `interfaces`; `feed_forward` is added to its effort."""
 
     name: str
     joints: tuple[str, ...]
@@ -124,17 +123,17 @@ class Controller(Protocol):
 
     @property
     def sensors(self) -> tuple[SensorRequest, ...]:
-        """What it reads beside its joints; with any it is a `roles.SensorReader`."""
+        """The sensors that it reads besides its joints; with any it is a `roles.SensorReader`."""
         ...
 
     @property
     def role(self) -> Role:
-        """What steps may ask of it; `roles.py` has the methods that it has then."""
+        """Its role for steps; `roles.py` defines the methods of each role."""
         ...
 
     @property
     def senses_contact(self) -> bool:
-        """Whether it asks for the forces of contacts at its next update."""
+        """Whether it needs contact forces at its next update."""
         ...
 
     @property
@@ -147,14 +146,14 @@ class Controller(Protocol):
     ) -> ControllerOutput:
         """One update at `time` [s], `period` [s] before the next.
 
-        `contact_force` (n) [N] is the normal force of contacts on what each joint moves, up to the next joint that
-        does not mimic it; where it moves several fingers, on the one that is pressed hardest. None where nobody senses
-        it.
+        `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves, up to the next joint
+        that does not mimic it; for a joint that moves several fingers, the largest force on one of them. None if
+        contacts are not sensed.
         """
         ...
 
     def deactivate(self, time: float, reason: str = ...) -> None:
-        """Ends its goal as aborted for this reason and forgets its state; the next update activates it again."""
+        """Abort its goal for this reason and reset its state; the next update re-activates it."""
         ...
 
 
@@ -163,7 +162,7 @@ S = TypeVar("S", bound=ControllerSpec)
 
 @dataclass(frozen=True, slots=True)
 class BuildContext:
-    """What controllers are built for: the robot, its kinematics (made when first asked for), and ROS's dialect."""
+    """Context for building controllers: the robot, its kinematics (computed on first use), and the ROS version."""
 
     robot: RobotModel
     kinematics: Callable[[], Kinematics]
@@ -177,10 +176,10 @@ class ControllerMember(Generic[S]):
     Attributes:
         name: the word under `type`.
         spec: what the user writes.
-        build: (name of the controller, spec, fit) -> the controller; for a spec without problems.
-        check: (spec, robot) -> what this robot does not have, or what could not work.
+        build: (name of the controller, spec, context) -> the controller, for a spec without problems.
+        check: (spec, robot) -> problems of the spec with this robot.
         loop: (spec) -> its control law, for preflight checks and `manipcli tune`.
-        hand: (spec) -> what limits it; for the role `hand` alone.
+        hand: (spec) -> its limits; only for the role `hand`.
     """
 
     name: str

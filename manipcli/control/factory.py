@@ -1,4 +1,4 @@
-"""From the controllers file to controllers that fit a robot: every finding of the file at once."""
+"""Construction of a robot's controllers from a controllers file, with all findings of the file at once."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from manipcli.spec.controllers import ControllerSpec, Interface
 from manipcli.spec.controllers_file import ControllersSpec
 
 Where = Callable[[Loc], Place | None]
-"""The place in the file of a value, by its keys from the top: ("controllers", "arm", "joints", 0)."""
+"""Maps the keys of a value, ("controllers", "arm", "joints", 0), to its place in the file."""
 
 
 def _nowhere(_: Loc) -> None:
@@ -36,7 +36,7 @@ def build_controllers(
     kinematics: Kinematics | None = None,
     compat: Compat | None = None,
 ) -> ControllerManager:
-    """The controllers of a file, for a robot, loaded and configured; active those that say so.
+    """The controllers of a file, for a robot: loaded, configured, and activated where the file has `active: true`.
 
     Args:
         spec: the file.
@@ -44,7 +44,7 @@ def build_controllers(
         period: [s] of a control tick.
         place: of values, for findings.
         kinematics: of the robot, for those that need its dynamics; None: made when needed.
-        compat: whose rules where ROS 1 and 2 differ; None: the safer one of each.
+        compat: the rules where ROS 1 and 2 differ; None: the safer rule of each.
 
     Raises:
         InvalidInput: `controller_findings` has errors.
@@ -53,7 +53,7 @@ def build_controllers(
     if errors:
         raise InvalidInput(errors)
     context = BuildContext(robot, kinematics=cache(lambda: kinematics or Kinematics(robot)), compat=compat)
-    built = {name: CONTROLLERS[one.type].build(name, one, context) for name, one in spec.controllers.items()}
+    built = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
     wanted = any(controller.feed_forward != "none" for controller in built.values())
     manager = ControllerManager(
         joints=robot.joint_names,
@@ -64,16 +64,19 @@ def build_controllers(
     for name, controller in built.items():
         manager.load(controller, update_rate=spec.controllers[name].update_rate)
         manager.configure(name)
-    manager.switch(activate=[name for name, one in spec.controllers.items() if one.active])
+    manager.switch(activate=[name for name, own in spec.controllers.items() if own.active])
     return manager
 
 
 def controller_findings(
     spec: ControllersSpec, robot: RobotModel, period: float, place: Where = _nowhere
 ) -> tuple[Diagnostic, ...]:
-    """Errors: unknown, fixed, mimic or repeated joints; what two active controllers both claim; an update rate that
-    does not divide the control rate; what the types object to. Warnings: joints that nobody commands, joints that
-    follow two, and positions that are commanded at a lower rate than the control rate."""
+    """All findings of a controllers file.
+
+    Errors: unknown, fixed, mimic or duplicate joints; interfaces claimed by two active controllers; an update rate that
+    does not divide the control rate; problems of each type. Warnings: uncommanded joints, joints that follow two
+    controllers, and positions that are commanded below the control rate.
+    """
     return tuple(_findings(spec, robot, period, place))
 
 
@@ -81,20 +84,20 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
     owners: dict[str, dict[Interface, str]] = {}
     commanded: set[str] = set()
     together: set[tuple[str, str, str]] = set()
-    for name, one in spec.controllers.items():
+    for name, own in spec.controllers.items():
         at = ("controllers", name)
-        if not one.joints and one.interfaces:
+        if not own.joints and own.interfaces:
             yield Diagnostic("CTRL101", f"controller '{name}' has no joints", place((*at, "joints")))
-        for k, joint in enumerate(one.joints):
+        for k, joint in enumerate(own.joints):
             where = place((*at, "joints", k))
-            yield from _joint_findings(name, one, joint, robot, where)
-            if one.active:
+            yield from _joint_findings(name, own, joint, robot, where)
+            if own.active:
                 before = set(owners.get(joint, {}).values())
-                yield from _claim_findings(name, one, joint, owners, where)
+                yield from _claim_findings(name, own, joint, owners, where)
                 together |= {(other, name, joint) for other in before if name in owners[joint].values()}
-        commanded.update(one.joints if one.interfaces else ())
-        yield from _rate_findings(name, one, robot, period, place((*at, "update_rate")))
-        for problem in CONTROLLERS[one.type].check(one, robot):
+        commanded.update(own.joints if own.interfaces else ())
+        yield from _rate_findings(name, own, robot, period, place((*at, "update_rate")))
+        for problem in CONTROLLERS[own.type].check(own, robot):
             message = f"controller '{name}': {problem.message}"
             yield Diagnostic(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
     yield from _rivals(spec, together, place)
@@ -104,7 +107,7 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
             "CTRL145",
             f"no controller commands {', '.join(repr(joint) for joint in idle)} of robot '{robot.name}'",
             place(("controllers",)),
-            hint=f"add {'it' if len(idle) == 1 else 'them'} to a controller; what nobody commands is braked",
+            hint=f"add {'it' if len(idle) == 1 else 'them'} to a controller; uncommanded joints are held by a brake",
             severity="warning",
         )
 
@@ -112,7 +115,6 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
 def _rate_findings(
     name: str, spec: ControllerSpec, robot: RobotModel, period: float, place: Place | None
 ) -> Iterator[Diagnostic]:
-    """A rate that does not divide the control rate; positions that are commanded in steps."""
     if spec.update_rate is None:
         return
     try:
@@ -127,18 +129,18 @@ def _rate_findings(
         if joint.name in spec.joints and joint.limits.acceleration is not None
     ]
     if ticks > 1 and "position" in spec.interfaces and limited:
-        message = f"controller '{name}' commands positions once in {ticks} control ticks: the acceleration limits of "
-        message += f"{listed(limited, most=3)} cut such steps, and they lag"
-        hint = "leave `update_rate` out; positions are commanded at every tick then"
+        message = f"controller '{name}' commands positions only every {ticks} control ticks: the acceleration limits "
+        message += f"of {listed(limited, most=3)} saturate such steps, and the joints lag"
+        hint = "remove `update_rate`; positions are then commanded at every tick"
         yield Diagnostic("CTRL170", message, place, hint, "warning")
 
 
 def _claim_findings(
     name: str, spec: ControllerSpec, joint: str, owners: dict[str, dict[Interface, str]], place: Place | None
 ) -> Iterator[Diagnostic]:
-    """One at most; `owners`: joint -> interface -> controller, of the active ones so far; grows."""
+    """At most one finding; `owners`: joint -> interface -> controller, of the active ones so far; extended here."""
     claimed = owners.setdefault(joint, {})
-    hint = "say `active: false` of one of them; a step `switch_controllers` changes who is active"
+    hint = "set `active: false` for one of them; a step `switch_controllers` switches between them"
     for interface in spec.interfaces:
         owner = claimed.get(interface)
         if owner is not None:
@@ -148,25 +150,25 @@ def _claim_findings(
             return
     if claimed and spec.interfaces and not may_go_together((*claimed, *spec.interfaces)):
         interface, owner = next(iter(claimed.items()))
-        message = f"controllers '{owner}' ({joint}/{interface}) and '{name}' ({joint}/{spec.interfaces[0]}) exclude "
-        yield Diagnostic("CTRL148", message + "each other: a joint obeys one of them", place, hint=hint)
+        message = f"controllers '{owner}' ({joint}/{interface}) and '{name}' ({joint}/{spec.interfaces[0]}) conflict: "
+        yield Diagnostic("CTRL148", message + "a joint follows one of them", place, hint=hint)
         return
     claimed.update(dict.fromkeys(spec.interfaces, name))
 
 
 def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], place: Where) -> Iterator[Diagnostic]:
-    """Two that follow trajectories with the same joints, at its positions and its efforts; `together`: both, joint."""
+    """Pairs of trajectory controllers on a joint, one by position and one by effort; `together`: both, joint."""
     rivals: dict[tuple[str, str], list[str]] = {}
-    for one, other, joint in sorted(together):
-        if spec.controllers[one].role == spec.controllers[other].role == "follower":
-            rivals.setdefault((one, other), []).append(joint)
-    for (one, other), joints in rivals.items():
-        message = f"controllers '{one}' and '{other}' are both active on {listed(joints)}: a joint obeys the positions "
+    for first, second, joint in sorted(together):
+        if spec.controllers[first].role == spec.controllers[second].role == "follower":
+            rivals.setdefault((first, second), []).append(joint)
+    for (first, second), joints in rivals.items():
+        message = f"controllers '{first}' and '{second}' are both active on {listed(joints)}: a joint tracks positions "
         yield Diagnostic(
             "CTRL149",
-            message + "of one and adds the efforts of the other",
-            place(("controllers", other)),
-            hint="say `active: false` of one of them; a step `switch_controllers` changes who is active",
+            message + "of the one and adds the efforts of the other",
+            place(("controllers", second)),
+            hint="set `active: false` for one of them; a step `switch_controllers` switches between them",
             severity="warning",
         )
 
@@ -186,7 +188,7 @@ def _joint_findings(
         return
     found = known[joint]
     if not found.moves:
-        yield Diagnostic("CTRL146", f"controller '{name}': joint '{joint}' is fixed; it cannot be commanded", place)
+        yield Diagnostic("CTRL146", f"controller '{name}': joint '{joint}' is fixed and cannot be commanded", place)
     elif found.mimic is not None and spec.interfaces:
-        message = f"controller '{name}': joint '{joint}' mimics '{found.mimic.joint}'; it cannot be commanded"
+        message = f"controller '{name}': joint '{joint}' mimics '{found.mimic.joint}' and cannot be commanded"
         yield Diagnostic("CTRL143", message, place, hint=f"claim '{found.mimic.joint}' instead")

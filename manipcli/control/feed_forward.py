@@ -1,4 +1,4 @@
-"""What the model of the robot adds to effort commands: gravity, or all the dynamics along the reference.
+"""Model-based feed-forward for effort commands: gravity, or the full dynamics along the reference.
 
 Computed torque and gravity compensation: Siciliano et al., Robotics: Modelling, Planning and Control (2009), 8.5.
 """
@@ -22,14 +22,14 @@ Index = slice | npt.NDArray[np.intp]
 
 
 Served = tuple[Controller, Index, int, int]
-"""A controller, where its joints stand in a joint vector, ticks between two of its updates, the tick of the first."""
+"""A controller, the index of its joints in a joint vector, ticks between two of its updates, tick of the first."""
 
 
 class FeedForwardLaw(Protocol):
     """Adds to the effort commands of controllers in place."""
 
     def serve(self, controllers: Sequence[Served]) -> None:
-        """From now on these."""
+        """Set the controllers to serve."""
         ...
 
     def add(self, tick: int, position: Array, velocity: Array) -> None:
@@ -38,13 +38,13 @@ class FeedForwardLaw(Protocol):
 
 
 class NoDynamics:
-    """Adds nothing: where no model of the robot is at hand."""
+    """Adds nothing: for a robot without a model."""
 
     def serve(self, controllers: Sequence[Served]) -> None:
-        """Nobody is served."""
+        """No effect."""
 
     def add(self, tick: int, position: Array, velocity: Array) -> None:
-        """Nothing."""
+        """No effect."""
 
 
 class ModelFeedForward:
@@ -53,8 +53,8 @@ class ModelFeedForward:
         M(q) a + C(q, v) v + g(q) + D v_r
 
     with the wanted acceleration a, and the viscous damping D of the joints at the reference velocity v_r: at the
-    measured one it would undo a damping that the loop is glad of. All other joints are taken not to accelerate,
-    except those that follow one (mimic): they move with it, and what they need is its to give.
+    measured velocity it would cancel the damping of the joints, which stabilises the loop. All other joints are assumed
+    not to accelerate, except mimic joints: they move with their driver, which supplies their effort.
     """
 
     def __init__(self, robot: RobotModel, kinematics: Kinematics) -> None:
@@ -70,8 +70,8 @@ class ModelFeedForward:
         self._driven: list[tuple[Index, Array, Array]] = []
 
     def serve(self, controllers: Sequence[Served]) -> None:
-        """From now on these."""
-        wanting = [one for one in controllers if one[0].feed_forward != "none" and "effort" in one[0].interfaces]
+        """Set the controllers to serve."""
+        wanting = [own for own in controllers if own[0].feed_forward != "none" and "effort" in own[0].interfaces]
         self._served = [
             (c.output.commands[c.interfaces.index("effort")], index, every, first) for c, index, every, first in wanting
         ]

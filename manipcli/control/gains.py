@@ -1,4 +1,4 @@
-"""From the gains of a controllers file to the PID of a controller, and what can be wrong with them."""
+"""PID gains of a controllers file: conversion to a `Pid`, and their checks."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ def joint_gains(
     """The gains (n) in the order of the joints, all zero where none are given.
 
     Raises:
-        InvalidArgument: gains of a joint that controller `name` does not have; see `gains_of`.
+        InvalidArgument: gains of a joint that is not in controller `name`; see `gains_of`.
     """
     unknown = sorted(set(gains) - set(joints))
     if unknown:
-        raise InvalidArgument("CTRL102", f"controller '{name}': '{unknown[0]}' has gains, but is not one of its joints")
+        message = f"controller '{name}': '{unknown[0]}' has gains, but is not a joint of the controller"
+        raise InvalidArgument("CTRL102", message)
     return tuple(gains_of(name, joint, gains.get(joint, {}), GainsSpec) for joint in joints)
 
 
@@ -38,7 +39,7 @@ def gains_of(name: str, joint: str, given: object, kind: type[G]) -> G:
     """The gains of one joint of controller `name`, which may be `given` as a mapping of its fields.
 
     Raises:
-        InvalidArgument: unknown fields, values out of their range, something else.
+        InvalidArgument: unknown fields, values out of range, or no mapping.
     """
     try:
         return kind.model_validate(given)
@@ -48,7 +49,7 @@ def gains_of(name: str, joint: str, given: object, kind: type[G]) -> G:
     where = f"controller '{name}': the gains of joint '{joint}'"
     if first["type"] == "extra_forbidden":
         hint = did_you_mean(field, kind.model_fields, kind="gains")
-        raise InvalidArgument("CTRL109", f"{where} have an unknown '{field}'", hint=hint)
+        raise InvalidArgument("CTRL109", f"{where} have an unknown field '{field}'", hint=hint)
     what = f"{field} {first['input']!r}" if field else repr(first["input"])
     raise InvalidArgument("CTRL109", f"{where}: {what}: {first['msg']}")
 
@@ -57,13 +58,13 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
     """The PID of gains (n).
 
     Raises:
-        InvalidArgument: gains of a joint that are all zero and feed no velocity forward: it would never move.
+        InvalidArgument: the gains of a joint are all zero, without velocity feed-forward: it would never move.
     """
     for joint, g in zip(joints, gains, strict=True):
         if g.idle:
             raise InvalidArgument(
                 "CTRL103",
-                f"controller '{name}': the gains of joint '{joint}' are all zero, so it would not move",
+                f"controller '{name}': the gains of joint '{joint}' are all zero; it would not move",
                 hint=f"give gains.{joint}.p",
             )
     return Pid(
@@ -82,12 +83,12 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
 
 
 def _antiwindup(gains: GainsSpec, compat: Compat | None) -> AntiWindup:
-    """ROS 1 says it with a boolean, for its own law; by the other rules the integral is clamped anyway."""
+    """ROS 1 has a boolean, for its own law; by the other rules the integral is always clamped."""
     return "conditional_integration" if compat == "ros1" and gains.antiwindup else gains.antiwindup_strategy
 
 
 def own_joints(robot: RobotModel, joints: Sequence[str]) -> tuple[str, ...]:
-    """Those that follow no other joint: one that does cannot be commanded, so nothing is asked for it."""
+    """The joints that do not mimic another: mimic joints cannot be commanded, so they need no values."""
     following = {joint.name for joint in robot.joints if joint.mimic is not None}
     return tuple(joint for joint in joints if joint not in following)
 
@@ -95,19 +96,22 @@ def own_joints(robot: RobotModel, joints: Sequence[str]) -> tuple[str, ...]:
 def strangers(
     robot: RobotModel, joints: Sequence[str], given: Collection[str], loc: Loc, what: str, code: str
 ) -> Iterator[Problem]:
-    """Whatever (`what`: gains, tolerances) is given at `loc` to joints that are not of `joints`."""
-    without = [joint for joint in own_joints(robot, joints) if joint not in given]  # only one that has none was meant
+    """Values (`what`: gains, tolerances) at `loc` for joints that are not in `joints`."""
+    without = [
+        joint for joint in own_joints(robot, joints) if joint not in given
+    ]  # only a joint without values can be meant
     for joint in given:
         if joint not in joints:
             near = did_you_mean(joint, without, kind=f"joints without {what}")
-            hint = near or f"take them out, or add '{joint}' to `joints`"
-            yield Problem((*loc, joint), f"'{joint}' has {what}, but is not one of its joints", hint, code)
+            hint = near or f"remove them, or add '{joint}' to `joints`"
+            message = f"'{joint}' has {what}, but is not a joint of the controller"
+            yield Problem((*loc, joint), message, hint, code)
 
 
 def idle_gains(
     robot: RobotModel, joints: Sequence[str], gains: Mapping[str, GainsSpec], interface: Interface
 ) -> Iterator[Problem]:
-    """Joints that would never move: their gains are all zero, and they feed no velocity forward."""
+    """Joints that would never move: their gains are all zero, without velocity feed-forward."""
     for joint in own_joints(robot, joints):
         own = gains.get(joint)
         if own is None or own.idle:

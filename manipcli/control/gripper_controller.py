@@ -1,4 +1,4 @@
-"""The hand's controller; see `controllers/gripper.py` for its laws and its file."""
+"""Controller of a hand; see `controllers/gripper.py` for its control law and its file."""
 
 from __future__ import annotations
 
@@ -22,44 +22,45 @@ REACHED = 1e-9
 """rad or m: a reference this close to its target has arrived."""
 
 _Watched = tuple[int, float, float, float]
-"""A joint, from where to where it counts as arrived, and how slow it counts as stalled."""
+"""A joint, the lower and upper bound of its target range, and its stall velocity."""
 
 UNTIL_CHANGED = 1 << 62
-"""Ticks: more than any run has."""
+"""[ticks] More than any run has."""
 
 
 class GripperController:
-    """One goal at a time; holds in between. It ends when every finger has stopped, see `GoalResult.fingers`; it is
-    aborted where one has stalled that must not.
+    """Executes one goal at a time, and holds in between.
+
+    A goal ends when every finger has stopped, see `GoalResult.fingers`; it is aborted if a finger stalls that must not.
 
     A finger has *contact* when the sum of its joints' contact forces meets the goal's force, after a low pass of the
-    time constant `contact_time`, so that the knock of the first touch does not count as a grip; it is *stalled* when
-    none of its joints that are further than `goal_tolerance` from their targets moved faster than `stall_velocity`
-    for `stall_time` although none will be pushed harder: each one's reference is at its target, or its effort at its
-    maximum; it has *reached* when all its joints are within `goal_tolerance` and their references are there.
+    time constant `contact_time`, so that the impact of the first touch does not count as a grip. It is *stalled* when,
+    for `stall_time`, none of its joints outside `goal_tolerance` moved faster than `stall_velocity`, although their
+    effort cannot grow: each reference is at its target, or each effort at its maximum. It has *reached* when all its
+    joints are within `goal_tolerance` and their references at the targets.
 
-    A reference that stands beyond its joint, seen from the target, as one does that pressed on what the hand lets go,
-    begins where the joint is.
+    A reference that is beyond its joint, seen from the target (it pressed on the object to release), begins at the
+    joint.
 
     Args:
         name: of the controller.
         joints: (n) distinct names.
-        interface: effort, or position, which needs no gains and knows no maximum effort.
+        interface: effort, or position, which needs no gains and has no maximum effort.
         gains: by joint name.
-        types: (n) joint types, for texts; None: they turn.
-        fingers: joint indices of each finger, where a goal does not say; empty: each joint is a finger.
+        types: (n) joint types, for texts; None: revolute.
+        fingers: default joint indices of each finger; empty: each joint is a finger.
         speed: [rad/s or m/s] of the references.
-        max_effort: (n) or a number, N m or N; None: unlimited here.
+        max_effort: (n) or a number, N m or N; None: unlimited.
         stall_velocity, goal_tolerance: see above; (n) or a number, rad/s or m/s and rad or m.
         stall_time: see above [s].
-        allow_stalling: whether a goal succeeds whose fingers stalled; else it is aborted.
-        contact_time: [s] of the low pass on contact forces; 0 takes them as they are.
-        feed_forward: what the manager shall add to the effort.
+        allow_stalling: whether a goal with stalled fingers succeeds; otherwise it is aborted.
+        contact_time: [s] time constant of the low pass on contact forces; 0: no filter.
+        feed_forward: added to the effort by the manager.
         compat: order of the PID integration.
 
     Raises:
-        InvalidArgument: joints repeated, gains of an unknown joint or all zero, fingers that do not part the joints, a
-            maximum effort of positions.
+        InvalidArgument: duplicate joints, gains of an unknown joint or all zero, fingers that are not a partition of
+            the joints, a maximum effort on the position interface.
     """
 
     role: Role = "hand"
@@ -125,14 +126,17 @@ class GripperController:
         self._period = math.nan
 
     def _efforts(self, effort: npt.ArrayLike) -> Array:
-        """(n) of a number or of one for each joint."""
+        """(n) efforts from one number, or from one per joint."""
         n = len(self.joints)
         given = np.array(effort, dtype=np.float64)
         if given.shape not in ((), (n,)) or not (given > 0.0).all():
-            raise InvalidArgument("CTRL133", f"max_effort {given.tolist()}: expected more than 0, one number or {n}")
+            message = f"max_effort is {given.tolist()}; expected values above 0, one number or {n}"
+            raise InvalidArgument("CTRL133", message)
         if self._pid is None and np.isfinite(given).any():
-            message = f"controller '{self.name}' commands positions, which know no maximum effort"
-            raise InvalidArgument("CTRL133", message, hint="give its joints effort limits, or use the effort interface")
+            message = f"controller '{self.name}' commands positions, which have no maximum effort"
+            raise InvalidArgument(
+                "CTRL133", message, hint="limit the effort of its joints, or use the effort interface"
+            )
         return np.broadcast_to(given, (n,)).copy()
 
     def _parted(self, fingers: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
@@ -141,7 +145,7 @@ class GripperController:
             return tuple((j,) for j in range(n))
         if sorted(j for finger in fingers for j in finger) != list(range(n)) or not all(fingers):
             raise InvalidArgument(
-                "CTRL130", f"controller '{self.name}': fingers {fingers} do not part the joints 0 to {n - 1}"
+                "CTRL130", f"controller '{self.name}': fingers {fingers} are not a partition of the joints 0 to {n - 1}"
             )
         return fingers
 
@@ -149,18 +153,18 @@ class GripperController:
         self._effort, self._minus_effort = effort, -effort
 
     def send_goal(self, goal: GripperGoal) -> GoalHandle:
-        """Accepts a goal, which begins at the next update; a goal before it ends as aborted.
+        """Accept a goal, which begins at the next update; the previous goal is aborted.
 
         Raises:
-            InvalidArgument: a target of another length or not finite, fingers that do not part the joints, a force or
-                an effort that is not positive.
+            InvalidArgument: a target of another length or not finite, fingers that are not a partition of the joints, a
+                force or an effort that is not positive.
         """
         n = len(self.joints)
         target = np.array(goal.target, dtype=np.float64)
         if target.shape == ():
             target = np.full(n, float(target))
         if target.shape != (n,) or not np.isfinite(target).all():
-            raise InvalidArgument("CTRL131", f"target {target.tolist()}: expected {n} finite numbers, one a joint")
+            raise InvalidArgument("CTRL131", f"target is {target.tolist()}; expected {n} finite numbers, one per joint")
         if goal.force is not None and not goal.force > 0.0:
             raise InvalidArgument("CTRL132", f"force is {goal.force} N; expected more than 0, or None")
         fingers = self._parted(goal.fingers) if goal.fingers else self._default_fingers
@@ -181,11 +185,11 @@ class GripperController:
 
     @property
     def senses_contact(self) -> bool:
-        """While a goal stops fingers by force."""
+        """True while a goal stops fingers by force."""
         return self._goal is not None and self._force is not None
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        """Abort its goal and reset its state; the next update re-activates it."""
         if self._goal is not None:
             self._goal.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
         self._goal = None
@@ -203,7 +207,7 @@ class GripperController:
 
         Args:
             measured: (n) of the controller's joints.
-            contact_force: (n) [N], see `Controller.update`; None: contact is not sensed.
+            contact_force: (n) [N], see `Controller.update`; None: contacts are not sensed.
         """
         self._time = time
         self._measured = measured.position
@@ -242,12 +246,12 @@ class GripperController:
         self._set_effort(self._effort if self._goal is not None else self._default_effort)
 
     def _unwind(self, position: Array) -> None:
-        """Takes back references that push away from their targets."""
+        """Reset references that push away from their targets to the joint positions."""
         wrong = (self._target - position) * (self._reference - position) < 0.0
         self._reference[wrong] = position[wrong]
 
     def _freeze(self) -> None:
-        """Fingers that press as hard as asked press no harder: their integrals stay."""
+        """Freeze the integrals of fingers that have reached the requested force."""
         if self._pid is not None:
             presses = np.zeros(len(self.joints), dtype=np.bool_)
             for finger, stop in zip(self._fingers, self._stops, strict=True):
@@ -262,18 +266,18 @@ class GripperController:
         np.add(self._reference, self._step, self._reference)
 
     def _plan_ramp(self, period: float) -> None:
-        """The step of every joint's reference, and for how many ticks it stays the same."""
+        """The step of every joint's reference, and the number of ticks for which it is constant."""
         step, limit = self._step, self._speed * period
-        way = (self._target - self._reference) * self._moving
-        np.minimum(np.maximum(way, -limit), limit, out=step)
+        remaining = (self._target - self._reference) * self._moving
+        np.minimum(np.maximum(remaining, -limit), limit, out=step)
         np.divide(step, period, out=self._velocity)
         self._period = period
         moves = step != 0.0
-        ticks = np.floor(way[moves] / step[moves])
+        ticks = np.floor(remaining[moves] / step[moves])
         self._ticks_left = int(ticks.min()) if ticks.size else UNTIL_CHANGED
 
     def _judge(self, time: float, period: float, measured: JointState, contact_force: Array | None) -> None:
-        """Stops the fingers that met something or arrived; ends the goal when all have."""
+        """Stop the fingers that met something or arrived; end the goal when all have."""
         position: list[float] = measured.position.tolist()
         velocity: list[float] = measured.velocity.tolist()
         wanted = self._force
@@ -287,7 +291,7 @@ class GripperController:
                 share = period / (period + self._contact_time)
                 felt = self._felt[f] = self._felt[f] + share * (pressed - self._felt[f])
                 if felt >= wanted:
-                    self._stop(f, "contact", f"contact at {felt:.3g} N (asked {wanted:.3g} N)")
+                    self._stop(f, "contact", f"contact at {felt:.3g} N (requested {wanted:.3g} N)")
                     continue
             far = still = False
             for j, lower, upper, slow in watched:
@@ -299,7 +303,7 @@ class GripperController:
             if not far:
                 if all(abs(self._target[j] - self._reference[j]) <= REACHED for j in self._fingers[f]):
                     self._stop(f, "reached", "reached its target")
-            elif not still or self._winds_up(f):
+            elif not still or self._gains_effort(f):
                 moved[f] = time
             elif time - moved[f] >= self._stall_time:
                 away = [abs(float(self._target[j]) - position[j]) for j in self._fingers[f]]
@@ -307,13 +311,12 @@ class GripperController:
                 j = self._fingers[f][k]
                 text = f"stalled {away[k]:.3g} {self._units[j]} before the target of '{self.joints[j]}'"
                 if force is not None:
-                    text += f", where it felt {self._felt[f]:.3g} N of the {wanted:.3g} N asked"
+                    text += f", with {self._felt[f]:.3g} N of the requested {wanted:.3g} N"
                 self._stop(f, "stalled", text)
         if self._goal is not None and None not in self._stops:
             self._end_goal(self._goal, time)
 
     def _end_goal(self, goal: GoalHandle, time: float) -> None:
-        """With what stopped each finger."""
         stops = tuple(stop for stop in self._stops if stop is not None)
         names = (self.joints[finger[0]] for finger in self._fingers)
         text = "; ".join(f"finger of '{name}': {why}" for name, why in zip(names, self._texts, strict=True))
@@ -325,21 +328,21 @@ class GripperController:
             goal.end("succeeded", ErrorCode.SUCCESSFUL, text, time, stops)
         self._end_motion()
 
-    def _winds_up(self, f: int) -> bool:
-        """Whether a finger will be pushed harder: a reference is on its way, and its effort not at its maximum.
+    def _gains_effort(self, f: int) -> bool:
+        """Whether a finger's effort still grows: a reference is moving, and its effort is below the maximum.
 
-        Where positions are commanded nobody here knows the effort: a reference on its way is enough.
+        On the position interface the effort is unknown: a moving reference is enough.
         """
         for j in self._fingers[f]:
-            way = self._target[j] - self._reference[j]
-            if abs(way) <= REACHED:
+            remaining = self._target[j] - self._reference[j]
+            if abs(remaining) <= REACHED:
                 continue
-            if self._pid is None or math.copysign(1.0, way) * self._command[j] < self._effort[j]:
+            if self._pid is None or math.copysign(1.0, remaining) * self._command[j] < self._effort[j]:
                 return True
         return False
 
     def _watch(self) -> None:
-        """What is looked at every tick: the fingers that have not stopped."""
+        """List the fingers to check at every tick: those that have not stopped."""
         target, tolerance, slow = self._target.tolist(), self._goal_tolerance, self._stall_velocity
         self._going = [
             (f, tuple((j, target[j] - tolerance[j], target[j] + tolerance[j], slow[j]) for j in finger))

@@ -1,7 +1,7 @@
-"""What the loops of a robot's joints meet: inertia as seen from the joints that are driven, gravity, and friction.
+"""Joint-space load of driven joints: inertia, gravity and friction.
 
-A joint that follows another (mimic) moves with it, q = S q_driven + constant, and what is held (braked, or on another
-interface) does not move at all: M_driven = S^T M S, g_driven = S^T g.
+A mimic joint moves with its driver, q = S q_driven + constant, and joints that are held (by a brake, or on another
+interface) do not move: M_driven = S^T M S, g_driven = S^T g.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from manipcli.model.robot import RobotModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Configurations:
-    """Where a robot is to be and how it moves there, arrays (T, n) of all its joints; at rest, two of them are 0."""
+    """Joint positions, velocities and accelerations, arrays (T, n) of all joints; at rest, the last two are 0."""
 
     position: Array
     velocity: Array
@@ -27,21 +27,21 @@ class Configurations:
 
     @classmethod
     def at_rest(cls, position: Array) -> Configurations:
-        """(T, n) positions, without motion."""
+        """Configurations (T, n) at rest."""
         return cls(position, np.zeros_like(position), np.zeros_like(position))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointSpaceLoad:
-    """What k driven joints meet in T postures.
+    """Load of k driven joints in T configurations.
 
     Attributes:
         joints: (k) names.
         mass: (T, k, k) kg m2 or kg.
-        gravity: (T, k) N m or N that hold them at rest.
-        needed: (T, k) N m or N that the motion needs, gravity included.
+        gravity: (T, k) N m or N, the effort that holds them at rest.
+        needed: (T, k) N m or N, the effort of the motion, gravity included.
         damping: (k) of the joints, viscous [N m s/rad or N s/m].
-        effort: (k) the most that joints and actuators give; infinite where nothing says.
+        effort: (k) the limit of joints and actuators; infinite where unlimited.
         latency: (k) control ticks from a command to its effort.
     """
 
@@ -55,24 +55,24 @@ class JointSpaceLoad:
 
     @property
     def own_inertia(self) -> Array:
-        """(T, k) 1 / (M^-1)_jj: what a joint's own effort moves while the others are free; the least it can be."""
+        """(T, k) 1 / (M^-1)_jj: inertia of each joint while the others are free; its lower bound."""
         return np.asarray(1.0 / np.diagonal(np.linalg.inv(self.mass), axis1=1, axis2=2))
 
     @property
     def held_inertia(self) -> Array:
-        """(T, k) M_jj: what it moves while the others stand; the most it can be."""
+        """(T, k) M_jj: inertia of each joint while the others are held; its upper bound."""
         return np.asarray(np.diagonal(self.mass, axis1=1, axis2=2))
 
 
 def load_of(
-    robot: RobotModel, kinematics: Kinematics, joints: Sequence[str], postures: Configurations
+    robot: RobotModel, kinematics: Kinematics, joints: Sequence[str], configurations: Configurations
 ) -> JointSpaceLoad:
-    """What these joints, independent ones, meet when no other is driven."""
+    """The load of these independent joints when no other joint is driven."""
     S = _drives(robot, joints)
     moving = robot.moving_joints
     damping = np.array([joint.damping for joint in moving])
     mass, gravity, needed = [], [], []
-    for q, v, a in zip(postures.position, postures.velocity, postures.acceleration, strict=True):
+    for q, v, a in zip(configurations.position, configurations.velocity, configurations.acceleration, strict=True):
         mass.append(S.T @ kinematics.mass_matrix(q) @ S)
         gravity.append(S.T @ kinematics.gravity(q))
         needed.append(S.T @ (kinematics.inverse_dynamics(q, v, a) + damping * v))

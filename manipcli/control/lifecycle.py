@@ -1,4 +1,4 @@
-"""Loaded controllers and their states, and the rules of switching between them (ros2_control's, without its clocks)."""
+"""States of loaded controllers, and the rules for switching between them (those of ros2_control, without timeouts)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ControllerState = Literal["unconfigured", "inactive", "active"]
 
 @dataclass(frozen=True, slots=True)
 class SwitchResult:
-    """What came of a switch: whether it was done, what was left out or refused and why, and who changed."""
+    """Result of a switch: whether it was done, messages on refused or omitted names, and the changed controllers."""
 
     ok: bool
     messages: tuple[str, ...] = ()
@@ -32,7 +32,7 @@ class SwitchResult:
 
 @dataclass(frozen=True, slots=True)
 class ControllerInfo:
-    """A loaded controller: `interfaces`, the `joint/interface` that it wants; `claimed`, the same while active."""
+    """A loaded controller: `interfaces`, the `joint/interface` that it needs; `claimed`, the same while active."""
 
     name: str
     state: ControllerState
@@ -41,17 +41,17 @@ class ControllerInfo:
 
     @staticmethod
     def of(controller: Claimant, state: ControllerState) -> ControllerInfo:
-        """Of a controller in this state."""
+        """The info of a controller in this state."""
         wants = tuple(f"{joint}/{interface}" for joint in controller.joints for interface in controller.interfaces)
         return ControllerInfo(controller.name, state, wants, wants if state == "active" else ())
 
 
 class Slot:
-    """A loaded controller, where its joints stand in a joint vector, and what is measured there.
+    """A loaded controller, the index of its joints in a joint vector, and their measured state.
 
-    `measured` and `contact_force` are read-only parts of the vectors that the manager was given, or, where the joints
-    do not stand side by side, copies that are taken anew every tick (`gathered`: copy, vector). It is updated at the
-    tick `first`, at which it was activated, and at every `every`-th one from there.
+    `measured` and `contact_force` are read-only views of the manager's vectors, or, for joints that are not contiguous,
+    copies that are updated every tick (`gathered`: copy, vector). The controller is updated at the tick `first`, at
+    which it was activated, and at every `every`-th tick from there.
     """
 
     __slots__ = (
@@ -74,7 +74,7 @@ class Slot:
         self.gathered: list[tuple[Array, Array]] = []
 
     def look(self, vectors: Sequence[Array], contact_force: Array | None) -> None:
-        """From now on at these vectors: position, velocity, effort."""
+        """Set the measured vectors: position, velocity, effort."""
         self.gathered = []
         self.measured = JointState(*map(self._part, vectors))
         self.contact_force = None if contact_force is None else self._part(contact_force)
@@ -88,7 +88,7 @@ class Slot:
         return part
 
     def gather(self) -> None:
-        """Copies what is measured now."""
+        """Copy the measured values of joints that are not contiguous."""
         for part, vector in self.gathered:
             part[:] = vector[self.index]
 
@@ -99,26 +99,26 @@ def decided(
     joints: Collection[str],
     following: Collection[str],
 ) -> SwitchResult:
-    """What comes of a request; where claims clash, strict refuses it and best_effort leaves out who came later.
+    """The result of a request; if claims conflict, strict refuses it and best_effort leaves out the later controller.
 
     Args:
-        controllers: all that are loaded, by name, and their states.
+        controllers: all loaded controllers and their states, by name.
         switch: the request.
         joints: all moving joints of the robot.
-        following: those that follow others.
+        following: joints that follow others (mimic).
     """
-    active = [one for one, state in controllers.values() if state == "active"]
+    active = [own for own, state in controllers.values() if state == "active"]
     activate, deactivate = switch.activate, switch.deactivate
     if switch.to:
         taken = {joint for name in switch.to if name in controllers for joint in _commanded(controllers[name][0])}
-        others = [one for one in active if one.name not in switch.to]
-        deactivate = tuple(one.name for one in others if taken & _commanded(one))
-        activate = tuple(name for name in switch.to if name not in [one.name for one in active])
+        others = [own for own in active if own.name not in switch.to]
+        deactivate = tuple(own.name for own in others if taken & _commanded(own))
+        activate = tuple(name for name in switch.to if name not in [own.name for own in active])
     states = {name: state for name, (_, state) in controllers.items()}
     request = requested(states, activate, deactivate, switch.strictness)
     if not request.ok:
         return request
-    kept = [one for one in active if one.name not in request.deactivated]
+    kept = [own for own in active if own.name not in request.deactivated]
     wanted = {name: controllers[name][0] for name in request.activated}
     if switch.strictness == "best_effort":
         return _without_clashes(request, kept, wanted, joints, following)
@@ -135,15 +135,15 @@ def _without_clashes(
     joints: Collection[str],
     following: Collection[str],
 ) -> SwitchResult:
-    """The request without whoever claims what those that stay active, or one that was named before, claim."""
-    there = list(kept)
-    told = list(request.messages)
-    for name, one in wanted.items():
-        clashes = conflicts([*there, one], joints, following)
-        told += [f"cannot activate '{name}': {finding.message}" for finding in clashes]
-        there += [] if clashes else [one]
-    names = {one.name for one in there}
-    return SwitchResult(True, tuple(told), tuple(name for name in wanted if name in names), request.deactivated)
+    """The request without controllers that conflict with those that stay active, or with an earlier name."""
+    chosen = list(kept)
+    messages = list(request.messages)
+    for name, controller in wanted.items():
+        clashes = conflicts([*chosen, controller], joints, following)
+        messages += [f"cannot activate '{name}': {finding.message}" for finding in clashes]
+        chosen += [] if clashes else [controller]
+    names = {controller.name for controller in chosen}
+    return SwitchResult(True, tuple(messages), tuple(name for name in wanted if name in names), request.deactivated)
 
 
 def requested(
@@ -152,23 +152,23 @@ def requested(
     deactivate: Collection[str],
     strictness: Strictness,
 ) -> SwitchResult:
-    """What of a request can be done, as far as names and states tell; claims are not looked at.
+    """The part of a request that names and states allow; claims are not checked.
 
-    strict: every name must be loaded, those to deactivate active, those to activate inactive or deactivated in the same
-    request. best_effort: names that are not are left out; refused only where no name of a list is loaded.
+    strict: every name must be loaded; those to deactivate must be active, those to activate inactive or deactivated in
+    the same request. best_effort: other names are left out; refused only if no name of a list is loaded.
     """
     off = tuple(name for name in dict.fromkeys(deactivate) if states.get(name) == "active")
     on = tuple(name for name in dict.fromkeys(activate) if states.get(name) == "inactive" or name in off)
-    told = [
+    messages = [
         f"cannot {verb} '{name}': {_why_not(states, name)}"
         for verb, names, fit in (("deactivate", deactivate, off), ("activate", activate, on))
         for name in dict.fromkeys(names)
         if name not in fit
     ]
     lost = any(names and not any(name in states for name in names) for names in (activate, deactivate))
-    if told and (strictness == "strict" or lost):
-        return SwitchResult(False, tuple(told))
-    return SwitchResult(True, tuple(told), on, off)
+    if messages and (strictness == "strict" or lost):
+        return SwitchResult(False, tuple(messages))
+    return SwitchResult(True, tuple(messages), on, off)
 
 
 def _commanded(controller: Claimant) -> set[str]:
@@ -183,17 +183,17 @@ def _why_not(states: Mapping[str, ControllerState], name: str) -> str:
 
 
 def names_of(given: Collection[str] | str) -> tuple[str, ...]:
-    """Names, or one name."""
+    """A tuple of names, from names or a single name."""
     return (given,) if isinstance(given, str) else tuple(given)
 
 
 def strictness_of(word: str) -> Strictness:
-    """In any case of letters.
+    """The strictness with this name; case is ignored.
 
     Raises:
-        InvalidArgument: another word.
+        InvalidArgument: an unknown strictness.
     """
-    known: dict[str, Strictness] = {each: each for each in get_args(Strictness)}
+    known: dict[str, Strictness] = {name: name for name in get_args(Strictness)}
     found = known.get(str(word).lower())
     if found is None:
         message = f"unknown strictness '{word}'; expected {' or '.join(known)}"
@@ -208,9 +208,9 @@ def ticks_between(update_rate: float, period: float) -> int:
         InvalidArgument: the rate does not divide the control rate, or is not above 0.
     """
     if not 0.0 < update_rate < math.inf:
-        raise InvalidArgument("CTRL163", f"an update rate of {update_rate:g} Hz; expected one above 0")
+        raise InvalidArgument("CTRL163", f"update rate is {update_rate:g} Hz; expected a rate above 0")
     every = 1.0 / (update_rate * period)
-    if abs(every - max(1, round(every))) > 1e-5 * every:  # six digits of a rate do, as those of the hint
-        message = f"an update rate of {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
-        raise InvalidArgument("CTRL163", message, hint=f"say {1.0 / (period * max(1, round(every))):g} Hz")
+    if abs(every - max(1, round(every))) > 1e-5 * every:  # six digits of a rate suffice, as in the hint
+        message = f"update rate {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
+        raise InvalidArgument("CTRL163", message, hint=f"use {1.0 / (period * max(1, round(every))):g} Hz")
     return round(every)

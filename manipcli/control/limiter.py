@@ -1,15 +1,14 @@
-"""The limits of all joints of a robot on what goes to them, once a tick, and how often each was cut.
+"""Joint limiter: saturates the commands of all joints once per tick, and counts the saturations.
 
-A joint that is measured beyond its position limits is no error here, as it is in ros2_control: what a simulation
-measures is true, so something pushed the joint there (a contact, a soft stop), and its way back stays open. A
-command or a measurement that is no finite number is an error, and names the joint.
+Unlike in ros2_control, a joint that is measured beyond its position limits is not an error: a simulation measures
+exactly, so something pushed the joint there (a contact, a soft stop), and it can still return. A command or a
+measurement that is not finite is an error, and names the joint.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
@@ -17,12 +16,11 @@ import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
 from manipcli.control.limits import (
+    LimitArrays,
     limit_acceleration,
-    limit_array,
     limit_effort,
     limit_position,
     limit_velocity,
-    refuse_limits,
 )
 from manipcli.control.saturation import (
     ACCELERATION,
@@ -37,16 +35,15 @@ from manipcli.control.saturation import (
 )
 from manipcli.core.errors import ExitCode, ManipcliError
 from manipcli.core.geometry import Array
-from manipcli.description.elements import JointLimits, SoftLimits
+from manipcli.description.elements import JointLimits
 
 SLACK = 1e-3
-"""Relative, on velocity and acceleration limits of positions: what is planned to a limit goes through as it is."""
-_NO_SOFT = SoftLimits()
+"""Relative, on velocity and acceleration limits of positions: a plan that reaches a limit passes unchanged."""
 _EFFORTS: Rows = slice(POSITION, EFFORT + 1), slice(None)
 
 
 class NotFinite(ManipcliError):
-    """A command, or what is measured, is no finite number; names the joint."""
+    """A command or a measured value is not finite; names the joint."""
 
     exit_code: ClassVar[ExitCode] = ExitCode.FAILED
     code: ClassVar[str] = "CTRL192"
@@ -56,59 +53,20 @@ class NotFinite(ManipcliError):
         super().__init__(f"joint '{joint}': the {what} is {value:g}")
 
 
-@dataclass(frozen=True, slots=True)
-class _Limits:
-    """Limits of joints as arrays (n); infinite, or of the gains 0, where there is none."""
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
-    effort: Array
-    soft_lower: Array
-    soft_upper: Array
-    k_position: Array
-    k_velocity: Array
-
-    @classmethod
-    def of(cls, limits: Sequence[JointLimits]) -> _Limits:
-        soft = [limit.soft or _NO_SOFT for limit in limits]
-        found = cls(
-            lower=limit_array((limit.lower for limit in limits), -math.inf),
-            upper=limit_array(limit.upper for limit in limits),
-            velocity=limit_array(limit.velocity for limit in limits),
-            acceleration=limit_array(limit.acceleration for limit in limits),
-            effort=limit_array(limit.effort for limit in limits),
-            soft_lower=limit_array((one.lower for one in soft), -math.inf),
-            soft_upper=limit_array(one.upper for one in soft),
-            k_position=np.array([one.k_position for one in soft]),
-            k_velocity=np.array([one.k_velocity for one in soft]),
-        )
-        refuse_limits(
-            found.lower, found.upper, velocity=found.velocity, acceleration=found.acceleration, effort=found.effort,
-            k_position=found.k_position, k_velocity=found.k_velocity,
-        )  # fmt: skip
-        return found
-
-    def at(self, where: npt.NDArray[np.intp]) -> _Limits:
-        """Of some joints."""
-        return _Limits(*(getattr(self, field.name)[where] for field in fields(self)))
-
-
 class _Efforts:
-    """Joints that obey an effort, or are told one to add; arrays are those of all joints.
+    """Joints with an effort command or a feed-forward effort; arrays are those of all joints.
 
-    Soft limits act where an effort is obeyed: elsewhere they act on the position, and would add an effort of their own.
+    Soft limits act here only in the mode `effort`; in the mode `position` they act on the position.
     """
 
-    def __init__(self, modes: Sequence[Mode], limits: _Limits) -> None:
+    def __init__(self, modes: Sequence[Mode], limits: LimitArrays) -> None:
         commanded = np.array([mode in ("effort", "position") for mode in modes])
         obeyed = np.array([mode == "effort" for mode in modes])
 
         def watched(limit: Array, default: float) -> Array:
             return np.where(commanded, limit, default)
 
-        self._limits = _Limits(
+        self._limits = LimitArrays(
             lower=watched(limits.lower, -math.inf),
             upper=watched(limits.upper, math.inf),
             velocity=watched(limits.velocity, math.inf),
@@ -124,7 +82,7 @@ class _Efforts:
         kv = own.k_velocity
         self._soft = bool(kv.any())
         if self._soft:
-            # Nothing is cut while effort + kv v is within -+ kv v_max, and with kv kp q added, within kv kp soft_limit.
+            # No saturation while effort + kv v is within -+ kv v_max, and with kv kp q added, within kv kp soft_limit.
             self._kv, self._kv_kp = kv, kv * own.k_position
             at, near = kv > 0.0, self._kv_kp > 0.0
             with np.errstate(invalid="ignore"):  # 0 times infinity, where it does not act
@@ -135,7 +93,7 @@ class _Efforts:
         self._rows = self._window.rows
 
     def inside(self, command: JointCommand, position: Array, velocity: Array) -> bool:
-        """Whether nothing has to be cut."""
+        """Whether no command saturates."""
         rows = self._rows
         rows[0][:] = position
         rows[1][:] = velocity
@@ -147,14 +105,14 @@ class _Efforts:
             np.add(rows[4], rows[3], rows[4])
         return self._window.holds()
 
-    def cut(
+    def saturate(
         self,
         command: JointCommand,
         position: Array,
         velocity: Array,
-        tally: Saturation,
+        saturation: Saturation,
     ) -> None:
-        """After `inside` has said that something may have to be."""
+        """Saturate the efforts; call it if `inside` is false."""
         own = self._limits
         limited = limit_effort(
             command.effort,
@@ -169,18 +127,18 @@ class _Efforts:
             k_position=own.k_position,
             k_velocity=own.k_velocity if self._soft else None,
         )
-        cut = limited != command.effort
-        if cut.any():
+        saturated = limited != command.effort
+        if saturated.any():
             broken = self._window.broken()[:3]
-            broken[:2] &= limited == 0.0  # where a joint is too far or too fast, efforts that lead back go through
-            tally.add(_EFFORTS, cut, broken)
+            broken[:2] &= limited == 0.0  # beyond these limits, efforts that lead back are allowed
+            saturation.add(_EFFORTS, saturated, broken)
             command.effort[:] = limited
 
 
 class _Positions:
-    """Joints that obey a position, and the velocity and acceleration that may go with it."""
+    """Joints in the mode `position`, with their feed-forward velocity and acceleration."""
 
-    def __init__(self, where: npt.NDArray[np.intp], limits: _Limits, dt: float) -> None:
+    def __init__(self, where: npt.NDArray[np.intp], limits: LimitArrays, dt: float) -> None:
         self._where, self._dt = where, dt
         self._own = own = limits.at(where)
         self._velocity, self._acceleration = own.velocity * (1.0 + SLACK), own.acceleration * (1.0 + SLACK)
@@ -194,7 +152,7 @@ class _Positions:
         self._by_velocity, self._by_acceleration = rows_of((VELOCITY,), where), rows_of((ACCELERATION,), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Saturation) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, saturation: Saturation) -> None:
         where, (wanted, step, growth) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -205,7 +163,7 @@ class _Positions:
         np.abs(self._step, self._size)
         np.subtract(growth, self._size, growth)
         if self._soft or not self._window.holds():
-            self._cut(command, wanted, tally)
+            self._saturate(command, wanted, saturation)
         else:
             self._before[:], self._step[:] = wanted, step
         for values, most, rows in (
@@ -215,12 +173,12 @@ class _Positions:
             if values.any():
                 asked = values[where]
                 limited = limit_acceleration(asked, acceleration=most)  # a velocity, too, is clamped to -+ most
-                cut = limited != asked
-                if cut.any():
-                    tally.add(rows, cut, cut[np.newaxis])
+                saturated = limited != asked
+                if saturated.any():
+                    saturation.add(rows, saturated, saturated[np.newaxis])
                     values[where] = limited
 
-    def _cut(self, command: JointCommand, wanted: Array, tally: Saturation) -> None:
+    def _saturate(self, command: JointCommand, wanted: Array, saturation: Saturation) -> None:
         own, dt = self._own, self._dt
         limited = limit_position(
             wanted,
@@ -235,19 +193,19 @@ class _Positions:
             k_position=own.k_position,
             dt=dt,
         )
-        cut = limited != wanted
-        if cut.any():
+        saturated = limited != wanted
+        if saturated.any():
             self._window.holds()
-            tally.add(self._kinds, cut, self._window.broken())
+            saturation.add(self._kinds, saturated, self._window.broken())
         np.subtract(limited, self._before, self._step)
         self._before[:] = limited
         command.position[self._where] = limited
 
 
 class _Velocities:
-    """Joints that obey a velocity."""
+    """Joints in the mode `velocity`."""
 
-    def __init__(self, where: npt.NDArray[np.intp], limits: _Limits, dt: float) -> None:
+    def __init__(self, where: npt.NDArray[np.intp], limits: LimitArrays, dt: float) -> None:
         self._where, self._dt = where, dt
         self._own = own = limits.at(where)
         # A velocity, by how much it has changed, and where it leads.
@@ -259,7 +217,7 @@ class _Velocities:
         self._kinds = rows_of((VELOCITY, ACCELERATION, POSITION), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Saturation) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, saturation: Saturation) -> None:
         where, (wanted, change, ahead) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -286,10 +244,10 @@ class _Velocities:
             k_position=own.k_position,
             beyond="return",
         )
-        cut = limited != wanted
-        if cut.any():
+        saturated = limited != wanted
+        if saturated.any():
             self._window.holds()
-            tally.add(self._kinds, cut, self._window.broken())
+            saturation.add(self._kinds, saturated, self._window.broken())
         self._before[:] = limited
         command.velocity[where] = limited
 
@@ -299,12 +257,12 @@ class JointLimiter:
 
     Effort, in the modes `effort` and `position` (added there; hard limits only): `limit_effort`. Velocity:
     `limit_velocity`, from the command before (at first, the measured velocity). Position: `limit_position`, from the
-    command before (at first, the measured position), its acceleration from the commands' own velocity, so that a joint
-    that lags is not slowed.
+    command before (at first, the measured position); its acceleration is that of the commands, so that a lagging joint
+    is not slowed down.
 
     Attributes:
-        saturations: (n) int, in how many ticks each joint's command was cut.
-        by_kind: (k, n) int, in how many of them by each of the `KINDS` of limits.
+        saturations: (n) int, number of ticks in which each joint's command was saturated.
+        by_kind: (k, n) int, number of these ticks by each of the `KINDS` of limits.
 
     Args:
         limits: (n) of the joints.
@@ -317,27 +275,27 @@ class JointLimiter:
     def __init__(self, limits: Sequence[JointLimits], joints: Sequence[str] | None = None) -> None:
         n = len(limits)
         self._joints = tuple(joints) if joints is not None else tuple(map(str, range(n)))
-        self._limits = _Limits.of(limits)
+        self._limits = LimitArrays.of(limits)
         self._version, self._dt = -1, 0.0
         brake: Mode = "brake"
         self._efforts = _Efforts((brake,) * n, self._limits)
         self._others: list[_Positions | _Velocities] = []
-        self._cut = Saturation(n)
+        self._saturation = Saturation(n)
         self.saturations = np.zeros(n, dtype=np.int64)
         self.by_kind = np.zeros((len(KINDS), n), dtype=np.int64)
 
     @property
     def saturated(self) -> npt.NDArray[np.bool_]:
-        """(n) whose command was cut in the last tick."""
-        return self._cut.joints
+        """(n) whether each command was saturated in the last tick."""
+        return self._saturation.joints
 
     def reset(self) -> None:
-        """Forgets the commands before and the counts."""
+        """Clear the previous commands and the counts."""
         for group in self._others:
             group.fresh = True
         self.saturations[:] = 0
         self.by_kind[:] = 0
-        self._cut.clear()
+        self._saturation.clear()
 
     def _obey(self, modes: Sequence[Mode], dt: float) -> None:
         self._efforts = _Efforts(modes, self._limits)
@@ -350,7 +308,7 @@ class JointLimiter:
             self._others.append(_Velocities(velocities, self._limits, dt))
 
     def apply(self, command: JointCommand, position: Array, velocity: Array, dt: float) -> None:
-        """Saturations the command in place.
+        """Saturate the command in place.
 
         Args:
             command: of this tick.
@@ -358,14 +316,14 @@ class JointLimiter:
             dt: [s] of a control period.
 
         Raises:
-            NotFinite: a command that a joint obeys, or what is measured of it, is not finite; nothing is cut then.
+            NotFinite: an active command or a measured value of a joint is not finite; the command is then unchanged.
         """
         if command.version != self._version or dt != self._dt:
             self._version, self._dt = command.version, dt
             self._obey(command.modes, dt)
-        cut = self._cut
-        if cut.any:
-            cut.clear()
+        saturation = self._saturation
+        if saturation.any:
+            saturation.clear()
         others = self._others
         if self._efforts.inside(command, position, velocity):
             if not others:
@@ -373,15 +331,15 @@ class JointLimiter:
             self._refuse_not_finite(command, position, velocity)
         else:
             self._refuse_not_finite(command, position, velocity)
-            self._efforts.cut(command, position, velocity, cut)
+            self._efforts.saturate(command, position, velocity, saturation)
         for group in others:
-            group.apply(command, position, velocity, cut)
-        if cut.any:
-            self.saturations += cut.joints
-            self.by_kind += cut.kinds
+            group.apply(command, position, velocity, saturation)
+        if saturation.any:
+            self.saturations += saturation.joints
+            self.by_kind += saturation.kinds
 
     def _refuse_not_finite(self, command: JointCommand, position: Array, velocity: Array) -> None:
-        # Products tell it quickly, for infinity times 0 is NaN; where they overflow, that only costs the closer look.
+        # A quick test by products, as infinity times 0 is NaN; an overflow only costs the exact test below.
         with np.errstate(all="ignore"):
             products = np.vdot(position, velocity) + np.vdot(command.effort, command.velocity)
             if math.isfinite(products + command.position.sum()):

@@ -2,13 +2,13 @@
 
 The rules are those of ros2_control's `joint_limits` for hard limits and of ROS 1's `joint_limits_interface` for soft
 ones. All arguments broadcast; infinite (or, for `k_position` and `k_velocity`, 0) means that there is no such limit. A
-command that is NaN stays NaN. Limits are such as `refuse_limits` lets pass; it is asked once, not at every tick.
+command that is NaN stays NaN. Limits must be valid by `refuse_limits`, which is called once, not at every tick.
 
 A soft limit bounds the velocity v near it, before the hard one is met:
 
     v_min = clamp(-k_position (q - soft_lower), -v_max, v_max),   v_max likewise with soft_upper
 
-so that a joint slows down towards it, and beyond it is led back; an effort is then bounded by what that velocity asks:
+so that a joint slows down towards it, and returns from beyond it; an effort is then bounded by the velocity bounds:
 
     -k_velocity (v - v_min) <= effort <= -k_velocity (v - v_max)
 """
@@ -16,7 +16,8 @@ so that a joint slows down towards it, and beyond it is led back; an effort is t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 from typing import Final, Literal
 
 import numpy as np
@@ -24,14 +25,15 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.description.elements import JointLimits, SoftLimits
 
 POSITION_TOLERANCE: Final = 0.002
-"""Beyond a position limit by no more than this [rad or m], a velocity may still lead back."""
+"""[rad or m] Beyond a position limit by at most this, a velocity may still lead back."""
 OUT_OF_BOUNDS: Final = 0.0087
-"""A position measured further beyond its limits than this [rad or m] is not believed."""
+"""[rad or m] A position measured further beyond its limits than this is an error."""
 
 Beyond = Literal["stop", "return"]
-"""What a velocity command may do where the joint is measured beyond its limits: nothing, or lead back."""
+"""Effect of a velocity command while the joint is beyond its limits: none, or only back."""
 
 
 def limit_position(
@@ -51,8 +53,8 @@ def limit_position(
 ) -> Array:
     """Clamped to [lower, upper] and to what can be reached from `previous` within `dt`; [lower, upper] wins.
 
-    Reached is previous -+ min(velocity, |measured_velocity| + acceleration dt) dt; with soft limits, previous +
-    [v_min, v_max] dt of the module's law at q = previous.
+    The reachable range is previous -+ min(velocity, |measured_velocity| + acceleration dt) dt; with soft limits,
+    previous + [v_min, v_max] dt of the module's law at q = previous.
 
     Args:
         command: (n) rad or m.
@@ -110,13 +112,13 @@ def limit_velocity(
 
     Beyond a position limit by up to `POSITION_TOLERANCE` it may lead back, but not further out; beyond that it is 0,
     or with `beyond="return"` it may still lead back. Where position and acceleration limits exclude each other, the
-    command is let between them: a joint cannot brake faster than it can.
+    command is allowed between them: the deceleration stays within its limit.
 
     Args:
         command: (n) rad/s or m/s.
         velocity, acceleration, lower, upper: hard limits.
         dt: [s], above 0; needed with `position` and with `previous`.
-        position: (n) measured; None: position limits, soft ones included, are not looked at.
+        position: (n) measured; None: position limits, soft ones included, are ignored.
         previous: (n) the velocity command before; None: the acceleration is not limited.
         soft_lower, soft_upper, k_position: soft limits; k_position [1/s].
         beyond: see above.
@@ -142,7 +144,7 @@ def limit_velocity(
             out = (q > q_high + POSITION_TOLERANCE) | (q < q_low - POSITION_TOLERANCE)
             low, high = np.where(out, 0.0, low), np.where(out, 0.0, high)
         least, most = _soft_velocities(q, fastest, soft_lower, soft_upper, k_position)
-        # Led back by the soft limit only as far as the hard ones let it.
+        # The soft limit leads back only as far as the hard limits allow.
         low, high = np.minimum(np.maximum(low, least), high), np.maximum(np.minimum(high, most), low)
     if previous is not None:
         change, before = _floats(acceleration) * dt, _floats(previous)
@@ -165,7 +167,7 @@ def limit_effort(
     k_position: npt.ArrayLike = 0.0,
     k_velocity: npt.ArrayLike | None = None,
 ) -> Array:
-    """Clamped to -+ effort, with no push further out at a position limit and none further up beyond the velocity limit.
+    """Clamped to -+ effort, without pushing further out at a position limit, or accelerating beyond the velocity limit.
 
     At or below `lower` and not moving back (velocity <= 0) the command cannot be negative; above `max_velocity` it
     cannot be positive; and the mirror images. Then the soft limits, by the module's law.
@@ -173,7 +175,7 @@ def limit_effort(
     Args:
         command: (n) N m or N.
         effort, lower, upper, max_velocity: hard limits.
-        position, velocity: (n) measured; what is None is not looked at.
+        position, velocity: (n) measured; None: not limited by it.
         soft_lower, soft_upper, k_position, k_velocity: soft limits; k_position [1/s], k_velocity [N m s/rad or N s/m].
 
     Returns:
@@ -234,7 +236,7 @@ def limit_array(values: Iterable[float | None], default: float = math.inf) -> Ar
 def refuse_limits(
     lower: npt.ArrayLike = -math.inf, upper: npt.ArrayLike = math.inf, **sizes: npt.ArrayLike | None
 ) -> None:
-    """Limits that nothing keeps.
+    """Refuse contradictory limits.
 
     Raises:
         InvalidArgument: one of `sizes` (None: there is none) is below 0, `lower` is above `upper`, or one is NaN.
@@ -244,7 +246,53 @@ def refuse_limits(
             raise InvalidArgument("CTRL194", f"the limit `{name}` is {_floats(size)}; expected 0 or more")
     least, most = _floats(lower), _floats(upper)
     if not (least <= most).all():
-        raise InvalidArgument("CTRL194", f"the limits are {least} to {most}; expected no lower one above its upper one")
+        raise InvalidArgument(
+            "CTRL194", f"the limits are {least} to {most}; expected each lower limit at or below its upper limit"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class LimitArrays:
+    """Limits of joints as arrays (n); where there is no limit, infinite, and the gains 0."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    effort: Array
+    soft_lower: Array
+    soft_upper: Array
+    k_position: Array
+    k_velocity: Array
+
+    @classmethod
+    def of(cls, limits: Sequence[JointLimits]) -> LimitArrays:
+        """The arrays of these joints.
+
+        Raises:
+            InvalidArgument: see `refuse_limits`.
+        """
+        soft = [limit.soft or SoftLimits() for limit in limits]
+        found = cls(
+            lower=limit_array((limit.lower for limit in limits), -math.inf),
+            upper=limit_array(limit.upper for limit in limits),
+            velocity=limit_array(limit.velocity for limit in limits),
+            acceleration=limit_array(limit.acceleration for limit in limits),
+            effort=limit_array(limit.effort for limit in limits),
+            soft_lower=limit_array((own.lower for own in soft), -math.inf),
+            soft_upper=limit_array(own.upper for own in soft),
+            k_position=np.array([own.k_position for own in soft]),
+            k_velocity=np.array([own.k_velocity for own in soft]),
+        )
+        refuse_limits(
+            found.lower, found.upper, velocity=found.velocity, acceleration=found.acceleration, effort=found.effort,
+            k_position=found.k_position, k_velocity=found.k_velocity,
+        )  # fmt: skip
+        return found
+
+    def at(self, where: npt.NDArray[np.intp]) -> LimitArrays:
+        """The limits of some joints, by index."""
+        return LimitArrays(*(getattr(self, field.name)[where] for field in fields(self)))
 
 
 def _refuse_time(dt: float) -> None:
@@ -281,5 +329,5 @@ def _refuse_out_of_bounds(position: Array, lower: Array, upper: Array) -> None:
     raise InvalidArgument(
         "CTRL191",
         f"{message}{limits[0]:g} to {limits[1]:g}",
-        hint="a broken sensor, or limits narrower than those of the robot",
+        hint="check the sensor, and whether the limits are narrower than the robot's",
     )

@@ -1,16 +1,15 @@
-"""All controllers of a robot: who is active, who claims what, and one update of them all a control tick.
+"""Controller manager: states and claims of all controllers of a robot, and their update once per control tick.
 
     manager = build_controllers(spec, robot, period)       # factory.py; or ControllerManager([...], joints=..., ...)
     command = manager.update(time, state, contact_force)   # a JointCommand, before limits, until the next update
 
-where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState` will do),
-and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves (see `Controller`); it
-need only be up to date while `senses_contact`.
-Goals go to the controllers: `manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` finds the active one
-that claims them.
+where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState`, for
+example), and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves (see
+`Controller`); it need only be up to date while `senses_contact`. Send goals to the controllers:
+`manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` is the active controller that claims them.
 
 A controller is unconfigured when loaded, inactive when configured, and active when switched on, as in ros2_control. A
-switch is whole or not at all, and happens between two updates: there is no clock to wait for and no time to run out.
+switch is done as a whole or not at all, between two updates, so it has no timeout.
 """
 
 from __future__ import annotations
@@ -58,12 +57,11 @@ class ControllerManager:
         controllers: loaded, configured and activated at once.
         joints: (n) all moving joints of the robot, in the order of its joint vectors.
         period: [s] between two updates.
-        following: joints that are not to be commanded, because they follow others (mimic).
+        following: joints that cannot be commanded, because they follow others (mimic).
         feed_forward: adds gravity or inverse dynamics for the controllers that want it.
 
     Raises:
-        InvalidInput: every conflict at once: two of one name, an interface claimed twice, a joint that is unknown or
-            follows another.
+        InvalidInput: every conflict at once: duplicate names or claims, joints that are unknown or follow others.
         InvalidArgument: a period that is not above 0.
     """
 
@@ -77,7 +75,7 @@ class ControllerManager:
         feed_forward: FeedForwardLaw | None = None,
     ) -> None:
         if not 0.0 < period < np.inf:
-            raise InvalidArgument("CTRL165", f"a control period of {period} s; expected a time above 0")
+            raise InvalidArgument("CTRL165", f"the control period is {period} s; expected a time above 0")
         self.joints = tuple(joints)
         self.period = period
         self.following = tuple(following)
@@ -101,24 +99,24 @@ class ControllerManager:
 
     @property
     def started(self) -> bool:
-        """Whether there was an update."""
+        """Whether there has been an update."""
         return self._tick > 0
 
     @property
     def senses_contact(self) -> bool:
-        """Whether some active controller asks for the forces of contacts at the next update."""
+        """Whether an active controller needs contact forces at the next update."""
         return any(slot.controller.senses_contact for slot in self._active)
 
     @property
     def controllers(self) -> tuple[Controller, ...]:
-        """All that are loaded, in the order of loading."""
+        """All loaded controllers, in the order of loading."""
         return tuple(slot.controller for slot in self._slots.values())
 
     def load(self, controller: Controller, *, update_rate: float | None = None) -> None:
-        """Takes a controller in, unconfigured.
+        """Load a controller; it is unconfigured.
 
         Args:
-            controller: of a name that is not loaded.
+            controller: its name must not be loaded.
             update_rate: [Hz] of its updates, a whole fraction of the control rate; None: at every tick.
 
         Raises:
@@ -126,7 +124,7 @@ class ControllerManager:
             InvalidInput: a joint that the robot does not have or that follows another.
         """
         if controller.name in self._slots:
-            raise InvalidArgument("CTRL141", f"two controllers are named '{controller.name}'")
+            raise InvalidArgument("CTRL141", f"duplicate controller name '{controller.name}'")
         findings = conflicts([controller], self.joints, self.following)
         if findings:
             raise InvalidInput(findings)
@@ -139,7 +137,7 @@ class ControllerManager:
         self._rearrange()
 
     def configure(self, name: str) -> None:
-        """Makes a controller ready to be activated; one that is inactive starts afresh.
+        """Configure a controller, so that it can be activated.
 
         Raises:
             InvalidArgument: it is unknown or active.
@@ -150,18 +148,20 @@ class ControllerManager:
         slot.state = "inactive"
 
     def cleanup(self, name: str) -> None:
-        """Takes an inactive controller back to unconfigured.
+        """Return an inactive controller to unconfigured.
 
         Raises:
             InvalidArgument: it is unknown, active, or unconfigured already.
         """
         slot = self._slot(name)
         if slot.state != "inactive":
-            raise InvalidArgument("CTRL160", f"controller '{name}' is {slot.state}; only an inactive one is cleaned up")
+            raise InvalidArgument(
+                "CTRL160", f"controller '{name}' is {slot.state}; only an inactive controller can be cleaned up"
+            )
         slot.state = "unconfigured"
 
     def unload(self, name: str) -> None:
-        """Forgets a controller that is not active.
+        """Unload a controller that is not active.
 
         Raises:
             InvalidArgument: it is unknown or active.
@@ -179,18 +179,18 @@ class ControllerManager:
         strictness: Strictness = "strict",
         time: float = 0.0,
     ) -> SwitchResult:
-        """Deactivates and activates controllers, all of it or, when refused, nothing.
+        """Deactivate and activate controllers, as a whole or, if refused, not at all.
 
-        A name on both lists restarts that controller. With `best_effort` names that cannot be switched are left out and
-        told, also where claims clash; it is refused only when no name of a list is loaded.
+        A name on both lists restarts that controller. With `best_effort`, names that cannot be switched are left out
+        and reported, also if claims conflict; it is refused only if no name of a list is loaded.
 
         Args:
-            activate, deactivate: names, or one name.
-            strictness: see above; in any case of letters.
+            activate, deactivate: names, or a single name.
+            strictness: see above; case is ignored.
             time: simulated time [s], for the results of goals that end.
 
         Raises:
-            InvalidArgument: another strictness.
+            InvalidArgument: an unknown strictness.
         """
         word = strictness_of(strictness)
         lists = Switch(activate=names_of(activate), deactivate=names_of(deactivate), strictness=word)
@@ -199,12 +199,11 @@ class ControllerManager:
     def switch_to(
         self, names: Collection[str], *, strictness: Strictness = "strict", time: float = 0.0
     ) -> SwitchResult:
-        """Has all of `names` active, and nobody else on their joints. Those that are active stay as they are. See
-        `switch`."""
+        """Activate `names` and deactivate all others on their joints; active ones are unchanged. See `switch`."""
         return self.carry_out(Switch(to=names_of(names), strictness=strictness_of(strictness)), time=time)
 
     def carry_out(self, switch: Switch, *, time: float) -> SwitchResult:
-        """A switch as a step asks for it; see `switch` and `switch_to`."""
+        """Carry out the switch of a step; see `switch` and `switch_to`."""
         controllers = {name: (slot.controller, slot.state) for name, slot in self._slots.items()}
         decision = decided(controllers, switch, self.joints, self.following)
         if not decision.ok:
@@ -219,7 +218,7 @@ class ControllerManager:
         return decision
 
     def list(self) -> tuple[ControllerInfo, ...]:
-        """All that are loaded, and what they claim."""
+        """All loaded controllers, and their claims."""
         return tuple(ControllerInfo.of(slot.controller, slot.state) for slot in self._slots.values())
 
     def __getitem__(self, name: str) -> Controller:
@@ -228,30 +227,30 @@ class ControllerManager:
     def _slot(self, name: str) -> Slot:
         if name not in self._slots:
             hint = did_you_mean(name, self._slots, kind="controllers")
-            raise InvalidArgument("CTRL161", f"no controller '{name}' is loaded", hint=hint)
+            raise InvalidArgument("CTRL161", f"controller '{name}' is not loaded", hint=hint)
         return self._slots[name]
 
     def serving(self, joints: Sequence[str]) -> Controller:
         """The active controller that claims all of `joints`.
 
         Raises:
-            InvalidArgument: none does.
+            InvalidArgument: no active controller does.
         """
         active = [slot.controller for slot in self._active]
         for controller in active:
             if controller.interfaces and set(joints) <= set(controller.joints):
                 return controller
-        claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "none is active"
+        claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "no controller is active"
         message = f"no active controller claims all of {', '.join(joints)} ({claims})"
         raise InvalidArgument("CTRL140", message, hint=self.faults[-1].message if self.faults else None)
 
     def keep_references(self) -> None:
-        """From now on the command holds the references, too."""
+        """Include the references in the command from now on."""
         self._references = True
         self._rearrange()
 
     def _rearrange(self) -> None:
-        """After a change of who is there and who is active: modes of the joints, and what has to be done every tick."""
+        """Update the modes of the joints and the work per tick, after a change of loaded or active controllers."""
         self._active = tuple(slot for slot in self._slots.values() if slot.state == "active")
         claimed = Claims.of([slot.controller for slot in self._active])
         modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
@@ -263,7 +262,7 @@ class ControllerManager:
         self.outputs = tuple(s.controller.output if s.state == "active" else None for s in self._slots.values())
 
     def _copies(self, slot: Slot) -> tuple[tuple[Array, Index, Array], ...]:
-        """What is copied into the command every tick: target, where in it, source."""
+        """The copies into the command at every tick: target, index, source."""
         command, output = self.command, slot.controller.output
         commands: dict[Interface, Array] = {
             "position": command.position,
@@ -280,11 +279,11 @@ class ControllerManager:
         return tuple(copies)
 
     def _look(self, state: JointVectors, contact_force: Array | None) -> None:
-        """The slots' own parts of vectors that are not those of the tick before."""
+        """Set the slots' views of new measured vectors."""
         for name in ("position", "velocity", "effort"):
             vector = getattr(state, name)
             if not isinstance(vector, np.ndarray) or vector.shape != (len(self.joints),):
-                message = f"measured {name}: {vector!r}; expected an array of {len(self.joints)} numbers"
+                message = f"measured {name} is {vector!r}; expected an array of {len(self.joints)} numbers"
                 raise InvalidArgument("CTRL166", message)
         vectors = self._seen = (state.position, state.velocity, state.effort)
         self._felt = contact_force
@@ -294,10 +293,11 @@ class ControllerManager:
     def update(self, time: float, state: JointVectors, contact_force: Array | None = None) -> JointCommand:
         """One control tick at `time` [s]; see the module for the vectors.
 
-        A controller that raises is deactivated, its goal aborted with the cause; its joints are braked. `faults` grows.
+        A controller that raises is deactivated: its goal is aborted with the cause, its joints are held by a brake, and
+        `faults` has a new entry.
 
         Raises:
-            InvalidArgument: measured vectors that are no arrays of one number a joint.
+            InvalidArgument: measured vectors that are not arrays with one number per joint.
         """
         seen = self._seen
         if seen is None or seen[0] is not state.position or self._felt is not contact_force:
@@ -309,7 +309,7 @@ class ControllerManager:
             if slot.every == 1 or (tick - slot.first) % slot.every == 0:
                 try:
                     slot.controller.update(time, slot.period, slot.measured, contact_force=slot.contact_force)
-                except Exception as error:  # noqa: BLE001  (whatever is wrong in one controller stops that one alone)
+                except Exception as error:  # noqa: BLE001  (an error in a controller stops only that controller)
                     self._fail(slot, _cause(error), time)
         self._feed_forward.add(tick, state.position, state.velocity)
         for slot in self._active:
@@ -325,23 +325,23 @@ class ControllerManager:
         self._rearrange()
 
     def stop_non_finite(self, time: float) -> None:
-        """Deactivates, as failed, the controllers that command what is no finite number; for whoever sees one."""
+        """Deactivate, as failed, all controllers whose commands are not finite."""
         for slot in self._active:
             for interface, command in zip(slot.controller.interfaces, slot.controller.output.commands, strict=True):
                 bad = np.flatnonzero(~np.isfinite(command))
                 if len(bad):
                     joint = slot.controller.joints[bad[0]]
-                    self._fail(slot, f"it commands {joint}/{interface} to be {command[bad[0]]}", time)
+                    self._fail(slot, f"its command for {joint}/{interface} is {command[bad[0]]}", time)
                     break
 
     def deactivate(self, time: float) -> None:
-        """Ends all goals as aborted; the next update activates the controllers again."""
+        """Abort all goals; the next update re-activates the controllers."""
         for slot in self._active:
             slot.controller.deactivate(time)
 
 
 def _cause(error: Exception) -> str:
-    """What went wrong, on one line."""
+    """The error on one line."""
     if isinstance(error, ManipcliError):
         return "; ".join(finding.message for finding in error.findings)
     return f"{type(error).__name__}: {error}"

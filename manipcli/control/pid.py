@@ -1,4 +1,4 @@
-"""The PID law of control_toolbox, for one joint or for all joints of a controller at once."""
+"""PID control law of control_toolbox, for one joint or for all joints of a controller at once."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
 class Pid:
     """u = p e + I + d de/dt, clamped to [u_min, u_max]; the integral term I is clamped to [i_min, i_max].
 
-    `compat="ros2"`: the command is computed first and I afterwards, so the integral acts one step late (forward Euler);
-    I is stored with its gain, so that a change of gain makes no step. `compat="ros1"`: the integral of the error is
-    updated first (backward Euler), and there is no derivative before a second error is known.
+    `compat="ros2"`: the command is computed before I, so the integral acts one step late (forward Euler); I is stored
+    with its gain, so that a change of gain makes no step. `compat="ros1"`: the integral of the error is updated first
+    (backward Euler), and there is no derivative before the second error.
 
     Anti-windup where the command u_unsat is clamped to u: `back_calculation` adds dt (u - u_unsat) / tracking_time to
-    I; `conditional_integration` leaves I alone while the error drives further into the clamp. With `ros1`, `none`
+    I; `conditional_integration` keeps I while the error drives further into the clamp. With `ros1`, `none`
     clamps only the term, so the integral of the error still winds up, and `conditional_integration` clamps that
     integral itself (ROS 1's `antiwindup: true`).
 
@@ -34,7 +34,7 @@ class Pid:
         i_min, i_max: bounds of the integral term; i_min <= 0 <= i_max.
         antiwindup: see above; one word, or (n).
         tracking_time: [s] of back calculation; 0 chooses sqrt(d / i), or p / i where d is 0.
-        error_deadband: errors that are not larger are not integrated; rad or m, 0 or more.
+        error_deadband: errors up to this are not integrated; rad or m, 0 or more.
         compat: see above.
 
     Raises:
@@ -75,7 +75,7 @@ class Pid:
             error_deadband=error_deadband,
         )  # fmt: skip
         if words.size not in (1, self._size):
-            raise InvalidArgument("CTRL114", f"{words.size} kinds of anti-windup for gains of {self._size} joints")
+            raise InvalidArgument("CTRL114", f"{words.size} anti-windup values for gains of {self._size} joints")
         words = np.broadcast_to(words, (self._size,))
         self._tracks, self._conditional = words == "back_calculation", words == "conditional_integration"
         self._any_tracks, self._any_conditional = bool(self._tracks.any()), bool(self._conditional.any())
@@ -93,7 +93,7 @@ class Pid:
         tracking_time: npt.ArrayLike = 0.0,
         error_deadband: npt.ArrayLike = 0.0,
     ) -> None:
-        """Replaces all gains and bounds, or none of them when one is invalid; the integral is kept.
+        """Replace all gains and bounds, or none of them if one is invalid; the integral is kept.
 
         Raises:
             InvalidArgument: as the constructor; also gains for another number of joints than before.
@@ -145,13 +145,13 @@ class Pid:
         return self._term.copy()
 
     def freeze(self, which: npt.ArrayLike) -> None:
-        """From now on the integrals of `which` (n), true or false, stay as they are, and no others."""
+        """Freeze the integrals where `which` (n) is true, and no others."""
         self._counted_above = np.where(which, np.inf, self._deadband)
         self._unwinding = np.where(which, 0.0, self._inverse_tracking)
         self._has_deadband = bool(self._counted_above.any())
 
     def reset(self, keep_integral: bool = False) -> None:
-        """Forgets the last error and command, and the integral too unless `keep_integral`."""
+        """Clear the last error and command, and the integral, too, unless `keep_integral`."""
         self._has_last = False
         self._last_error[:] = 0.0
         self._command = np.zeros(self._size)
@@ -172,7 +172,7 @@ class Pid:
             error_rate: its derivative; by default (error - last error) / dt, the last error being 0 at first.
 
         Returns:
-            A number, or a new array (n). NaN where the error is not finite, whose integral is then left alone.
+            A number, or a new array (n). NaN where the error is not finite; the integral is then kept.
 
         Raises:
             InvalidArgument: a negative dt, or an error of another size than the gains.
@@ -183,10 +183,10 @@ class Pid:
         elif np.shape(error) == (self._size,):
             errors[0] = error
         else:
-            raise InvalidArgument("CTRL114", f"an error of shape {np.shape(error)} for gains of {self._size} joints")
+            raise InvalidArgument("CTRL114", f"error of shape {np.shape(error)} for gains of {self._size} joints")
         if not dt > 0.0:
             if dt != 0.0:
-                raise InvalidArgument("CTRL115", f"dt is {dt} s; expected a time that is not negative")
+                raise InvalidArgument("CTRL115", f"dt is {dt} s; expected 0 or more")
             return float(self._command[0]) if self._scalar else self._command.copy()
         if error_rate is not None:
             errors[1] = error_rate
@@ -203,7 +203,7 @@ class Pid:
         return float(command[0]) if self._scalar else command
 
     def apply(self, errors: Array, dt: float, command: Array) -> None:
-        """`update` for loops, in place: no check, nothing remembered but the integral.
+        """`update` for the control loop, in place: without checks, and without state except the integral.
 
         Args:
             errors: (2, n) errors and their rates, all finite.
@@ -256,7 +256,7 @@ class Pid:
         return np.where(np.abs(e) > self._counted_above, e, 0.0) if self._has_deadband else e
 
     def _apply_finite(self, errors: Array, dt: float, command: Array) -> None:
-        """NaN for the joints whose error is not finite, their state kept; the others as ever."""
+        """NaN for the joints whose error is not finite, with their state kept; `apply` for the others."""
         bad = ~np.isfinite(errors).all(axis=0)
         kept = self._term[bad], self._integral[bad], self._last_error[bad]
         safe = np.where(bad, 0.0, errors)
@@ -267,7 +267,7 @@ class Pid:
 
 
 def _check(g: dict[str, Array]) -> None:
-    """Raises InvalidArgument for gains and bounds that say no law."""
+    """Raise InvalidArgument for invalid gains and bounds."""
     for name, value in g.items():
         bound = name in ("u_min", "u_max", "i_min", "i_max")
         if np.isnan(value).any() or not (bound or np.isfinite(value).all()):
@@ -275,7 +275,7 @@ def _check(g: dict[str, Array]) -> None:
     if (g["u_min"] >= g["u_max"]).any():
         raise InvalidArgument("CTRL111", f"u_min {g['u_min'].tolist()} is not below u_max {g['u_max'].tolist()}")
     if (g["i_min"] > 0.0).any() or (g["i_max"] < 0.0).any():
-        message = f"i_min {g['i_min'].tolist()}, i_max {g['i_max'].tolist()}: 0 is not between"
+        message = f"i_min {g['i_min'].tolist()}, i_max {g['i_max'].tolist()}: 0 is not between them"
         raise InvalidArgument("CTRL112", message)
     for name in ("tracking_time", "error_deadband"):
         if (g[name] < 0.0).any():

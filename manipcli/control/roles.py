@@ -1,4 +1,4 @@
-"""What steps ask of controllers: to follow trajectories, and to close and open a hand; and who reads sensors."""
+"""Roles of controllers for steps: trajectory follower and hand; and controllers that read sensors."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from manipcli.plan.trajectory import JointTrajectory
 
 
 class Follower(Controller, Protocol):
-    """Follows joint trajectories, whatever it commands."""
+    """Follows joint trajectories, on any interface."""
 
     def send_goal(self, trajectory: JointTrajectory) -> GoalHandle:
-        """Accepts a trajectory of all its joints, which starts at its next update; a goal before it is aborted.
+        """Accept a trajectory of all its joints, which starts at the next update; the previous goal is aborted.
 
         Raises:
-            InvalidArgument: the trajectory cannot be followed; a goal before it goes on.
+            InvalidArgument: the trajectory cannot be followed; the previous goal continues.
         """
         ...
 
@@ -27,10 +27,10 @@ class Hand(Controller, Protocol):
     """Closes and opens a hand."""
 
     def send_goal(self, goal: GripperGoal) -> GoalHandle:
-        """Accepts a goal, which begins at its next update; a goal before it is aborted.
+        """Accept a goal, which begins at the next update; the previous goal is aborted.
 
         Raises:
-            InvalidArgument: the goal makes no sense for this hand; a goal before it goes on.
+            InvalidArgument: the goal is invalid for this hand; the previous goal continues.
         """
         ...
 
@@ -39,20 +39,20 @@ class SensorReader(Controller, Protocol):
     """Reads sensors."""
 
     def attach(self, readings: Sequence[Array]) -> None:
-        """An array for each of its `sensors`, which is up to date at every update from now on."""
+        """Attach one array per sensor in `sensors`; it is up to date at every update."""
         ...
 
 
 def is_follower(controller: Controller) -> TypeGuard[Follower]:
-    """Whether `move` steps may use it."""
+    """Whether it follows trajectories, for `move` steps."""
     return controller.role == "follower"
 
 
 def is_hand(controller: Controller) -> TypeGuard[Hand]:
-    """Whether `grasp` and `release` steps may use it."""
+    """Whether it moves a hand, for `grasp` and `release` steps."""
     return controller.role == "hand"
 
 
 def reads_sensors(controller: Controller) -> TypeGuard[SensorReader]:
-    """Whether it asks for sensors."""
+    """Whether it reads sensors."""
     return bool(controller.sensors)

@@ -1,4 +1,4 @@
-"""Saturation: the joints whose commands exceed limits, and the engine's motors that are at their effort limit."""
+"""Saturation of joint commands at limits, and of the engine's motors at their effort limits."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 
 KINDS: Final = ("position", "velocity", "effort", "acceleration", "soft_limit")
-"""Of limits, as the rows of `JointLimiter.by_kind`."""
+"""Kinds of limits, in the order of the rows of `JointLimiter.by_kind`."""
 POSITION, VELOCITY, EFFORT, ACCELERATION, SOFT = range(len(KINDS))
-_MOST = sys.float_info.max  # infinity is beyond it, so that it is found
+_MOST = sys.float_info.max  # below infinity, so that infinity is detected
 
 
 class Window:
-    """Rows of numbers, and whether each lies strictly between its bounds: in two comparisons, not two a row."""
+    """Rows of numbers, and whether each lies strictly between its bounds: in two comparisons, not two per row."""
 
     __slots__ = ("_above", "_all", "_below", "_flags", "_least", "_most", "_values", "rows")
 
@@ -41,7 +41,7 @@ class Window:
         return self._flags.tobytes() == self._all  # faster than asking numpy whether all are true
 
     def broken(self) -> npt.NDArray[np.bool_]:
-        """(rows, joints) which are not, when `holds` was last asked."""
+        """(rows, joints) those that did not, at the last call of `holds`."""
         return ~(self._above & self._below).reshape(len(self.rows), -1)
 
 
@@ -54,7 +54,7 @@ def rows_of(kinds: Sequence[int], where: npt.NDArray[np.intp]) -> Rows:
 
 
 class Saturation:
-    """Which joints are cut in a tick, and by what."""
+    """The joints that are saturated in a tick, by kind of limit."""
 
     __slots__ = ("any", "joints", "kinds")
 
@@ -66,36 +66,36 @@ class Saturation:
     def clear(self) -> None:
         self.joints[:], self.kinds[:], self.any = False, False, False
 
-    def add(self, rows: Rows, cut: npt.NDArray[np.bool_], broken: npt.NDArray[np.bool_]) -> None:
-        """More joints.
+    def add(self, rows: Rows, saturated: npt.NDArray[np.bool_], broken: npt.NDArray[np.bool_]) -> None:
+        """Add joints.
 
         Args:
             rows: which of `kinds`, and which joints.
-            cut: (joints) whether it was.
-            broken: (rows, joints) whether the command was beyond that kind of limit; where it was beyond none, a soft
-                limit has cut it.
+            saturated: (joints) whether each is.
+            broken: (rows, joints) whether the command exceeds that kind of limit; if it exceeds none of them, a soft
+                limit has saturated it.
         """
         self.any = True
         where = rows[1]
-        self.joints[where] |= cut
-        known = broken & cut
+        self.joints[where] |= saturated
+        known = broken & saturated
         self.kinds[rows] |= known
-        self.kinds[SOFT, where] |= cut & ~known.any(axis=0)
+        self.kinds[SOFT, where] |= saturated & ~known.any(axis=0)
 
 
 ALL: Final = 1.0 - 1e-6
-"""Share of its limit from which on a motor gives all; engines hold the limit as an impulse of a step, and round."""
+"""Share of its limit above which a motor counts as saturated; engines keep the limit as an impulse, with rounding."""
 
 
 class MotorLimits:
-    """Looks at measured efforts for motors at their limits.
+    """Detects motors at their limits from measured efforts.
 
     Args:
         robot: the robot.
-        pressing: joints that stand at their limits by intent: those of hands, which press on what they hold.
+        pressing: joints that are at their limits by intent: those of hands, which press on what they hold.
 
     Attributes:
-        watches: whether there is anything to look at; without, `count` need not be called.
+        watches: whether there is any such motor; otherwise `count` need not be called.
     """
 
     def __init__(self, robot: RobotModel, *, pressing: Collection[str] = ()) -> None:
@@ -106,22 +106,22 @@ class MotorLimits:
         self.watches = False
 
     def select(self, modes: Sequence[Mode]) -> None:
-        """From now on each joint (n) obeys this."""
+        """Set the modes (n) of the joints."""
         driven = np.array([mode in ("position", "velocity") for mode in modes], dtype=np.bool_)
         self._at = np.flatnonzero(driven & self._may)
         self._own = self._limits[self._at]
         self.watches = len(self._at) > 0
 
-    def count(self, effort: Array, cut: npt.NDArray[np.bool_], *counts: npt.NDArray[np.int64]) -> None:
-        """Adds 1 to each of the `counts` (n) of joints whose motor gave all in the last tick.
+    def count(self, effort: Array, saturated: npt.NDArray[np.bool_], *counts: npt.NDArray[np.int64]) -> None:
+        """Adds 1 to each of the `counts` (n) of joints whose motor was at its limit in the last tick.
 
         Args:
             effort: (n) measured [N m or N].
-            cut: (n) of whom the command of that tick was cut, which is counted already.
+            saturated: (n) joints whose command was saturated in that tick, which are counted already.
             counts: (n), changed in place.
         """
         at = self._at
-        full = (np.abs(effort[at]) >= self._own) & ~cut[at]
+        full = (np.abs(effort[at]) >= self._own) & ~saturated[at]
         if full.any():
             for each in counts:
                 each[at] += full

@@ -1,4 +1,4 @@
-"""Whether sampled loops are stable: the poles of a robot's joints, held by gains, from one control tick to the next.
+"""Stability of sampled joint control loops: their poles from one control tick to the next.
 
 Between two ticks the effort is held, and the joints move as M a = u - B v (gravity and what depends on the velocity
 squared left out), in `substeps` steps of semi-implicit Euler as engines take them, v' = v + s a, q' = q + s v', where
@@ -6,8 +6,8 @@ stiff damping acts on v' so that none runs away, or exactly where `substeps` is 
 
     u = -P q - D v - I z,    z the integral of q, a sum over the ticks
 
-or the u of `delay` ticks before. With x = (q, v, z, and the efforts on their way) x' = A x, and the loop is stable when
-all eigenvalues of A lie inside of the unit circle (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 4.3).
+or the u of `delay` ticks before. With x = (q, v, z, delayed efforts), x' = A x, and the loop is stable if all
+eigenvalues of A lie inside the unit circle (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 4.3).
 
 For one joint without damping, delay and integral, exactly: kd > kp h / 2 and kd < 2 I / h. In one step of Euler: kd > 0
 and kd < 2 I / h - kp h / 2.
@@ -27,14 +27,13 @@ from manipcli.core.geometry import Array
 from manipcli.model.damping import implicit_damping
 
 MARGINAL: Final = 1e-9
-"""A pole this near to the unit circle counts as outside of it."""
+"""A pole this near to the unit circle counts as unstable."""
 SLOW: Final = 1e-6
-"""An integral that does less than this share of its stiffness in a tick, i h < SLOW p, has its pole at 1 but for
-rounding."""
+"""A slow integral, i h < SLOW p, has its pole at 1 within rounding."""
 RINGING: Final = 0.5
-"""A pole that changes its sign every tick may be no larger."""
+"""Largest magnitude of a pole that changes its sign every tick."""
 MOST_GAIN: Final = 1e6
-"""A margin that is larger is not looked for."""
+"""Upper bound for gain margins."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,18 +84,18 @@ class Loop:
         )
 
     def scaled(self, gains: float) -> Loop:
-        """With all gains this many times as large."""
+        """The loop with all gains multiplied by this factor."""
         return replace(self, p=self.p * gains, d=self.d * gains, i=self.i * gains)
 
 
 def transition(loop: Loop) -> Array:
-    """A (m, m): x = (q, v, z, efforts on their way) at the next tick; z of joints with an integral gain."""
+    """A (m, m): x = (q, v, z, delayed efforts) at the next tick; z of joints with an integral gain."""
     n = len(loop.p)
     F, G = _held(loop)
     summed = np.flatnonzero(loop.i)
     delay = np.zeros(n, dtype=np.int64) if loop.delay is None else loop.delay
     most = int(delay.max(initial=0))
-    first = 2 * n + len(summed)  # of the efforts on their way, the latest command first
+    first = 2 * n + len(summed)  # of the delayed efforts, the latest command first
     rows = first + most * n
     A = np.zeros((rows, rows))
     law = np.zeros((n, rows))
@@ -149,10 +148,10 @@ def poles(loop: Loop) -> npt.NDArray[np.complex128]:
 
 
 def is_stable(loop: Loop) -> bool:
-    """Whether all poles lie inside of the unit circle.
+    """Whether all poles lie inside the unit circle.
 
-    A joint without a p gain has one at 1, which is left out; and so is that of a slow integral, at 1 - i h / p: none
-    leaves the circle there while i and p are positive, as det(A - 1) goes with their product.
+    A joint without a p gain has a pole at 1, which is ignored; so is that of a slow integral, at 1 - i h / p: no pole
+    leaves the circle there while i and p are positive, because det(A - 1) is proportional to their product.
     """
     found = poles(loop)
     slow = (loop.i > 0.0) & (loop.i * loop.period < SLOW * loop.p)
@@ -163,7 +162,7 @@ def is_stable(loop: Loop) -> bool:
 
 
 def unstable_share(loop: Loop) -> tuple[complex, Array]:
-    """The largest pole, and the share (n) that each joint has in its mode: the power d |v|^2 of its damping, sum 1."""
+    """The largest pole, and the share (n) of each joint in its mode: the power d |v|^2 of its damping, with sum 1."""
     values, vectors = np.linalg.eig(transition(loop))
     worst = int(np.argmax(np.abs(values)))
     n = len(loop.p)
@@ -172,41 +171,41 @@ def unstable_share(loop: Loop) -> tuple[complex, Array]:
 
 
 def gain_margin(loop: Loop) -> float:
-    """By what factor all gains may grow until the loop is unstable; 0 where it is already, at most `MOST_GAIN`."""
+    """Factor on all gains at which the loop becomes unstable; 0 if it is unstable already, at most `MOST_GAIN`."""
     if not is_stable(loop):
         return 0.0
     return boundary(loop.scaled)
 
 
 def largest_damping(loop: Loop) -> float:
-    """The largest d of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
+    """The largest d of a stable loop of one joint, with its other gains; 0 if there is none."""
     unit = math.sqrt(float(loop.p[0]) * float(loop.mass[0, 0])) or float(loop.mass[0, 0]) / loop.period
-    # From the stable middle upwards: with little damping a loop may be unstable, too.
+    # Upwards from the first stable value: with little damping a loop may be unstable, too.
     return _largest(lambda d: replace(loop, d=d), unit, 10.0 ** np.arange(-3.0, 4.0, 0.25))
 
 
 def largest_stiffness(loop: Loop) -> float:
-    """The largest p of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
+    """The largest p of a stable loop of one joint, with its other gains; 0 if there is none."""
     return _largest(lambda p: replace(loop, p=p), float(loop.mass[0, 0]) / loop.period**2, [1e-9])
 
 
 def largest_integral(loop: Loop) -> float:
-    """The largest i of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
+    """The largest i of a stable loop of one joint, with its other gains; 0 if there is none."""
     return _largest(lambda i: replace(loop, i=i), float(loop.p[0]) / loop.period, [1e-6])
 
 
 def _largest(loop_with: Callable[[Array], Loop], unit: float, starts: Iterable[float]) -> float:
-    """The largest stable gain above the first stable one of `starts`, in units of `unit`; 0 where there is none."""
+    """The largest stable gain above the first stable one of `starts`, in units of `unit`; 0 if there is none."""
 
     def loop_at(factor: float) -> Loop:
         return loop_with(np.array([unit * factor]))
 
-    start = next((float(one) for one in starts if unit > 0.0 and is_stable(loop_at(float(one)))), None)
+    start = next((float(gain) for gain in starts if unit > 0.0 and is_stable(loop_at(float(gain)))), None)
     return 0.0 if start is None else unit * boundary(loop_at, start=start)
 
 
 def boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
-    """The first factor above `start`, where the loop is stable, at which it is not; within 0.1 %."""
+    """The first factor above the stable `start` at which the loop is unstable; within 0.1 %."""
     low = start
     while is_stable(loop_at(2.0 * low)):
         low *= 2.0
@@ -220,13 +219,13 @@ def boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
 
 
 def velocity_loop_poles(*, p: float, i: float = 0.0, d: float = 0.0, period: float) -> npt.NDArray[np.complex128]:
-    """Poles, the largest first, of a joint whose velocity is commanded and comes true at once: 3; 2 without i.
+    """Poles, the largest first, of a joint with ideal velocity tracking: 3, or 2 without i.
 
-    v = -p q - i z - d v_before, q' = q + period v, z' = z + period q: there is no inertia in it, and no delay.
+    v = -p q - i z - d v_before, q' = q + period v, z' = z + period q: without inertia and delay.
     """
     law = np.array([-p, -i, -d])
     A = np.array([[1.0, 0.0, 0.0] + period * law, [period, 1.0, 0.0], law])
-    found = np.linalg.eigvals(A if i else A[::2, ::2])  # z, which is not fed back, would stand at 1
+    found = np.linalg.eigvals(A if i else A[::2, ::2])  # z, which is not fed back, has its pole at 1
     return np.asarray(found[np.argsort(-np.abs(found))], dtype=np.complex128)
 
 

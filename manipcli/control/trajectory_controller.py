@@ -1,6 +1,6 @@
-"""The joint trajectory controller: what it does at each tick, and what it is told in between.
+"""Joint trajectory controller: its goals, and its update at each tick.
 
-The laws are told in `controllers/joint_trajectory.py`.
+`controllers/joint_trajectory.py` has the control laws.
 """
 
 from __future__ import annotations
@@ -35,57 +35,57 @@ from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Rol
 
 
 class JointTrajectoryController:
-    """One goal at a time; holds in between.
+    """Executes one goal at a time, and holds in between.
 
     Activation (the first update) holds the measured position. A goal begins at the first update after `send_goal`, or
     at its start time, from the reference (so that the command makes no step), and is sampled once for every tick of
-    that update's period. Until then, and for joints that it leaves out, the path before is followed. It succeeds at or
-    after its end, when all joints are inside their goal tolerances at the same tick; it is aborted when a joint leaves
-    its path tolerance before (and at its first tick), or is outside its goal tolerance `goal_time` after the end. After
-    a success the last position is held at rest; after a cancel the reference is brought to rest and held: all joints on
-    their straight path, or each by itself where a position limit is near.
+    that update's period. Until then, and for joints that it leaves out, the previous trajectory is followed. It
+    succeeds at or after its end, when all joints are inside their goal tolerances at the same tick; it is aborted when
+    a joint exceeds its path tolerance before (also at its first tick), or is outside its goal tolerance `goal_time`
+    after the end. After a success the last position is held at rest; after a cancel the reference is brought to rest
+    and held: all joints on their straight path, or each by itself if a position limit is near.
 
-    Where ROS 1 and 2 differ, `compat` chooses; without it the safer of the two is done:
+    Where ROS 1 and 2 differ, `compat` chooses; without it the safer rule applies:
 
         ==========================  =======================  ======================  ========================
         what                        None                     ros1                    ros2
         ==========================  =======================  ======================  ========================
         integral of the PID         acts one step late       acts at once            acts one step late
-        after an abort              holds what is measured   the trajectory goes on  holds what is measured
-        goal_time: 0                no grace                 no grace                waits without end
-        a goal that is preempted    aborted, INVALID_GOAL    canceled                aborted, INVALID_GOAL
+        after an abort              hold measured position   trajectory continues    hold measured position
+        goal_time: 0                no grace                 no grace                unlimited
+        a preempted goal            aborted, INVALID_GOAL    canceled                aborted, INVALID_GOAL
         ==========================  =======================  ======================  ========================
 
     Args:
         name: of the controller.
         joints: (n) distinct names.
-        command_interfaces: what the command is, one row each: [position], [position, velocity], [position, velocity,
-            acceleration], [velocity], [effort] or [position, effort]; one alone need not stand in a list.
-        state_interfaces: what may be read: [position], and velocity, and acceleration; needed by the commands.
+        command_interfaces: of the command, one row each: [position], [position, velocity], [position, velocity,
+            acceleration], [velocity], [effort] or [position, effort]; a single interface needs no list.
+        state_interfaces: measured values: [position], and velocity, and acceleration; as the commands need.
         gains: by joint name, a `GainsSpec` or its fields; needed for [effort] and [velocity].
-        constraints: tolerances; those of `stopped_velocity_tolerance` 0 and absent ones are not enforced.
-        limits: (n) of the joints; waypoints beyond them are refused.
-        types: (n) joint types: a `continuous` joint takes the shortest way and its error is the shortest angle.
-        feed_forward: what the manager shall add to the effort.
+        constraints: tolerances; absent ones, and a `stopped_velocity_tolerance` of 0, are not enforced.
+        limits: (n) of the joints; waypoints beyond them are rejected.
+        types: (n) joint types: a `continuous` joint takes the shortest rotation, and its error is the shortest angle.
+        feed_forward: added to the effort by the manager.
         compat: see above.
         allow_partial_joints_goal: accept goals that leave joints out.
-        allow_nonzero_velocity_at_trajectory_end: accept goals that do not end at rest; they are held at rest.
-        allow_integration_in_goal_trajectories: accept points of velocities or accelerations alone.
-        allow_trajectory_replacement: a new goal goes on from the path before; else that ends where the reference is.
+        allow_nonzero_velocity_at_trajectory_end: accept goals that do not end at rest; their last position is held.
+        allow_integration_in_goal_trajectories: accept points with only velocities or accelerations.
+        allow_trajectory_replacement: a new goal continues from the previous trajectory; otherwise that ends at once.
         interpolation_method: `splines`, or `none` to step to the next point.
-        interpolate_from_desired_state: goals start from the reference; else from what is measured.
-        cmd_timeout: [s] after its end a goal that is not reached is aborted, and its last position held; 0: never.
-            Only where it is above goal_time.
-        stop_trajectory_duration: [s] a cancel stops in this time; 0: by deceleration.
-        speed_scaling: seconds of a trajectory a second, at first.
-        positions_upsampling: points of positions alone get the velocities of a spline.
+        interpolate_from_desired_state: goals start from the reference; otherwise from the measured state.
+        cmd_timeout: [s] after its end, when a goal that is not reached is aborted, and its last position held; 0:
+            never. Only effective above goal_time.
+        stop_trajectory_duration: [s] of the stop after a cancel; 0: by deceleration.
+        speed_scaling: initial trajectory seconds per second.
+        positions_upsampling: points with only positions get the velocities of a spline.
 
     Attributes:
-        notes: what of this was not taken as it was said, and why.
+        notes: arguments that have no effect, and why.
 
     Raises:
-        InvalidArgument: no or repeated joints, interfaces that do not go together, gains of an unknown joint, gains all
-            zero where they are needed, a negative time or speed.
+        InvalidArgument: no or duplicate joints, incompatible interfaces, gains of an unknown joint, gains all zero
+            where they are needed, a negative time or speed.
     """
 
     role: Role = "follower"
@@ -149,12 +149,12 @@ class JointTrajectoryController:
         self.notes: tuple[str, ...] = ()
         self._timeout = cmd_timeout if cmd_timeout > self._constraints.goal_time else np.inf
         if 0.0 < cmd_timeout <= self._constraints.goal_time:
-            self.notes = (f"cmd_timeout {cmd_timeout:g} s is not above goal_time and counts for nothing",)
+            self.notes = (f"cmd_timeout {cmd_timeout:g} s has no effect: it is not above goal_time",)
 
         by_error = controlled_by_error(self.interfaces)
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
-        scale = np.array([each.ff_velocity_scale for each in chosen])
+        scale = np.array([gain.ff_velocity_scale for gain in chosen])
         self.output = ControllerOutput.of(n, len(self.interfaces))
         rows = self.output.rows
         self._reference = Reference(rows[:3], self.interfaces, velocity_scale=scale if by_error else None)
@@ -179,22 +179,22 @@ class JointTrajectoryController:
 
     @property
     def tolerances(self) -> Tolerances:
-        """Those of the goal, waiting or active, or else of the controller."""
+        """The tolerances of the goal, waiting or active, otherwise of the controller."""
         goal = self._next or self._goal
         return self._default_tolerances if goal is None else goal.tolerances
 
     @property
     def speed_scaling(self) -> float:
-        """Seconds of a trajectory a second."""
+        """Trajectory seconds per second."""
         return self._speed
 
     def set_speed_scaling(self, speed: float) -> bool:
-        """From the last update on, trajectories run so fast: 0 pauses, 1 is as they say. Stops are not scaled.
+        """Set the speed of trajectories from the last update on: 0 pauses, 1 is nominal. Stops are not scaled.
 
         The reference's velocity is multiplied by `speed`, its acceleration by the square.
 
         Returns:
-            False for a negative speed or none, which changes nothing.
+            False for a negative or non-finite speed, which has no effect.
         """
         if not 0.0 <= speed < np.inf:
             return False
@@ -205,16 +205,16 @@ class JointTrajectoryController:
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
     ) -> GoalHandle:
-        """Accepts a trajectory, whose joints may stand in another order; a goal before it ends.
+        """Accept a trajectory, with its joints in any order; the previous goal ends.
 
         Args:
-            trajectory: starts at the next update; a `TrajectoryGoal` may say another time, and tolerances.
+            trajectory: starts at the next update; a `TrajectoryGoal` may set another time, and tolerances.
             constraints: for this goal, instead of the controller's.
 
         Raises:
-            GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities over the limits (on
-                the way to the first point to come, too, once it is active), points that differ in what they give or
-                give what is not allowed, a velocity at the end, an end in the past. The goal before then goes on.
+            GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities above the limits (also
+                on the path to the next point, once it is active), points with different or forbidden fields, a velocity
+                at the end, an end in the past. The previous goal then continues.
         """
         goal = trajectory if isinstance(trajectory, TrajectoryGoal) else TrajectoryGoal(trajectory)
         ordered = check_goal(goal, self._facts, self._accepted, self._time)
@@ -235,7 +235,7 @@ class JointTrajectoryController:
         return handle
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        """Abort its goal and reset its state; the next update re-activates it."""
         for goal in (self._goal, self._next):
             if goal is not None:
                 goal.handle.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
@@ -265,12 +265,12 @@ class JointTrajectoryController:
         if reference.moving:
             reference.advance(time, period)
         if self._waiting:
-            self._turn(time, period, measured)
+            self._handle_requests(time, period, measured)
         np.subtract(self._desired, measured.position, self._error)
         np.subtract(self._desired_velocity, measured.velocity, self._error_rate)
         if self._wraps:
             shortest(self._error, self._facts)
-        # The largest error is at most their norm: nearly always this alone answers. NaN and infinity do not pass.
+        # The largest error is at most their norm, a quick test. NaN and infinity do not pass.
         if not math.hypot(*self._all_errors.tolist()) < self._bound:
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
@@ -287,14 +287,14 @@ class JointTrajectoryController:
         return self.output
 
     def _compare(self, measured: JointState) -> None:
-        """Writes the errors of this tick, once more."""
+        """Compute the errors of this tick for the present reference."""
         np.subtract(self._desired, measured.position, out=self._error)
         np.subtract(self._desired_velocity, measured.velocity, out=self._error_rate)
         if self._wraps:
             shortest(self._error, self._facts)
 
     def _look_closer(self, time: float, measured: JointState) -> None:
-        """Ends the goal where a joint left its path tolerance."""
+        """Abort the goal if a joint exceeds its path tolerance."""
         for what, values in (("position", measured.position), ("velocity", measured.velocity)):
             if not np.isfinite(values).all():
                 j = int(np.flatnonzero(~np.isfinite(values))[0])
@@ -320,8 +320,8 @@ class JointTrajectoryController:
         self._goal = None
         self._bound = np.inf
 
-    def _turn(self, time: float, period: float, measured: JointState) -> None:
-        """What was asked for since the last update: to be active, a new goal, to stop."""
+    def _handle_requests(self, time: float, period: float, measured: JointState) -> None:
+        """Carry out the requests since the last update: activation, a new goal, a stop."""
         self._waiting = False
         if not self._activated:
             self._activated = True
@@ -335,7 +335,7 @@ class JointTrajectoryController:
         self._next, self._stop = None, False
 
     def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
-        """The waiting goal becomes the active one: its references for every tick, once."""
+        """Make the waiting goal active, and sample its references for every tick."""
         reference = self._reference
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
         at = (measured.position, measured.velocity)
@@ -363,7 +363,7 @@ class JointTrajectoryController:
     def _cancel(self, handle: GoalHandle) -> None:
         handle.end("canceled", ErrorCode.SUCCESSFUL, f"canceled at t = {self._time:.3f} s", self._time)
         if self._next is not None and self._next.handle is handle:
-            self._next = None  # and the goal before ended when this one was sent: nobody wants its path any more
+            self._next = None  # the previous goal ended when this one was sent: its trajectory is dropped, too
         else:
             self._forget()
         self._stop = self._waiting = True

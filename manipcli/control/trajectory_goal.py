@@ -1,4 +1,4 @@
-"""Goals of joint trajectory controllers, and their validation; the interfaces that such a controller may command."""
+"""Goals of joint trajectory controllers and their validation; the interfaces of such controllers."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ REST = 1.2e-7
 
 POSITION_SLACK = 1e-6
 VELOCITY_SLACK = 1e-3
-"""What rounding may add: rad or m, and relative. A waypoint on its limit is not beyond it."""
+"""Tolerances for rounding: rad or m, and relative. A waypoint on its limit is not beyond it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointFacts:
-    """The joints of a controller: names, units of their positions, limits (n), infinite where there are none."""
+    """The joints of a controller: names, units of their positions, limits (n), infinite where there is no limit."""
 
     joints: tuple[str, ...]
     units: tuple[str, ...]
@@ -58,7 +58,7 @@ class JointFacts:
         )
 
     def some(self, joints: tuple[str, ...]) -> JointFacts:
-        """Of these joints alone."""
+        """The facts of these joints only."""
         if joints == self.joints:
             return self
         k = [self.joints.index(joint) for joint in joints]
@@ -85,11 +85,11 @@ class JointTolerance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrajectoryGoal:
-    """A trajectory and how it is wanted: control_msgs/FollowJointTrajectory's goal.
+    """A trajectory with its start time and tolerances: the goal of control_msgs/FollowJointTrajectory.
 
     Attributes:
-        trajectory: of all joints of the controller in any order, or of some where that is allowed.
-        start_time: [s] simulated time from which the trajectory's times count; 0: the next update.
+        trajectory: of all joints of the controller in any order, or of some if that is allowed.
+        start_time: [s] simulated time of the trajectory's time 0; 0: the next update.
         path_tolerance, goal_tolerance: instead of the controller's own; see `JointTolerance`.
         goal_time_tolerance: [s] likewise.
     """
@@ -103,7 +103,7 @@ class TrajectoryGoal:
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
-    """What goals a controller takes; the words are those of ROS 2's parameters."""
+    """Which goals a controller accepts; named as the parameters of ROS 2."""
 
     allow_partial_joints_goal: bool
     allow_nonzero_velocity_at_trajectory_end: bool
@@ -119,28 +119,28 @@ def check_goal(goal: TrajectoryGoal, facts: JointFacts, accepted: Acceptance, no
     """
     trajectory = goal.trajectory
     if not isinstance(trajectory, JointTrajectory):
-        raise GoalRejected("CTRL129", f"a goal of {type(trajectory).__name__}; expected a JointTrajectory")
+        raise GoalRejected("CTRL129", f"the goal is a {type(trajectory).__name__}; expected a JointTrajectory")
     names = _check_joints(trajectory, facts, accepted)
     if trajectory.orders is not None:
         k = int(np.flatnonzero(trajectory.orders != trajectory.orders[0])[0])
         raise GoalRejected(
             "CTRL122",
-            f"point {k} gives other things than point 0",
+            f"point {k} has other fields than point 0",
             hint="give velocities (and accelerations) at every point, or at none",
         )
     if trajectory.integrated and not accepted.allow_integration_in_goal_trajectories:
         message = "the trajectory has points without positions, and integrating them is not allowed"
-        hint = "give positions, or say allow_integration_in_goal_trajectories: true"
+        hint = "give positions, or set allow_integration_in_goal_trajectories: true"
         raise GoalRejected("CTRL126", message, hint=hint)
     if trajectory.efforts is not None and not accepted.efforts:
-        message = "the trajectory gives efforts, but the controller commands none"
-        raise GoalRejected("CTRL127", message, hint="take them out, or add effort to command_interfaces")
+        message = "the trajectory has efforts, but the controller commands no effort"
+        raise GoalRejected("CTRL127", message, hint="remove them, or add effort to command_interfaces")
     if not math.isfinite(goal.start_time) or goal.start_time < 0.0:
-        raise GoalRejected("CTRL128", f"a start time of {goal.start_time} s; expected 0 or more")
+        raise GoalRejected("CTRL128", f"the start time is {goal.start_time} s; expected 0 or more")
     if goal.start_time > 0.0 and goal.start_time + trajectory.duration < now:
         end = goal.start_time + trajectory.duration
         message = f"the trajectory ends at t = {end:.3f} s, {now - end:.3f} s ago"
-        raise GoalRejected("CTRL128", message, hint="leave the start time out to begin now")
+        raise GoalRejected("CTRL128", message, hint="omit the start time to begin now")
     ordered = trajectory.of_joints(names)
     own = facts.some(names)
     _check_limits(ordered, own)
@@ -154,7 +154,7 @@ def _check_joints(trajectory: JointTrajectory, facts: JointFacts, accepted: Acce
         if name not in facts.joints:
             raise GoalRejected(
                 "CTRL120",
-                f"joint '{name}' is not one of the controller's: {', '.join(facts.joints)}",
+                f"joint '{name}' is not a joint of the controller: {', '.join(facts.joints)}",
                 hint=did_you_mean(name, facts.joints, kind="joints"),
                 error_code=ErrorCode.INVALID_JOINTS,
             )
@@ -163,7 +163,7 @@ def _check_joints(trajectory: JointTrajectory, facts: JointFacts, accepted: Acce
         raise GoalRejected(
             "CTRL121",
             f"the trajectory has no values for joint '{left_out[0]}'",
-            hint="give all joints, or say allow_partial_joints_goal: true",
+            hint="give all joints, or set allow_partial_joints_goal: true",
             error_code=ErrorCode.INVALID_JOINTS,
         )
     return tuple(name for name in facts.joints if name in trajectory.names)
@@ -176,12 +176,12 @@ def _check_end(trajectory: JointTrajectory, facts: JointFacts, accepted: Accepta
     j = int(np.argmax(np.abs(last)))
     if abs(last[j]) > REST:
         message = f"the trajectory ends with joint '{facts.joints[j]}' at {last[j]:.6g} {facts.units[j]}/s, not at rest"
-        hint = "end at rest, or say allow_nonzero_velocity_at_trajectory_end: true"
+        hint = "end at rest, or set allow_nonzero_velocity_at_trajectory_end: true"
         raise GoalRejected("CTRL123", message, hint=hint)
 
 
 def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
-    if trajectory.source is None:  # else nobody knows the positions yet
+    if trajectory.source is None:  # otherwise the positions are not known yet
         positions = trajectory.positions
         beyond = (positions < facts.lower - POSITION_SLACK) | (positions > facts.upper + POSITION_SLACK)
         if beyond.any():
@@ -191,7 +191,7 @@ def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
         velocities, what, first = trajectory.velocities, "at point", 0
     elif trajectory.interpolation == "splines":
         velocities = np.diff(trajectory.positions, axis=0) / np.diff(trajectory.times)[:, None]
-        what, first = "on the way to point", 1
+        what, first = "on the path to point", 1
     else:
         return
     fast = np.abs(velocities) > facts.velocity * (1.0 + VELOCITY_SLACK)
@@ -201,7 +201,7 @@ def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
 
 
 def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalRejected:
-    """What a goal is refused with that asks joint `j` for a `velocity` beyond its limit."""
+    """The rejection of a goal with a `velocity` of joint `j` beyond its limit."""
     unit = facts.units[j] + "/s"
     most = float(facts.velocity[j])
     moves, limit = told_apart(velocity, most if velocity > 0.0 else -most, form=".6g")
@@ -224,9 +224,9 @@ def _beyond(facts: JointFacts, j: int, value: float, where: str) -> str:
 
 
 def outside_limits(positions: Array, facts: JointFacts, period: float) -> str | None:
-    """What first lies beyond a position limit in (T, n) references of consecutive ticks; None when nothing does.
+    """The first violation of a position limit in (T, n) references of consecutive ticks; None if there is none.
 
-    Curves can swing over between waypoints that are inside; the slack here is ten times as large for that reason.
+    Curves can overshoot between waypoints within the limits; the slack here is ten times as large for that reason.
     """
     slack = 10.0 * POSITION_SLACK
     if not ((positions.min(axis=0) < facts.lower - slack) | (positions.max(axis=0) > facts.upper + slack)).any():
@@ -236,7 +236,7 @@ def outside_limits(positions: Array, facts: JointFacts, period: float) -> str | 
 
 
 def shortest(error: Array, facts: JointFacts) -> None:
-    """Makes errors (n) of continuous joints the shortest angles, in place; at half a turn the sign stays."""
+    """Reduce errors (n) of continuous joints to the shortest angles, in place; at half a turn the sign is kept."""
     turns = np.ceil(np.abs(error) / math.tau - 0.5)
     error -= facts.continuous * math.tau * np.copysign(np.maximum(turns, 0.0), error)
 
@@ -253,23 +253,25 @@ READ: Final[tuple[tuple[Interface, ...], ...]] = COMMANDED[:3]
 
 
 def controlled_by_error(command_interfaces: Sequence[str]) -> bool:
-    """Whether a PID makes the command: a velocity or an effort alone."""
+    """Whether a PID computes the command: only a velocity or only an effort."""
     return tuple(command_interfaces) in {("velocity",), ("effort",)}
 
 
 def refused(command_interfaces: Sequence[str], state_interfaces: Sequence[str]) -> tuple[str, str] | None:
-    """What is wrong with such interfaces, and a hint; None when nothing is."""
+    """The problem with these interfaces, and a hint; None if they are valid."""
     for what, given, legal in (("command", command_interfaces, COMMANDED), ("state", state_interfaces, READ)):
-        for one in given:
-            if one not in get_args(Interface):
+        for interface in given:
+            if interface not in get_args(Interface):
                 known = get_args(Interface)
-                return f"unknown {what} interface '{one}'", did_you_mean(one, known, kind="interfaces") or ""
-        if len(set(given)) < len(given) or set(given) not in [set(one) for one in legal]:
-            sets = "; ".join(f"[{', '.join(one)}]" for one in legal)
-            return f"{what}_interfaces [{', '.join(given)}] are not a set that it serves", f"expected {sets}"
+                return f"unknown {what} interface '{interface}'", did_you_mean(
+                    interface, known, kind="interfaces"
+                ) or ""
+        if len(set(given)) < len(given) or set(given) not in [set(allowed) for allowed in legal]:
+            sets = "; ".join(f"[{', '.join(allowed)}]" for allowed in legal)
+            return f"{what}_interfaces [{', '.join(given)}] are not supported together", f"use one of {sets}"
     if "velocity" not in state_interfaces and (
         controlled_by_error(command_interfaces) or "effort" in command_interfaces
     ):
-        message = f"state_interfaces [{', '.join(state_interfaces)}] lack the velocity that commands of "
-        return message + f"[{', '.join(command_interfaces)}] need", "say state_interfaces: [position, velocity]"
+        message = f"state_interfaces [{', '.join(state_interfaces)}] lack the velocity, which commands of "
+        return message + f"[{', '.join(command_interfaces)}] need", "set state_interfaces: [position, velocity]"
     return None

@@ -1,4 +1,4 @@
-"""From what a trajectory controller follows to a new goal, and to rest."""
+"""Transitions of a trajectory controller: from the present reference to a new goal, and to rest."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from manipcli.spec.controllers import ConstraintsSpec
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transitions:
-    """How one controller does it; see `JointTrajectoryController` for the first five.
+    """Settings of one controller for transitions; see `JointTrajectoryController` for the first five.
 
     Attributes:
-        deceleration: (n) how fast each joint stops; infinite: at once.
-        together: whether all joints stop at the same time, on their straight path, where that is within their limits.
+        deceleration: (n) of each joint; infinite: it stops at once.
+        together: whether all joints stop at the same time, on their straight path, if their limits allow it.
     """
 
     facts: JointFacts
@@ -54,7 +54,7 @@ class Transitions:
         """`deceleration` and `together`."""
         if not constraints.decelerate_on_cancel:
             return np.full(len(facts.joints), np.inf), True
-        own = {joint: one.max_deceleration_on_cancel for joint, one in constraints.joints.items()}
+        own = {joint: constraint.max_deceleration_on_cancel for joint, constraint in constraints.joints.items()}
         chosen = [own.get(joint, 0.0) or limit for joint, limit in zip(facts.joints, facts.acceleration, strict=True)]
         return np.array(chosen), not any(own.values())
 
@@ -67,18 +67,18 @@ class Transitions:
         speed: float,
         measured: tuple[Array, Array],
     ) -> ActiveTrajectory:
-        """What is followed from `time` [s] on.
+        """The active trajectory from `time` [s] on.
 
         Args:
-            trajectory: its joints stand in the order of the controller.
-            later: [s] its time 0 is so much later; negative: its points up to now are left out.
-            reference: what is followed now.
+            trajectory: with its joints in the order of the controller.
+            later: [s] delay of its time 0; negative: its points up to now are left out.
+            reference: the present reference.
             time: now.
             speed: of the new trajectory.
             measured: position and velocity (n).
         """
         now = reference.row(time)
-        if speed not in (0.0, 1.0):  # in seconds of the trajectory; where it is paused, nothing moves
+        if speed not in (0.0, 1.0):  # in seconds of the trajectory; while it is paused, nothing moves
             now[VELOCITY] /= speed
             now[ACCELERATION] /= speed**2
         active = reference.now(time) if self.replaces else ActiveTrajectory.hold(now[POSITION], now[EFFORT])
@@ -104,21 +104,21 @@ class Transitions:
         period: float,
         actual: Array,
     ) -> None:
-        """Whether the first point still to come of a new goal can be reached from where it begins: |p - q| <= v_max T.
+        """Check that the next point of a new goal can be reached from its start: |p - q| <= v_max T.
 
-        Of a goal in the past, T is what is left of it at the next tick, at the least a period: where its end is over by
-        then, the reference steps there. Nobody knows exactly where the goal begins. It counts what is nearest of the
-        reference now, the reference one tick later, and what is measured: who sends goals knows one of them.
+        For a goal in the past, T is the time left at the next tick, at least a period: if the goal has ended by then,
+        the reference steps there. The exact start is not known: of the reference now, the reference one tick later, and
+        the measured position, the nearest counts, because the sender of a goal knows one of them.
 
         Args:
-            trajectory: its joints stand in the order of the controller.
+            trajectory: with its joints in the order of the controller.
             start_time: of the goal.
             reference, time: as for `to_goal`.
             period: [s] to the next tick, at which the goal begins.
-            actual: (n) what is measured now, continuous joints in the turn of the reference.
+            actual: (n) measured position; for continuous joints within half a turn of the reference.
 
         Raises:
-            GoalRejected: a joint would have to move faster than its limit, whatever the curve.
+            GoalRejected: a joint would exceed its velocity limit on every curve.
         """
         due = time + period
         later = start_time - due if start_time > 0.0 else 0.0
@@ -135,19 +135,19 @@ class Transitions:
         if not ahead:
             starts.append(actual)
         facts = self.facts.some(trajectory.names)
-        ways = trajectory.positions[k] - np.array(starts)[:, self._columns(trajectory.names)]
-        shortest(ways, facts)
-        way = np.take_along_axis(ways, np.abs(ways).argmin(axis=0)[None], axis=0)[0]
-        excess = np.abs(way) - facts.velocity * duration * (1.0 + VELOCITY_SLACK)
+        distances = trajectory.positions[k] - np.array(starts)[:, self._columns(trajectory.names)]
+        shortest(distances, facts)
+        nearest = np.take_along_axis(distances, np.abs(distances).argmin(axis=0)[None], axis=0)[0]
+        excess = np.abs(nearest) - facts.velocity * duration * (1.0 + VELOCITY_SLACK)
         if (excess > POSITION_SLACK).any():
             j = int(excess.argmax())
-            raise too_fast(facts, j, float(way[j]) / duration, f"on the way to point {k}")
+            raise too_fast(facts, j, float(nearest[j]) / duration, f"on the path to point {k}")
 
     def to_rest(self, reference: Reference, time: float) -> ActiveTrajectory:
-        """What is followed from `time` [s] on, until it rests; in seconds of real time.
+        """The active trajectory from `time` [s] on, until it rests; in seconds of real time.
 
-        Where that would take a joint beyond a position limit, each joint stops by itself: within the time that it needs
-        at its own deceleration, or that is given; before its limit even if it has to brake harder.
+        If that exceeds a position limit of a joint, each joint stops by itself: within the time given by its own
+        deceleration, or by the stop duration, but before its limit, even with a larger deceleration.
         """
         now = reference.row(time)
         if self.stop_duration > 0.0:
@@ -158,15 +158,15 @@ class Transitions:
             common = np.where(np.isfinite(self.deceleration), own.max(), 0.0)
             active = decelerating(now, common if self.together else own)
         room = self._room(now)
-        ways = np.abs(active.sample(np.array([active.end]))[0, POSITION] - now[POSITION])
-        if (ways <= room + POSITION_SLACK).all():
+        distances = np.abs(active.sample(np.array([active.end]))[0, POSITION] - now[POSITION])
+        if (distances <= room + POSITION_SLACK).all():
             return active
         rate = np.abs(now[VELOCITY])
         latest = np.divide(2.0 * room, rate, out=np.zeros_like(rate), where=rate > 0.0)
         return decelerating(now, np.minimum(own, latest))
 
     def _room(self, row: Array) -> Array:
-        """(n) how far each joint may go on in the direction in which it moves; beyond its limit: not at all."""
+        """(n) distance of each joint to its limit in its direction of motion; 0 beyond the limit."""
         ahead = np.where(row[VELOCITY] > 0.0, self.facts.upper - row[POSITION], row[POSITION] - self.facts.lower)
         return np.asarray(np.maximum(ahead, 0.0))
 
@@ -184,18 +184,18 @@ def lead_in(
     smooth: bool,
     interpolation: Interpolation,
 ) -> JointTrajectory:
-    """The trajectory from `start` on.
+    """The trajectory with a lead-in from `start`.
 
-    The start becomes a point at time 0 of what the trajectory's points give, unless the first point is at 0 itself.
+    The start becomes a point at time 0, with the same fields as the points, unless the first point is at 0 itself.
     Continuous joints of the trajectory are shifted by whole turns, so that its first point is the nearest.
 
     Args:
         trajectory: of the joints of `facts`.
-        start: (4, n) where it begins: position, velocity, acceleration, effort.
+        start: (4, n) position, velocity, acceleration, effort.
         facts: of its joints.
-        ago: [s] its time 0 was so long ago (negative: will be); of its points those that are still to come are left.
-        smooth: whether points that give positions alone get the velocities of a spline.
-        interpolation: `none` also where the trajectory does not say so.
+        ago: [s] time since its time 0 (negative: until then); only its remaining points are kept.
+        smooth: whether points with only positions get the velocities of a spline.
+        interpolation: `none` overrides that of the trajectory.
     """
     if trajectory.source is not None:
         begin = TrajectoryPoint(start[0], 0.0, start[1], start[2], start[3])
@@ -230,12 +230,12 @@ def lead_in(
 
 
 def first_to_come(times: Array, ago: float) -> int:
-    """Which of the points at `times` (K) is the first that comes later than `ago`; the last where none does."""
+    """Index of the first of the points at `times` (K) that is later than `ago`; the last if there is none."""
     return min(int(np.searchsorted(times, ago, side="right")), len(times) - 1)
 
 
 def _remaining(trajectory: JointTrajectory, ago: float) -> JointTrajectory:
-    """The points of a trajectory that come later than `ago` [s] of it, at the least the last, from then on."""
+    """The points of a trajectory later than `ago` [s], at least the last, with `ago` as the new time 0."""
     first = first_to_come(trajectory.times, ago)
 
     def kept(values: Array | None) -> Array | None:

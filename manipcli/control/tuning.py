@@ -1,18 +1,17 @@
-"""Gains for a bandwidth and a damping ratio, and how the sampled loop answers a step with them.
+"""Gains for a bandwidth and a damping ratio, and the step response of the sampled loop.
 
-A joint of inertia I and viscous friction b under u = p e + d de/dt swings, continuously, with p = I w^2 and
-d = 2 zeta I w - b; I is the largest inertia that the joint meets while the others stand, so that nowhere it is damped
-less. A joint that its friction slows down more than that, b > 2 I w, creeps after the reference at p / b: p = b w / 2.
-On a velocity interface the reference is followed with u = v + p e, p = w. Where it must be,
+A joint of inertia I and viscous friction b under u = p e + d de/dt has, in continuous time, p = I w^2 and
+d = 2 zeta I w - b. I is the largest inertia of the joint while the others are held, so that the damping ratio is
+nowhere smaller. A joint with more friction than that, b > 2 I w, lags the reference with the rate p / b: p = b w / 2.
+On a velocity interface u = v + p e, p = w. If necessary,
 
-- w is raised where the joint of a hand would press with less than all its effort, all the way through its travel;
-- w is lowered until the step asks for no more than what gravity leaves of the effort (or for no more than the
-  velocity);
-- first zeta, down to `LEAST_DAMPING`, then w is lowered until all gains could be `MARGIN` times as large before the
-  loop is unstable (`stability.py`) at the smallest inertia, and before all loops together are in any posture: an arm
-  that is stretched out now and then straight up has a hundred times less inertia about its first joint.
+- w is raised until the joint of a hand presses with all its effort, over its whole travel;
+- w is lowered until the step needs at most the effort left by gravity (or at most the velocity limit);
+- first zeta, down to `LEAST_DAMPING`, then w is lowered until the gain margin (`stability.py`) is `MARGIN` at the
+  smallest inertia of each joint, and of all loops together in every configuration: an arm that points straight up has
+  a hundred times less inertia about its first joint than one that is stretched out.
 
-The answer to a step is that of the joint alone, without gravity: decoupled, sampled, and with its effort limit.
+The step response is that of the joint alone, without gravity: decoupled, sampled, and with its effort limit.
 """
 
 from __future__ import annotations
@@ -31,26 +30,26 @@ from manipcli.core.geometry import Array
 from manipcli.model.damping import implicit_damping
 
 MARGIN: Final = 2.0
-"""All gains together could be so much larger."""
+"""Required gain margin: a factor on all gains together."""
 LEAST_DAMPING: Final = 0.3
-"""Ratio at the largest inertia, where the control step allows no more."""
+"""Least damping ratio at the largest inertia, if the control period limits it."""
 SLOW_INTEGRAL: Final = 0.1
-"""Of the frequency of the loop: how fast an integral takes over where nothing carries the weight."""
+"""Frequency of the integral relative to the loop, if gravity is not compensated."""
 WEIGHTLESS: Final = 1e-6
-"""Of the effort: what carries no more has no weight to hold, only rounding."""
+"""Share of the effort below which a gravity load counts as rounding."""
 SETTLED: Final = 0.02
-"""Of the step: closer for good counts as settled."""
+"""Relative band of the settled step response."""
 LEAST_FREQUENCY: Final = 1e-3
-"""[rad/s] where no slower one is looked for."""
+"""[rad/s] Lower bound for natural frequencies."""
 LONGEST: Final = 6.0
-"""[s] of a step."""
+"""[s] Upper bound for the duration of a step response."""
 
 Limit = Literal["", "control step", "other joints", "effort", "velocity"]
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is wanted of every loop.
+    """Requirements for every loop.
 
     Attributes:
         bandwidth: natural frequency [Hz].
@@ -67,12 +66,12 @@ class Wish:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepAnswer:
-    """How a joint answers a step of its reference.
+    """Step response of a joint.
 
     Attributes:
         size: of the step [rad or m].
         times: (T,) [s].
-        share: (T,) of the step that is done: 1 at its end.
+        share: (T,) of the step: 1 at its end.
     """
 
     size: float
@@ -81,12 +80,12 @@ class StepAnswer:
 
     @property
     def overshoot(self) -> float:
-        """Of the step, 0 or more."""
+        """Overshoot as a share of the step, 0 or more."""
         return max(0.0, float(self.share.max()) - 1.0)
 
     @property
     def settling_time(self) -> float:
-        """[s] after which it stays within `SETTLED`; infinite where it does not in this time."""
+        """[s] after which it stays within `SETTLED`; infinite if it does not settle in this time."""
         away = np.flatnonzero(np.abs(self.share - 1.0) > SETTLED)
         if not len(away):
             return 0.0
@@ -99,14 +98,14 @@ class Tuned:
 
     Attributes:
         controller, joint, interface: whose gains.
-        inertia: of the design, the most that it meets [kg m2 or kg]; `least`: the smallest.
-        p, i, d: the gains; `i_clamp`: the most effort of the integral, None where i is 0.
+        inertia: of the design, the largest [kg m2 or kg]; `least`: the smallest.
+        p, i, d: the gains; `i_clamp`: effort limit of the integral, None if i is 0.
         frequency, damping: natural frequency [Hz] and damping ratio at `inertia`.
-        bandwidth: where the reference comes through with 1 / sqrt 2 [Hz], of the sampled loop.
-        margin: by what factor all gains may grow, at `least`, before the loop is unstable.
-        limited_by: what keeps it from what was wanted; "" where nothing does.
-        predicted: the answer to a step.
-        simulated: the same of the whole robot in an engine, where that was asked for.
+        bandwidth: -3 dB frequency of the sampled loop from reference to position [Hz].
+        margin: gain margin at `least`, a factor on all gains.
+        limited_by: what keeps it from the requirements; "" if they are met.
+        predicted: the step response.
+        simulated: the step response of the whole robot in an engine, if requested.
     """
 
     controller: str
@@ -129,7 +128,7 @@ class Tuned:
 
 @dataclass(frozen=True, slots=True)
 class _Draft:
-    """What is wanted of one joint, before its gains are written down in three digits."""
+    """Design of one joint, before its gains are rounded to three digits."""
 
     inertia: float
     friction: float  # viscous, of the joint itself
@@ -159,11 +158,11 @@ def tune_efforts(
 
     Args:
         controllers: (k) whose gains.
-        load: what the joints meet.
-        wish: what is wanted.
+        load: of the joints.
+        wish: the requirements.
         steps: (k) that do not saturate [rad or m].
-        carried: (k) whether something else carries the weight, so that no integral is needed.
-        pressing: (k) the least p that is wanted, of joints that press on what they hold; 0 of others.
+        carried: (k) whether gravity is compensated, so that no integral is needed.
+        pressing: (k) the least p of joints that press on what they hold; 0 for others.
     """
     w = math.tau * wish.bandwidth
     inertia = load.held_inertia.max(axis=0)
@@ -205,14 +204,14 @@ def _loop(load: JointSpaceLoad, k: int, inertia: float, gains: tuple[float, floa
 
 
 def _softer(draft: _Draft, limit: Limit) -> _Draft:
-    """A twentieth less damping gain, at the cost of the damping ratio as long as that is not the least."""
+    """Reduce the damping gain by 5 %, by the damping ratio until that is at its least."""
     if draft.damping > LEAST_DAMPING:
         return replace(draft, damping=max(0.95 * draft.damping, LEAST_DAMPING), limit=limit)
     return replace(draft, w=0.95 * draft.w, limit=limit)
 
 
 def _calmed(load: JointSpaceLoad, k: int, draft: _Draft, wish: Wish) -> _Draft:
-    """With the margin at the least inertia."""
+    """The draft with the required gain margin at the least inertia."""
     least = float(load.own_inertia[:, k].min())
     while draft.w > LEAST_FREQUENCY and not is_stable(_loop(load, k, least, draft.gains, wish).scaled(MARGIN)):
         draft = _softer(draft, "control step")
@@ -220,7 +219,7 @@ def _calmed(load: JointSpaceLoad, k: int, draft: _Draft, wish: Wish) -> _Draft:
 
 
 def _calm_together(load: JointSpaceLoad, drafts: list[_Draft], wish: Wish) -> None:
-    """With the margin of all loops together, in every posture; those that have the largest share give in."""
+    """Reduce the drafts until all loops together have the margin in every configuration, the largest shares first."""
     for mass in load.mass:
         for _ in range(400):
             p, i, d = (np.array(column) for column in zip(*(draft.gains for draft in drafts), strict=True))
@@ -233,18 +232,18 @@ def _calm_together(load: JointSpaceLoad, drafts: list[_Draft], wish: Wish) -> No
 
 
 def tightness(load: JointSpaceLoad, tuned: Sequence[Tuned], wish: Wish) -> Array:
-    """(T,) how near these gains come to what the control step allows: the largest eigenvalue of M^-1 (2 D h + P h^2),
-    which is 4 where they are unstable, in one step of Euler and for one joint exactly."""
-    p, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "d"))
+    """(T,) distance of these gains to the stability limit of the control period: the largest eigenvalue of
+    M^-1 (2 D h + P h^2), which is 4 at the limit (exact for one Euler step and one joint)."""
+    p, d = (np.array([getattr(gains, key) for gains in tuned]) for key in ("p", "d"))
     push = 2.0 * (d + load.damping) * wish.period + p * wish.period**2
-    # Of the same eigenvalues as M^-1 W, and symmetric: W^1/2 M^-1 W^1/2.
+    # W^1/2 M^-1 W^1/2 is symmetric and has the eigenvalues of M^-1 W.
     root = np.sqrt(push)
     return np.asarray(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(load.mass) * root)[:, -1])
 
 
 def least_margin(load: JointSpaceLoad, tuned: Sequence[Tuned], wish: Wish) -> float:
-    """By what factor all of these gains may grow in every posture; 0 where they are unstable in one."""
-    p, i, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "i", "d"))
+    """Least gain margin of these gains over all configurations; 0 if they are unstable in one."""
+    p, i, d = (np.array([getattr(gains, key) for gains in tuned]) for key in ("p", "i", "d"))
     late = np.array(load.latency)
     loops = (Loop(mass, p, d, i, load.damping, wish.period, wish.substeps, late) for mass in load.mass)
     return min(gain_margin(loop) for loop in loops)
@@ -280,9 +279,9 @@ def _tuned(load: JointSpaceLoad, k: int, controller: str, draft: _Draft, wish: W
 def tune_velocity(
     controller: str, joint: str, wish: Wish, *, step: float, inertia: float, velocity: float, acceleration: float
 ) -> Tuned:
-    """The gain of a joint on the velocity interface, whose velocities come true within `acceleration` [rad/s2 or m/s2].
+    """The gain of a joint on the velocity interface, with ideal tracking up to `acceleration` [rad/s2 or m/s2].
 
-    Per tick the error shrinks by 1 - p h: unstable from p h = 2.
+    Per tick the error is multiplied by 1 - p h: unstable from p h = 2.
     """
     w = math.tau * wish.bandwidth
     limits: list[tuple[float, Limit]] = [(2.0 / MARGIN / wish.period, "control step"), (velocity / step, "velocity")]
@@ -323,7 +322,7 @@ def tune_velocity(
 
 
 def bandwidth(loop: Loop) -> float:
-    """[Hz] up to which the reference of a loop of one joint comes through with at least 1 / sqrt 2."""
+    """-3 dB frequency [Hz] of a loop of one joint, from reference to position."""
     A = transition(loop)
     B = np.zeros(len(A))
     without = transition(replace(loop, p=np.zeros(1)))
@@ -346,7 +345,7 @@ def _last_through(scan: Array, through: Array) -> float:
 
 
 def step_answer(loop: Loop, step: float, *, effort: float, i_clamp: float | None = None) -> StepAnswer:
-    """A loop of one joint, at rest, whose reference steps by `step` [rad or m]; the effort is cut at -+ `effort`."""
+    """A loop of one joint, at rest, whose reference steps by `step` [rad or m]; the effort saturates at -+ `effort`."""
     inertia, damping = float(loop.mass[0, 0]), float(loop.damping[0])
     p, d, i = float(loop.p[0]), float(loop.d[0]), float(loop.i[0])
     clamp = math.inf if i_clamp is None else i_clamp
@@ -372,5 +371,5 @@ def step_answer(loop: Loop, step: float, *, effort: float, i_clamp: float | None
 
 
 def _ticks(rate: float, period: float) -> int:
-    """Long enough for what decays at `rate` [1/s]."""
+    """Number of ticks for a response that decays at `rate` [1/s]."""
     return max(10, math.ceil(min(max(10.0 / rate, 0.1), LONGEST) / period))

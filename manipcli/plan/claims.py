@@ -1,7 +1,7 @@
-"""Which controller commands which joints, and what of a step no controller could carry out.
+"""Claims of controllers on joints during planning, and the parts of a step that no controller can command.
 
-A trajectory goes to one active controller, and so does a goal of the hand: neither can be split. This is known from the
-files alone, step by step, so it is told before anything is planned.
+A trajectory goes to one active controller, and so does a goal of the hand: neither can be split. The files alone
+determine this for every step, so it is checked before anything is planned.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ _THIS_TYPE = "`type: gripper`"
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One controller: what steps may ask of it, what it commands of its joints while active, and whether it is; its
-    type and where it stands in the controllers file."""
+    """One controller: its role for steps, joints, command interfaces and state; its type and its place in the file."""
 
     name: str
     role: Role
@@ -41,59 +40,65 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """All controllers of a robot, at some moment of a task; `following`: the types that follow trajectories."""
+    """All controllers of a robot at one point of a task; `following`: the types that follow trajectories."""
 
     controllers: tuple[Claim, ...]
     following: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, spec: ControllersSpec, place: Callable[..., Place | None] = lambda *_: None) -> Claims:
-        """Those of a controllers file, at the start; `place` of a location in it."""
+        """The controllers of a file, as at the start; `place` gives the line and column of a location in it."""
         return cls(
             tuple(
                 Claim(
-                    name, one.role, one.joints, one.interfaces, one.active, one.type, place("controllers", name, "type")
+                    name,
+                    own.role,
+                    own.joints,
+                    own.interfaces,
+                    own.active,
+                    own.type,
+                    place("controllers", name, "type"),
                 )
-                for name, one in spec.controllers.items()
+                for name, own in spec.controllers.items()
             ),
-            following=tuple(name for name, one in type(spec).types.items() if one.role == "follower"),
+            following=tuple(name for name, kind in type(spec).types.items() if kind.role == "follower"),
         )
 
     def switched(self, activated: Sequence[str], deactivated: Sequence[str]) -> Claims:
-        """The same after a switch; a name of both is active."""
+        """The claims after a switch; a name in both lists is active."""
         controllers = tuple(
-            replace(one, active=one.name in activated or (one.active and one.name not in deactivated))
-            for one in self.controllers
+            replace(claim, active=claim.name in activated or (claim.active and claim.name not in deactivated))
+            for claim in self.controllers
         )
         return replace(self, controllers=controllers)
 
     @property
     def followers(self) -> tuple[Claim, ...]:
-        """Those that follow trajectories now."""
-        return tuple(one for one in self.controllers if one.active and one.role == "follower")
+        """The active controllers that follow trajectories."""
+        return tuple(claim for claim in self.controllers if claim.active and claim.role == "follower")
 
     @property
     def grippers(self) -> tuple[Claim, ...]:
-        """Those that open and close a hand now."""
-        return tuple(one for one in self.controllers if one.active and one.role == "hand")
+        """The active controllers that open and close a hand."""
+        return tuple(claim for claim in self.controllers if claim.active and claim.role == "hand")
 
     @property
     def hand(self) -> tuple[str, ...]:
-        """The joints that are a hand's: those of all gripper controllers, active or not."""
-        return tuple(dict.fromkeys(name for one in self.controllers if one.role == "hand" for name in one.joints))
+        """The joints of all gripper controllers, active or not."""
+        return tuple(dict.fromkeys(name for claim in self.controllers if claim.role == "hand" for name in claim.joints))
 
 
 def unknown_controller(claims: Claims, name: str, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if there is a controller of this name."""
-    known = [one.name for one in claims.controllers]
+    """A problem if no controller has this name, else empty."""
+    known = [claim.name for claim in claims.controllers]
     if name in known:
         return ()
-    message = f"there is no controller '{name}' in the controllers file"
+    message = f"controller '{name}' is not in the controllers file"
     return (Problem(loc, message, did_you_mean(name, known, kind="controllers")),)
 
 
 def arm_joints(robot: RobotModel, hand: Sequence[str]) -> tuple[str, ...]:
-    """The independent joints from the root to the tool that are not the hand's; none for a robot without a tool."""
+    """The independent joints from the root to the tool, without the hand's; empty for a robot without a tool."""
     by_child = {joint.child: joint for joint in robot.joints}
     link = "" if robot.tool is None else robot.tool.link
     found = []
@@ -106,85 +111,85 @@ def arm_joints(robot: RobotModel, hand: Sequence[str]) -> tuple[str, ...]:
 
 
 def unfollowed(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem, ...]:
-    """Empty if one controller follows trajectories of all these joints."""
+    """A problem unless one controller follows trajectories of all these joints."""
     followed = {name for claim in claims.followers for name in claim.joints}
     gripped = [
         name for name in joints if name not in followed and any(name in claim.joints for claim in claims.grippers)
     ]
     if gripped:
-        message = f"joint '{gripped[0]}' is moved by a gripper controller, which follows no trajectory"
-        return (Problem(loc, message, "`move`, `grasp` or `release` move the hand"),)
+        message = f"joint '{gripped[0]}' belongs to a gripper controller, which does not follow trajectories"
+        return (Problem(loc, message, "move the hand with `move`, `grasp` or `release`"),)
     owners = [claim for claim in claims.followers if set(joints) & set(claim.joints)]
     if len(owners) < 2:
-        return tuple(_sleeping(claims, "follower", name, loc) for name in joints if name not in followed)[:1]
+        return tuple(_unserved(claims, "follower", name, loc) for name in joints if name not in followed)[:1]
     shares = " and ".join(f"'{_first(joints, claim)}' ({claim.name})" for claim in owners)
-    hint = "move them one controller after the other, or give them one controller in the controllers file"
+    hint = "use one step per controller, or give the joints one controller in the controllers file"
     if not claims.hand:
-        hint += f"; if one of them moves a hand, give it {_THIS_TYPE}"
-    return (Problem(loc, f"joints of {len(owners)} controllers cannot be moved at once: {shares}", hint),)
+        hint += f"; if one of them moves a hand, change it to {_THIS_TYPE}"
+    return (Problem(loc, f"one step cannot move joints of {len(owners)} controllers: {shares}", hint),)
 
 
 def unmoved_joints(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem, ...]:
-    """Empty if one controller follows trajectories of these joints, and one moves those of them that are the hand's."""
+    """Problems unless one controller follows trajectories of the arm joints, and one gripper controller the hand's."""
     arm = [name for name in joints if name not in claims.hand]
     return unfollowed(claims, arm, loc) + (_not_one_hand(claims, loc) if len(arm) < len(joints) else ())
 
 
 def unmoved_tool(claims: Claims, robot: RobotModel, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if the robot has a tool, and one controller follows trajectories of the joints that move it."""
+    """A problem unless the robot has a tool, and one controller follows trajectories of the joints that move it."""
     if robot.tool is None:
         hint = "add `tool: {link: ...}` to the robot file"
-        return (Problem(loc, f"robot '{robot.name}' has no tool frame, so there is nothing to lead there", hint),)
+        return (Problem(loc, f"robot '{robot.name}' has no tool frame to move", hint),)
     joints = arm_joints(robot, claims.hand)
     if not joints:
-        hint = "say another link under `tool` in the robot file"
-        return (Problem(loc, f"no joint of robot '{robot.name}' moves its tool at link '{robot.tool.link}'", hint),)
+        hint = "set another link under `tool` in the robot file"
+        return (Problem(loc, f"no joint of robot '{robot.name}' moves its tool link '{robot.tool.link}'", hint),)
     return unfollowed(claims, joints, loc)
 
 
 def unmoved_hand(claims: Claims, robot: RobotModel, posture: str, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if one gripper controller moves the hand to this pose of the robot."""
+    """A problem unless one gripper controller moves the hand to this pose of the robot."""
     posed = set(robot.pose(posture).joints)
     if posed & set(claims.hand):
         return _not_one_hand(claims, loc)
     message, hint = f"pose '{posture}' has no joint that a gripper controller moves", _GRIPPER
-    owners = [one for one in claims.controllers if one.interfaces and posed & set(one.joints)]
+    owners = [claim for claim in claims.controllers if claim.interfaces and posed & set(claim.joints)]
     if len(owners) == 1 and not claims.hand:
         (owner,) = owners
-        message += f": its joints are those of controller {owner.described}, of type `{owner.type}`"
+        message += f": its joints belong to controller {owner.described} of type `{owner.type}`"
         mixed = bool(set(owner.joints) & set(arm_joints(robot, ())))
-        hint = f"take the hand's joints from '{owner.name}', and {_GRIPPER}" if mixed else f"give it {_THIS_TYPE}"
+        move = f"remove the hand's joints from '{owner.name}', and {_GRIPPER}"
+        hint = move if mixed else f"change it to {_THIS_TYPE}"
     return (Problem(loc, message, hint),)
 
 
 def no_hand(robot: RobotModel) -> Problem:
-    """What keeps a robot from every step with a hand."""
+    """The problem of a robot without a gripper controller, for every step that uses a hand."""
     return Problem((), f"no gripper controller moves a hand of robot '{robot.name}'", _GRIPPER)
 
 
 def _not_one_hand(claims: Claims, loc: Loc) -> tuple[Problem, ...]:
     if len(claims.grippers) < 2:
         moved = [name for claim in claims.grippers for name in claim.joints]
-        return tuple(_sleeping(claims, "hand", name, loc) for name in claims.hand if name not in moved)[:1]
+        return tuple(_unserved(claims, "hand", name, loc) for name in claims.hand if name not in moved)[:1]
     names = ", ".join(f"'{claim.name}'" for claim in claims.grippers)
-    message = f"a step moves one hand, and {len(claims.grippers)} gripper controllers move joints of hands: {names}"
-    return (Problem(loc, message, "give one gripper controller; one of type `joint_trajectory` moves other fingers"),)
+    message = f"{len(claims.grippers)} gripper controllers are active, but a step moves one hand: {names}"
+    return (Problem(loc, message, "keep one gripper controller; move other fingers with type `joint_trajectory`"),)
 
 
-def _sleeping(claims: Claims, role: Role, joint: str, loc: Loc) -> Problem:
-    """Nobody who is active does what a step asks of a joint."""
+def _unserved(claims: Claims, role: Role, joint: str, loc: Loc) -> Problem:
     what = "follows trajectories of" if role == "follower" else "opens and closes a hand with"
-    able = [one.name for one in claims.controllers if one.role == role and joint in one.joints]
+    able = [claim.name for claim in claims.controllers if claim.role == role and joint in claim.joints]
     if able:
-        message = f"controller '{able[0]}', which {what} joint '{joint}', is not active here"
+        message = f"controller '{able[0]}' is not active here; it {what} joint '{joint}'"
         return Problem(loc, message, f"add a step before it: `switch_controllers: {able[0]}`")
     message = f"no controller {what} joint '{joint}'"
     types = " or ".join(", ".join(f"`{name}`" for name in claims.following).rsplit(", ", 1))
-    hint = f"add the joint to a controller of a type that does, in the controllers file: {types}"
-    owner = next((one for one in claims.controllers if one.interfaces and joint in one.joints), None)
+    hint = f"add the joint to a controller of type {types} in the controllers file"
+    owner = next((claim for claim in claims.controllers if claim.interfaces and joint in claim.joints), None)
     if owner is not None:
-        message += f": it is one of controller {owner.described}, of type `{owner.type}`"
-        hint = f"give '{owner.name}' a type that does: {types}"
+        message += f": it belongs to controller {owner.described} of type `{owner.type}`"
+        hint = f"change the type of '{owner.name}' to {types}"
     return Problem(loc, message, hint)
 
 

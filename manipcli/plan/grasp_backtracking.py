@@ -1,4 +1,4 @@
-"""The search for a grasp with which all can be done: what cannot be placed as it is held may be held otherwise."""
+"""Backtracking over grasps: another grasp is tried when a later step cannot be planned with the present one."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
 
 MOST: Final = 7
-"""Grasps of an object that are tried before a task is refused."""
+"""Maximum number of grasps of an object before a task is refused."""
 
 
 class GraspBacktracking:
-    """Which grasps lead nowhere, by the step that takes the object: R_WT (3, 3) of the tool."""
+    """Grasps with which a later step cannot be planned, by the index of the grasping step: R_WT (3, 3) of the tool."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
@@ -24,19 +24,19 @@ class GraspBacktracking:
         self._latest: tuple[int, NotPlannable] | None = None
 
     def of(self, step: int) -> tuple[Array, ...]:
-        """Those that a step is not to use."""
+        """The grasps that a step must not use."""
         return self._grasps.get(step, ())
 
     def back(self, refusal: NotPlannable, done: Sequence[tuple[str, PlanningState]]) -> int:
-        """From which step on to plan again, where the one after those that are planned is refused.
+        """Index of the step from which to re-plan, when the step after the planned ones is refused.
 
         Args:
-            refusal: its own.
-            done: of each of the others its verb and its predicted end.
+            refusal: of that step.
+            done: verb and predicted end of each planned step.
 
         Raises:
-            NotPlannable: no grasp is left to try; of the refusals the one that came latest in the task. Or a value of
-                the step is the cause, with which no grasp helps.
+            NotPlannable: no grasp is left to try: the refusal of the latest step in the task. Or the cause is a value
+                of the step, which no other grasp changes.
         """
         if refusal.loc:
             raise refusal
@@ -47,15 +47,14 @@ class GraspBacktracking:
         while taken and done[taken - 1][1].carried is not None:
             taken -= 1
         tried = self.of(taken)
-        if taken < step and STEPS[done[taken][0]].regrasp is not None:
+        if taken < step and STEPS[done[taken][0]].alternative is not None:
             tried = self._grasps[taken] = (*tried, self._planner.tool_pose(done[taken][1]).R)
             if len(tried) < MOST:
                 return taken
-        raise _of_all(self._latest[1], len(tried))
+        raise _counted(self._latest[1], len(tried))
 
 
-def _of_all(refusal: NotPlannable, tried: int) -> NotPlannable:
-    """The refusal, telling how many grasps were `tried`."""
+def _counted(refusal: NotPlannable, tried: int) -> NotPlannable:
     if tried < 2:
         return refusal
     cause = f"{refusal.cause}; {tried} grasps were tried"

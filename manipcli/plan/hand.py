@@ -1,4 +1,4 @@
-"""What planning knows of hands: which joints make a finger, and where the fingers will stop on an object."""
+"""Hands in planning: which joints form a finger, and where the fingers stop on an object."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 
 STEPS = 40
-"""Points of the way of a closing hand at which contact is looked for."""
+"""Number of steps of a closing hand at which contact is checked."""
 SPEED = 1.0
-"""[rad/s or m/s] of a hand's references, where nobody says."""
+"""Default speed of a hand's references [rad/s or m/s]."""
 PRESSES = 1e-3
-"""[m] A finger that would stand deeper than this in what it is to let go of would still press on it."""
+"""[m] A finger that is deeper than this in the object to release still presses on it."""
 
 
 def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], ...]:
-    """Indices into the `joints` of a hand by finger: those that hang below the same first one of them."""
+    """Indices into the `joints` of a hand, by finger: joints below the same first joint form a finger."""
     mover = {joint.child: joint for joint in robot.joints}
     found: dict[str, list[int]] = {}
     for k, name in enumerate(joints):
@@ -34,7 +34,7 @@ def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], 
 
 
 def closing_speed(robot: RobotModel, joints: Sequence[str], stated: float | None) -> float:
-    """At which all references of a hand move [rad/s or m/s]: as stated, else no faster than its slowest joint may."""
+    """Speed of a hand's references [rad/s or m/s]: as stated, else at most the least velocity limit of its joints."""
     if stated is not None:
         return stated
     limits = (robot.joint(name).limits.velocity for name in joints)
@@ -47,13 +47,13 @@ def moved_links(robot: RobotModel, joints: Sequence[str]) -> frozenset[str]:
     return frozenset().union(*(robot.descendants(robot.joint(name).child) for name in driven))
 
 
-def ramp(here: Array, target: Array, way: Array) -> Array:
-    """(k, m): every joint on its way from `here` to `target` (m), each by as much as `way` (k) [rad or m] at most.
+def ramp(here: Array, target: Array, distance: Array) -> Array:
+    """(k, m): every joint moved from `here` towards `target` (m) by at most `distance` (k) [rad or m].
 
     This is how a gripper controller moves its references: all joints at one speed, the nearest arrives first.
     """
     delta = target - here
-    return np.asarray(here + np.clip(delta, -way[:, None], way[:, None]))
+    return np.asarray(here + np.clip(delta, -distance[:, None], distance[:, None]))
 
 
 def closed_on(
@@ -63,13 +63,13 @@ def closed_on(
 
     Args:
         robot: whose hand it is.
-        query: touches where hand and object do, and nowhere else.
+        query: checks the hand against the object, and nothing else.
         q: (n) all moving joints, the hand open.
         joints: (m) of the hand.
         target: (m) position of a hand that closes on nothing.
 
     Returns:
-        (n) the predicted position, and the links that touch then, as `robot/<link>`.
+        (n) the predicted position, and the links that touch there, as `robot/<link>`.
     """
     columns = robot.indices(joints)
     parts = fingers(robot, joints)
@@ -78,8 +78,8 @@ def closed_on(
     here = q[columns]
     position = np.array(q)
     touched: set[str] = set()
-    for way in np.linspace(0.0, float(np.max(np.abs(target - here))), STEPS + 1)[:, None]:
-        reference = ramp(here, target, way)[0]
+    for distance in np.linspace(0.0, float(np.max(np.abs(target - here))), STEPS + 1)[:, None]:
+        reference = ramp(here, target, distance)[0]
         position[columns] = np.where(moving, reference, position[columns])
         position = np.array(with_mimics(robot, position))
         if not query.touches(position):
@@ -95,8 +95,10 @@ def closed_on(
 
 
 def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequence[str]) -> str | None:
-    """The part of the hand of these `joints` that is deepest at `q` (n) in what the query looks at, by more than
-    `PRESSES`, as `robot/<link>`; None if no two fingers are: one alone does not hold, unless the hand has no other."""
+    """The deepest part, at `q` (n), of a hand that still holds what the query checks, as `robot/<link>`, else None.
+
+    A hand holds when at least two fingers (or its only one) are deeper than `PRESSES`.
+    """
     hits = [hit for hit in query.every(q) if hit.distance < -PRESSES]
     parts = fingers(robot, joints)
     found: list[tuple[float, str]] = []

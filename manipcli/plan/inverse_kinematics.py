@@ -8,8 +8,8 @@ weighed alike. One step solves
 over the joints that are free: a joint at its limit that would be pushed further out is held, and the step is solved
 again. Positions are then clamped to the limits, so every iterate is admissible.
 
-Of a goal that leaves a turn of the tool open, e and J lose what does not count: the part of the rotation about the
-goal's z axis, where the error is that between the two z axes; or all of it.
+A goal may leave part of the orientation open. e and J then omit that part: the rotation about the goal's z axis (the
+error is the angle between the two z axes), or the whole rotation.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from manipcli.core.text import number_of
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
 
-Open = Literal["nothing", "spin", "turn"]
-"""What a goal leaves open of the tool's orientation: nothing, how it is turned about its z axis, or all of it."""
+Open = Literal["nothing", "spin", "rotation"]
+"""The part of the tool's orientation that a goal leaves open: nothing, the rotation about its z axis, or all of it."""
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
 _ITERATIONS = 40  # of one try; fewer than 30 cost more restarts than they save
-_TRIES = 40  # random restarts; past these a pose is called unreachable
-_ENOUGH = 3  # solutions among which the nearest to the seed is taken
+_TRIES = 40  # random restarts; after these a pose counts as unreachable
+_ENOUGH = 3  # solutions, the nearest to the seed is used
 _AT_LIMIT = 1e-6  # rad or m
-_TURNED = math.radians(60.0)  # a pose missed by more is one to which the arm cannot turn its tool
-_FAR = 50.0  # m: a goal beyond this was hardly meant in metres
-_ALL = 6  # joints that it takes for any pose
+_TURNED = math.radians(60.0)  # an orientation missed by more is out of the arm's reach
+_FAR = 50.0  # m: a goal beyond this is probably in millimetres
+_ALL = 6  # joints needed for an arbitrary pose
 _UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """What an attempt ended with.
+    """Result of one attempt.
 
     Attributes:
         q: (n) all moving joints of the robot; only the solver's own differ from the seed.
@@ -65,15 +65,15 @@ class Solution:
         return self.position_error <= POSITION_TOLERANCE and self.angle_error <= ANGLE_TOLERANCE
 
     def explain(self) -> str:
-        """Why this attempt is no solution, for a message."""
+        """Why this attempt is not a solution, for a message."""
         away, turned = 1000.0 * self.position_error, math.degrees(self.angle_error)
         if away < 0.05 and turned < 0.05:
             near = f"{1000.0 * POSITION_TOLERANCE:.2g} mm and {math.degrees(ANGLE_TOLERANCE):.2g} deg"
-            text = f"the nearest pose is {away:.2g} mm and {turned:.2g} deg off, and up to {near} counts as reached"
-            return f"{text}: an arm of few joints cannot take every orientation"
+            text = f"the nearest pose is {away:.2g} mm and {turned:.2g} deg off, the tolerance is {near}"
+            return f"{text}: an arm of few joints cannot reach every orientation"
         text = f"the nearest pose is {away:.1f} mm and {turned:.1f} deg off"
         if self.at_limit:
-            return f"{text}, held back by the limits of {', '.join(self.at_limit)}"
+            return f"{text}, at the limits of {', '.join(self.at_limit)}"
         return f"{text}, out of reach"
 
 
@@ -107,13 +107,13 @@ class InverseKinematics:
         self._open: Open = "nothing"
 
     def leaving(self, open_: Open) -> InverseKinematics:
-        """The same for goals that leave so much of the orientation open."""
+        """The same solver for goals that leave this part of the orientation open."""
         other = copy(self)
         other._open = open_
         return other
 
     def drawn_in(self, margin: Array) -> InverseKinematics:
-        """The same within narrower limits: each joint's drawn in by its `margin` (m) [rad or m]."""
+        """The same solver with the limits of each joint narrowed by its `margin` (m) [rad or m]."""
         narrower = copy(self)
         narrower._lower, narrower._upper = self._lower + margin, self._upper - margin
         return narrower
@@ -132,18 +132,18 @@ class InverseKinematics:
     ) -> Array:
         """Joint positions (n) with the tool at `X_WT`, near `seed`.
 
-        The first try starts from `seed` and is taken when it converges. Else tries start from uniformly random
-        positions inside the limits, until three converge or 40 are spent; the nearest (Euclidean) to `seed` is taken.
+        The first attempt starts from `seed` and is used if it converges. Further attempts start from uniformly random
+        positions inside the limits, until three converge or 40 are made; the nearest (Euclidean) to `seed` is used.
 
         Args:
             X_WT: the goal.
             seed: (n) all moving joints.
             rng: draws the restarts.
-            refuse: (n) -> why these positions are no good (a collision), or None. Refused solutions do not count.
+            refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count.
 
         Raises:
-            NotPlannable: none converges; tells the best error, the distance to the goal, the joints at their limits.
-                Or all that converge are refused; tells why.
+            NotPlannable: no attempt converges; names the least error, the distance to the goal and the joints at their
+                limits. Or all solutions are rejected; names the reason.
         """
         seed = np.asarray(seed, dtype=np.float64)
         if not (np.isfinite(X_WT.p).all() and np.isfinite(X_WT.R).all() and np.isfinite(seed).all()):
@@ -176,25 +176,25 @@ class InverseKinematics:
             return min(found, key=lambda solution: float(np.linalg.norm(solution.q - seed))).q
         distance = float(np.linalg.norm(X_WT.p - self._kinematics.robot.X_WB.p))
         place = ", ".join(f"{value:.3f}" for value in X_WT.p)
-        turn = "" if self._open == "turn" else ", or change the orientation of the tool"
+        rotate = "" if self._open == "rotation" else ", or change the orientation of the tool"
         if refusal is not None:
             raise NotPlannable(
                 f"the arm reaches ({place}) m only where {refusal}",
-                hint=f"move the goal away from what is touched{turn}",
+                hint=f"move the goal away from the obstacle{rotate}",
                 reason="touches",
             )
-        hint = f"move the goal nearer{turn}"
+        hint = f"move the goal nearer{rotate}"
         kind: RefusalReason | None = None
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
-        elif self._open == "spin" and (alone := self.leaving("turn").track(X_WT, seed)).converged:
+        elif self._open == "spin" and (alone := self.leaving("rotation").track(X_WT, seed)).converged:
             off = float(np.degrees(np.arccos(np.clip(self.forward(alone.q).R[:, 2] @ X_WT.R[:, 2], -1.0, 1.0))))
-            hint = f"without `pointing` the point is reached, with the tool {off:.0f} deg off"
+            hint = f"remove `pointing`: the tool then reaches the point, pointing {off:.0f} deg off"
         elif best.angle_error > _TURNED:
-            hint, kind = "change the orientation of the tool: the arm cannot turn it like this", "orientation"
+            hint, kind = "change the orientation of the tool: the arm cannot reach it here", "orientation"
         if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
-            hint += f"; an arm of {few} takes few of them at a place: `move: {{point: ...}}` leaves it open"
+            hint += f"; an arm of {few} reaches few orientations: leave it open with `move: {{point: ...}}`"
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
             hint=hint,
@@ -202,7 +202,7 @@ class InverseKinematics:
         )
 
     def track(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
-        """One try from `seed` (n), without restarts: what a path follows from point to point."""
+        """One attempt from `seed` (n), without restarts, for the next point of a path."""
         q = np.array(seed, dtype=np.float64)
         columns, lower, upper = self._columns, self._lower, self._upper
         q[columns] = np.minimum(np.maximum(q[columns], lower), upper)
@@ -223,13 +223,16 @@ class InverseKinematics:
             q[columns] = np.minimum(np.maximum(here + step, lower), upper)
         return self._solution(X_WT, q)
 
+    def unit(self, joint: int) -> str:
+        """Unit of the position of the solver's joint with this index."""
+        return "rad" if self._turning[joint] else "m"
+
     def singularity(self, q: npt.ArrayLike) -> str:
         """The smallest singular value of the tool's Jacobian at `q` (n), as text."""
         J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
         return f"smallest singular value {np.linalg.svd(J, compute_uv=False)[-1]:.3f}"
 
     def _solution(self, X_WT: Transform, q: Array) -> Solution:
-        """Judged by forward kinematics alone."""
         X_WC = self.forward(q)
         error, angle = _pose_error(X_WT, X_WC.R, X_WC.p, self._open)
         here = q[self._columns]
@@ -242,7 +245,7 @@ class InverseKinematics:
         )
 
     def _unwound(self, solution: Solution, seed: Array) -> Solution:
-        """The same pose with each turning joint less than half a turn from `seed`, where its limits allow."""
+        """The same pose with each rotating joint less than half a turn from `seed`, where its limits allow."""
         here = solution.q[self._columns]
         turned = here - 2.0 * np.pi * np.round((here - seed[self._columns]) / (2.0 * np.pi))
         inside = self._turning & (turned >= self._lower) & (turned <= self._upper)
@@ -258,13 +261,13 @@ class InverseKinematics:
         if self._open == "spin":
             z = X_WT.R[:, 2]
             J[3:] -= np.outer(z, z @ J[3:])
-        elif self._open == "turn":
+        elif self._open == "rotation":
             J[3:] = 0.0
         return error, J, angle
 
 
 def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array, open_: Open) -> tuple[Array, float]:
-    """Pose error (6) in the world of what is not left open, and its angle [rad]."""
+    """Pose error (6) in the world, without the part left open, and its angle [rad]."""
     error = np.zeros(6)
     error[:3] = X_WG.p - p_WT
     if open_ == "nothing":
@@ -275,7 +278,7 @@ def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array, open_: Open) -> tuple
 
 
 def pointed(R: Array, z: Array) -> Array:
-    """R (3, 3), turned the short way so that its z axis is the unit vector `z` (3,)."""
+    """R (3, 3) after the smallest rotation that aligns its z axis with the unit vector `z` (3,)."""
     axis, cosine = cross(R[:, 2], z), float(R[:, 2] @ z)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-12:
@@ -292,14 +295,14 @@ def rotation_vector(R: Array) -> Array:
         return np.array([x, y, z]) * (0.5 * angle / sine)
     if angle < 1.0:
         return np.array([x, y, z]) * 0.5
-    # Near pi the antisymmetric part vanishes; the axis stands in the largest column of R + I = 2 a a^T.
+    # Near pi the antisymmetric part vanishes; the axis is the largest column of R + I = 2 a a^T, normalised.
     columns = R + np.eye(3)
     axis = columns[:, int(np.argmax(np.diag(columns)))]
     return np.asarray(axis / np.linalg.norm(axis) * angle)
 
 
 def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array) -> Array:
-    """The step dq (m) of the joints that are free to take it; the others rest."""
+    """The step dq (m); 0 for joints that are held at their limits."""
     n = len(q)
     H = J.T @ J
     H.flat[:: n + 1] += damping

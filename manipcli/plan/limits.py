@@ -1,4 +1,4 @@
-"""The limits of a set of joints as arrays: what retimers keep and `verify` checks."""
+"""Limits of a set of joints as arrays, for retiming and for `verify`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from manipcli.model.robot import RobotModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionLimits:
-    """Symmetric bounds per joint, arrays (n) in the order of `names`; infinite where there is none. SI, rad or m.
+    """Symmetric bounds per joint, arrays (n) in the order of `names`; infinite where there is no limit. SI, rad or m.
 
     Attributes:
         names: (n) joints.
         lower, upper: position.
         velocity, acceleration: finite and positive.
         jerk: infinite where none is stated.
-        soft: (joint, side) of those position limits that are soft ones; `lower` is side 0, `upper` side 1.
+        soft: (joint, side) of the soft position limits; `lower` is side 0, `upper` side 1.
         sliding: those of `names` whose positions are in m.
     """
 
@@ -43,7 +43,7 @@ class MotionLimits:
     def of(
         robot: RobotModel, joints: Sequence[str], *, velocity_scale: float = 1.0, acceleration_scale: float = 1.0
     ) -> MotionLimits:
-        """The limits of `joints`; the scales (0, 1] slow a motion down (`acceleration_scale` holds for jerk, too).
+        """The limits of `joints`; the scales (0, 1] slow a motion down (`acceleration_scale` applies to jerk, too).
 
         Raises:
             NotPlannable: a joint states no positive velocity or acceleration limit.
@@ -57,10 +57,10 @@ class MotionLimits:
                 ("acceleration", limit.acceleration, acceleration),
             ):
                 if value is None or not 0.0 < value < np.inf:
-                    said = "none" if value is None else f"{value:g}"
+                    stated = "none" if value is None else f"{value:g}"
                     raise NotPlannable(
-                        f"joint '{name}' has no usable {word} limit (stated: {said})",
-                        hint=f"state it in the robot file: limits: {{{name}: {{{word}: ...}}}}",
+                        f"joint '{name}' has no usable {word} limit (stated: {stated})",
+                        hint=f"set it in the robot file: limits: {{{name}: {{{word}: ...}}}}",
                     )
                 into.append(value)
         lower, upper = position_limits(robot.joint(name) for name in joints)

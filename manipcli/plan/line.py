@@ -1,4 +1,4 @@
-"""A line of the tool with time: walked by the inverse kinematics, then timed."""
+"""Timed straight line of the tool: inverse kinematics along the line, then retiming."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.verify import overshoot, verify
 
 Walk = Callable[[InverseKinematics], Array]
-"""The path (k, n) along a line, with the joints where this solver has them."""
+"""The joint path (k, n) along a line, as this solver finds it."""
 
-_TRIES: Final = 3  # of 64 random lines along limits one mends 46, three 51
+_TRIES: Final = 3  # one attempt repairs 46 of 64 random lines along limits, three repair 51
 
 
 def timed_line(
@@ -26,10 +26,10 @@ def timed_line(
 ) -> JointTrajectory:
     """The fastest motion along what `walk` finds, at rest at both ends.
 
-    Where a joint of a redundant arm comes to its limit, the others go on without it: a corner in its path, over which
-    the smooth curve through the waypoints swings, beyond the limit. If it is to `insist`, the line is then walked again
-    with that limit drawn in by twice as much, so that the tool stays on it; where there are other ways to try, one that
-    keeps clear of the limits is quicker.
+    Where a joint of a redundant arm reaches its limit, the other joints continue without it. The joint's path then has
+    a corner, and the smooth curve through the waypoints overshoots the limit. With `insist`, the line is solved once
+    more with that limit narrowed by twice the overshoot, so that the tool stays on the line. Where other candidates
+    exist, trying one that keeps clear of the limits is quicker.
 
     Args:
         walk: finds the path.
@@ -39,7 +39,7 @@ def timed_line(
         insist: see above.
 
     Raises:
-        NotPlannable: there is no such path, or its motion leaves a limit.
+        NotPlannable: there is no such path, or its motion exceeds a limit.
     """
     trajectory = retime(walk(solver), limits, period=period)
     margin = np.zeros(len(limits.names))
@@ -50,7 +50,7 @@ def timed_line(
         margin += 2.0 * over
         try:
             trajectory = retime(walk(solver.drawn_in(margin)), limits, period=period)
-        except NotPlannable:  # the line needs that joint all the way: what is told is the limit that it leaves
+        except NotPlannable:  # the line needs that joint throughout: `verify` reports the limit that it exceeds
             break
     verify(trajectory, limits)
     return trajectory

@@ -1,4 +1,4 @@
-"""What a step plans: from a planning state to motions and the state after them."""
+"""Planning state, motions and step plans: the values that steps take and return."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manipcli.model.collision import Carried
 from manipcli.plan.trajectory import JointTrajectory
 
 Strictness = Literal["strict", "best_effort"]
-"""Of a switch of controllers: all of it or nothing, or what of it can be done."""
+"""Whether a switch of controllers is done as a whole or not at all, or as far as possible."""
 CLOSING = "close"
 """The phase of a step in which the hand closes on something."""
 
@@ -24,7 +24,7 @@ class PlanningState:
         bodies: `X_WO` of every movable body, in the order of `Scene.movable`.
         carried: what the hand holds.
         closed: the hand was closed to hold something, and not opened since; moves leave it as it is.
-        at_start: the robot has not moved since the task began: it stands where the files put it.
+        at_start: the robot has not moved since the task began.
     """
 
     position: Array
@@ -40,9 +40,9 @@ class PlanningState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grip:
-    """A goal of the hand: `joints` go to `target` (n) until each finger meets `force` [N] or arrives.
+    """A goal of the hand: `joints` move to `target` (n) until each finger meets `force` [N] or arrives.
 
-    With `must_hold`, a hand that closed on nothing has failed; with `must_arrive`, one that something stopped.
+    With `must_hold`, closing on nothing is a failure; with `must_arrive`, so is being stopped before the target.
     """
 
     joints: tuple[str, ...]
@@ -54,7 +54,7 @@ class Grip:
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """Controllers that take over between two ticks: those of `to`, in whose way nobody stays, or those of the lists."""
+    """Controllers that switch between two ticks: to those of `to`, exclusively on their joints, or by the two lists."""
 
     to: tuple[str, ...] = ()
     activate: tuple[str, ...] = ()
@@ -64,7 +64,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What is commanded at once, and when it is done: all its goals reached and `duration` [s] over.
+    """Commands that start together; done when all goals are reached and `duration` [s] has passed.
 
     Attributes:
         label: the phase of the step ("approach", "close", ...).
@@ -72,8 +72,8 @@ class Motion:
         grip: of the hand, or None where it holds.
         duration: planned [s].
         awaits: the step's `until` is waited for here; where no motion awaits, it is at the step's end.
-        guarded: it stops where that comes to hold on the way.
-        switch: of controllers, before anything else; None where they stay.
+        guarded: it stops as soon as `until` holds.
+        switch: of controllers, before anything else; None for no switch.
     """
 
     label: str
@@ -87,7 +87,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class StepPlan:
-    """The motions of one step, and where they lead."""
+    """The motions of one step, and the state after them."""
 
     motions: tuple[Motion, ...]
     end: PlanningState

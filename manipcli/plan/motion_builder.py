@@ -1,5 +1,7 @@
-"""Builder of the motions of a step: each method adds one that starts where the last ended: timed, verified and free of
-collisions."""
+"""Builder of a step's motions: each method adds one that starts where the last ended.
+
+Every motion is timed, verified against the limits and free of collisions.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +31,11 @@ from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify
 
 GRAZE = 1e-4
-"""[m] by which a finger that withdraws may come nearer than it was: rounding, and the arm's own curve."""
+"""[m] How much nearer than before a withdrawing finger may come: rounding, and the arm's own curve."""
 
 
 class MotionBuilder:
-    """The motions of one step. What refuses one is told with its label, unless the step has no other."""
+    """The motions of one step. A refusal names the label of its motion, unless the step has only that motion."""
 
     def __init__(self, planner: Planner, state: PlanningState, *, verb: str = "", allowed: Pairs = NOTHING) -> None:
         """
@@ -59,23 +61,23 @@ class MotionBuilder:
         return StepPlan(motions=tuple(self._motions), end=self._now)
 
     def copy(self) -> MotionBuilder:
-        """To go on from here in several ways."""
+        """A copy, to plan alternatives from here."""
         other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
 
     def with_body(self, name: str, X_WO: Transform) -> PlanningState:
-        """The present state, with one body put elsewhere."""
+        """The present state with one body moved to `X_WO`."""
         return put(self._planner, self._now, {name: X_WO})
 
     def let_go(self, posture: str) -> PlanningState:
-        """The present state with the hand at a pose, and empty; whatever is in the way of its joints."""
+        """The present state with the hand at a pose and empty; collisions are not checked."""
         grip = self._grip(self._posture(posture))
         empty = replace(self._now, carried=None, closed=False)
         return empty if grip is None else empty.moved(self._with(grip.joints, grip.target))
 
     def joints(self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0) -> None:
-        """Straight in joint space; joints of the hand are moved by their own controller at the same time.
+        """Move straight in joint space; joints of the hand are moved by their own controller at the same time.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.
@@ -89,19 +91,19 @@ class MotionBuilder:
             named = next(name for name in names if name in hand)
             raise NotPlannable(
                 f"joint '{named}' belongs to the hand, which {what}",
-                hint="`release` or `place` opens the hand" if carried is not None else "`release` opens the hand",
+                hint=f"open the hand with `release`{'' if carried is None else ' or `place`'}",
             )
-        with self._told(label):
+        with self._labelled(label):
             trajectory = self._rest_to_rest(arm, [values[name] for name in arm], speed) if arm else None
         self._add(label, trajectory, self._grip({name: values[name] for name in names if name in hand}))
 
     def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
-        """Why no posture of the arm has the tool there, nothing touched and the hand in its pose `hand`; None if one.
+        """Why no free configuration of the arm has the tool at `X_WT` and the hand at its pose `hand`; None if any has.
 
-        Adds no motion: it tells, before a path is planned, whether its end can be reached at all.
+        Adds no motion: it checks whether the end of a path can be reached, before the path is planned.
         """
         try:
-            with self._told(label):
+            with self._labelled(label):
                 self._solved(X_WT, self._grip(self._posture(hand)), self._planner.solver)
         except NotPlannable as refusal:
             return refusal
@@ -117,16 +119,16 @@ class MotionBuilder:
         free: bool = False,
         leaving: Open = "nothing",
     ) -> None:
-        """The tool to a pose, straight in joint space; the hand goes to its pose `hand` meanwhile.
+        """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
-        Of the arm's postures with the tool there, those that touch something are passed over; if `free`, also those to
-        which the straight way does. The orientation may be left open.
+        Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
+        path is. Part of the orientation may be left open.
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
         solver = self._planner.solver.leaving(leaving)
         grip = None if hand is None else self._grip(self._posture(hand))
-        with self._told(label):
+        with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free)
             trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
         self._add(label, trajectory, grip)
@@ -134,19 +136,21 @@ class MotionBuilder:
     def straight(
         self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
     ) -> None:
-        """The tool on a straight line to a pose, of which the orientation may be left open on all the way; one that is
-        the step itself may lead along joint limits."""
-        with self._told(label):
+        """Move the tool on a straight line to a pose; part of the orientation may be left open along the whole line.
+
+        A line that is the step itself may run along joint limits.
+        """
+        with self._labelled(label):
             trajectory = self._straight(X_WT, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
-        """The tool on a straight line to a pose, away from a `body` that the hand, open now, was closed on.
+        """Move the tool on a straight line to a pose, away from a `body` that the now open hand was closed on.
 
-        With `grazing` the hand keeps no clearance to that body, and where they overlap it only gets no deeper: for one
-        that does not sit in the middle of the hand.
+        With `grazing` the hand keeps no clearance to that body, and where they overlap it must not get deeper: for a
+        body that does not sit in the middle of the hand.
         """
-        with self._told("withdraw"):
+        with self._labelled("withdraw"):
             trajectory = self._straight(X_WT, speed)
         allowed = NOTHING
         if grazing:
@@ -157,21 +161,21 @@ class MotionBuilder:
         self._add("withdraw", trajectory, None, allowed=allowed)
 
     def turn(self, label: str, axis: Array, angle: float, *, speed: float) -> None:
-        """The tool turns in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
+        """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         X_WT = self._planner.tool_pose(self._now)
         count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
         poses = [
             Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
             for k in range(count + 1)
         ]
-        with self._told(label):
+        with self._labelled(label):
             trajectory = self._timed(lambda solver: follow_poses(solver, self._now.position, poses), speed)
         self._add(label, trajectory, None)
 
     def back(self, label: str) -> None:
-        """The last trajectory, from its end to its beginning.
+        """Repeat the last trajectory backwards.
 
-        Limits are symmetric and what was passed freely is free on the way back, so nothing is planned or checked anew.
+        Limits are symmetric and the path was free forwards, so nothing is planned or checked.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
         assert (
@@ -184,18 +188,18 @@ class MotionBuilder:
         self._accept(label, trajectory, None, trajectory.duration)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
-        """Given points, which begin where the last motion ended; at every control tick, and at their end.
+        """Follow given points from the end of the last motion, sampled at every control tick and at their end.
 
         Args:
             label: of the motion.
             points: what lies between them is linear, cubic or quintic.
-            limits: what the curve must keep; infinite where it cannot.
+            limits: of the curve; infinite where it has none to keep.
 
         Raises:
-            NotPlannable: it does not keep them, takes longer than `LONGEST`, or something is in the way.
+            NotPlannable: it exceeds them, takes longer than `LONGEST`, or is in collision.
         """
         if points.duration > LONGEST:
-            raise NotPlannable(f"the trajectory takes {points.duration:g} s, longer than {LONGEST:g} s")
+            raise NotPlannable(f"the trajectory takes {points.duration:g} s; the limit is {LONGEST:g} s")
         period = self._planner.period
         ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
         times = np.append(np.arange(ticks) * period, points.duration)
@@ -204,24 +208,24 @@ class MotionBuilder:
         trajectory = JointTrajectory.of_arrays(
             points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
         )
-        with self._told(label):
+        with self._labelled(label):
             verify(trajectory, limits, given=points)
         self._add(label, trajectory, None)
 
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
-        """The hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
+        """Close the hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
         The fingers are predicted to stop where the first link of each touches the body.
 
         Args:
             posture: named.
             force: at which a finger stops.
-            must_hold: whether it fails where it holds nothing.
-            body: what it closes on, if that is said.
-            roomier: how the body can be taken where fingers have more room: the hint where something is in their way.
+            must_hold: whether holding nothing is a failure.
+            body: what it closes on, if known.
+            roomier: the hint if the fingers are in collision: how to grasp where they have more room.
 
         Raises:
-            NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and would not touch it.
+            NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and does not touch it.
         """
         planner = self._planner
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
@@ -251,13 +255,13 @@ class MotionBuilder:
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
-        """The hand to a pose; what it held stays where it is. It may touch that, or the body that it is `around`.
+        """Open the hand to a pose; the held object stays where it is. It may touch that, or the body it is `around`.
 
-        With `must_arrive` the step fails where something stops the hand.
+        With `must_arrive` the step fails if something stops the hand.
 
         Raises:
-            NotPlannable: no gripper controller moves the hand, something else than the object is in its way, or it
-                `must_arrive` where it would still press on the object.
+            NotPlannable: no gripper controller moves the hand, it collides with something else than the object, or it
+                `must_arrive` at a pose that still presses on the object.
         """
         grip = self._grip(self._posture(posture))
         if grip is None:
@@ -269,8 +273,8 @@ class MotionBuilder:
             query = self._planner.grasping(self._now, held)
             still = pressing(self._planner.robot, query, there, grip.joints) if must_arrive else None
             if still is not None:
-                message = f"with the hand in its pose '{posture}', '{still}' would still press on '{held}'"
-                raise NotPlannable(message, hint="it lets go in a pose that is open: `posture: POSE`")
+                message = f"'{still}' still presses on '{held}' with the hand in its pose '{posture}'"
+                raise NotPlannable(message, hint="set a pose in which the hand is open: `posture: POSE`")
             allowed |= self._planner.hand_contacts(held)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
@@ -278,16 +282,16 @@ class MotionBuilder:
         self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
 
     def dwell(self, label: str, duration: float) -> None:
-        """Hold still for `duration` [s], and until what the step waits for holds."""
+        """Hold still for `duration` [s], and until the step's `until` holds."""
         self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=True))
 
     def spill(self, into: str) -> None:
-        """What lay in the carried object is predicted to lie on the floor of the container `into` now."""
+        """Predict the contents of the carried object on the floor of the container `into`."""
         self._now = spilled(self._planner, self._now, into)
 
     @contextmanager
-    def _told(self, label: str) -> Iterator[None]:
-        """Refusals inside are told with the motion they are about."""
+    def _labelled(self, label: str) -> Iterator[None]:
+        """Prefixes refusals with the label of their motion."""
         try:
             yield
         except NotPlannable as refusal:
@@ -296,7 +300,7 @@ class MotionBuilder:
             raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint, reason=refusal.reason) from refusal
 
     def _solved(self, X_WT: Transform, grip: Grip | None, solver: InverseKinematics, *, free: bool = False) -> Array:
-        """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""
+        """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
         query = self._query()
@@ -307,13 +311,12 @@ class MotionBuilder:
                 return None if hit is None else planner.in_the_way(hit)
             count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
             share = np.linspace(0.0, 1.0, count + 1)
-            on_way = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
-            return None if on_way is None else f"{planner.in_the_way(on_way)}, on the way there"
+            blocked = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
+            return None if blocked is None else f"{planner.in_the_way(blocked)}, on the path there"
 
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
     def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
-        """What the arm may hit now; `allowed` pairs may touch, too."""
         return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
@@ -345,7 +348,7 @@ class MotionBuilder:
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
-        """Accept a motion if nothing is in its way."""
+        """Accept a motion if it is free of collisions."""
         query, move = self._query(allowed), self._verb == "move"
         refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
@@ -361,13 +364,13 @@ class MotionBuilder:
         self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
 
     def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
-        """The present position with some joints elsewhere; joints that mimic them follow."""
+        """The present position with other values of some joints; joints that mimic them follow."""
         q = np.array(self._now.position)
         q[self._planner.robot.indices(tuple(names))] = values
         return with_mimics(self._planner.robot, q)
 
     def _grip(self, targets: dict[str, float], *, force: float | None = None, must_hold: bool = False) -> Grip | None:
-        """A goal for the joints that a gripper controller moves, or None where there is none."""
+        """A goal for the joints of the gripper controller, or None if no target is one of them."""
         joints = self._planner.gripper_joints
         if not any(name in targets for name in joints):
             return None

@@ -1,4 +1,4 @@
-"""Names in steps that the robot or the scene does not know, each with the nearest one it does."""
+"""Unknown names in steps: poses, joints and frames, each with the nearest known name."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from manipcli.scene.scene import Scene
 
 
 def unknown_pose(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if the robot has a pose of this name."""
+    """A problem if the robot has no pose of this name, else empty."""
     return _unknown(name, (pose.name for pose in robot.poses), f"robot '{robot.name}' has no pose '{name}'", loc)
 
 
 @dataclass(frozen=True, slots=True)
 class UnknownPosture(Problem):
-    """An unknown pose that a hand is to take."""
+    """An unknown pose of a hand."""
 
 
 def unknown_posture(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if the robot has a pose of this name, for its hand."""
-    return tuple(UnknownPosture(loc, one.message, one.hint) for one in unknown_pose(robot, name, loc))
+    """A problem if the robot has no pose of this name for its hand, else empty."""
+    return tuple(UnknownPosture(loc, found.message, found.hint) for found in unknown_pose(robot, name, loc))
 
 
 def unknown_joint(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if the robot has an independent joint of this name."""
+    """A problem if the robot has no independent joint of this name, else empty."""
     known = (joint.name for joint in robot.joints if joint.independent)
-    return _unknown(name, known, f"joint '{name}' is not one that robot '{robot.name}' can move", loc)
+    return _unknown(name, known, f"joint '{name}' is not a movable joint of robot '{robot.name}'", loc)
 
 
 def unknown_frame(scene: Scene, name: str, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if `name` is `world`, `base`, `tool`, a body or a named frame."""
+    """A problem unless `name` is `world`, `base`, `tool`, a body or a named frame."""
     known = ["world", "base", "tool", *(body.name for body in scene.bodies), *(frame.name for frame in scene.frames)]
-    return _unknown(name, known, f"there is no frame '{name}'", loc)
+    return _unknown(name, known, f"unknown frame '{name}'", loc)
 
 
 def _unknown(name: str, known: Iterable[str], message: str, loc: Loc) -> tuple[Problem, ...]:

@@ -1,4 +1,4 @@
-"""The outline of a plan that a log carries as `plan.json`; it is written and read here only."""
+"""Outline of a plan, which a log carries as `plan.json`; only this module writes and reads it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class StepOutline:
 
     Attributes:
         id, verb: of the step.
-        place: where it is written, `pour.yaml:21:5`; "" in a log that does not say.
+        place: where it is written, `pour.yaml:21:5`; "" where the log has none.
         planned_duration: [s].
         motions: written for the reader of a log; not read back.
     """
@@ -39,7 +39,7 @@ class PlanOutline:
     judged: tuple[str, ...] = ()
 
     def to_json(self) -> bytes:
-        """The attachment: of trajectories only both ends."""
+        """The attachment; it has only the two ends of each trajectory."""
         steps = [
             {
                 "id": step.id,
@@ -54,7 +54,7 @@ class PlanOutline:
 
     @classmethod
     def read(cls, content: bytes | None) -> PlanOutline:
-        """The plan in an attachment; without steps where there is no attachment, or it is not a plan."""
+        """The plan in an attachment; without steps if there is no attachment, or if it is not a plan."""
         try:
             plan: Any = json.loads(content or b"{}")  # Any: the content of a file is not known before
             steps = tuple(

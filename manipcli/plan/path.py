@@ -1,4 +1,4 @@
-"""Paths: geometry without time. Joint waypoints, and straight lines of a tool frame in the world.
+"""Paths (geometry without time): joint waypoints, and straight lines of a tool frame in the world.
 
 A straight line of the tool interpolates position linearly and orientation on the shortest arc (slerp: a constant
 rotation vector), and is turned into joint positions point by point: each from the one before, without restarts, so that
@@ -20,13 +20,13 @@ from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
-_OTHERWISE = "start the line from another arm configuration, after a `pick` from another `yaw` of its `approach`"
+_OTHERWISE = "start the line from another arm configuration (after a `pick`: another `yaw` of its `approach`)"
 
 
 def joint_path(waypoints: npt.ArrayLike) -> Array:
     """A path through `waypoints` (k, n), k >= 1: (m, n), equal neighbours merged.
 
-    What lies between them is the retimer's choice.
+    The retimer chooses the curve between them.
     """
     points = np.array(waypoints, dtype=np.float64)
     keep = np.ones(len(points), dtype=bool)
@@ -41,9 +41,9 @@ def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
         X_WA, X_WB: first and last pose; neighbours between them differ by at most `LINEAR_STEP` and `ANGULAR_STEP`.
     """
     distance = X_WB.p - X_WA.p
-    turn = rotation_vector(X_WA.R.T @ X_WB.R)
-    whole = float(np.linalg.norm(turn))
-    axis = turn / whole if whole > 1e-12 else np.array([0.0, 0.0, 1.0])
+    rotation = rotation_vector(X_WA.R.T @ X_WB.R)
+    whole = float(np.linalg.norm(rotation))
+    axis = rotation / whole if whole > 1e-12 else np.array([0.0, 0.0, 1.0])
     steps = max(float(np.linalg.norm(distance)) / LINEAR_STEP, whole / ANGULAR_STEP)
     count = max(1, int(np.ceil(steps - 1e-9)))
     between = [
@@ -66,7 +66,7 @@ def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) ->
 
 
 def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform]) -> Array:
-    """Joint positions that take the tool through `poses`, the first of which `q` (n) already has.
+    """Joint positions that move the tool through `poses`; the first is the tool pose at `q` (n).
 
     Args:
         solver: of the joints that move.
@@ -74,10 +74,10 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
         poses: `X_WT`, near neighbours (see `interpolate`).
 
     Returns:
-        One waypoint a pose, of the solver's joints.
+        One waypoint per pose, of the solver's joints.
 
     Raises:
-        NotPlannable: a pose cannot be reached from the one before; names how far along, and why.
+        NotPlannable: a pose cannot be reached from the one before; names the distance along the path, and the cause.
     """
     q = np.array(q, dtype=np.float64)
     columns = list(solver.columns)
@@ -87,20 +87,20 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
         walked += float(np.linalg.norm(X_WT.p - before.p))
         turned += float(np.linalg.norm(rotation_vector(before.R.T @ X_WT.R)))
         found = solver.track(X_WT, q)
-        where = f"{walked * 1000.0:.0f} mm and {np.degrees(turned):.0f} deg along the line"
+        where = f"at {walked * 1000.0:.0f} mm and {np.degrees(turned):.0f} deg along the line"
         if not found.converged:
             raise NotPlannable(
-                f"the straight line ends {where}: {found.explain()}",
-                hint=f"{_OTHERWISE}, make it shorter, or move `free` instead",
+                f"the straight line is unreachable {where}: {found.explain()}",
+                hint=f"{_OTHERWISE}, make it shorter, or use `path: free`",
                 reason="line",
             )
         jump = np.abs(found.q[columns] - q[columns])
         worst = int(np.argmax(jump))
         if jump[worst] > MAX_JUMP:
             raise NotPlannable(
-                f"the arm would have to jump {where}: joint '{solver.joints[worst]}' by {jump[worst]:.2f} within one "
-                f"point of the line (near singular: {solver.singularity(q)})",
-                hint=f"{_OTHERWISE}, or move `free` instead",
+                f"joint '{solver.joints[worst]}' would jump by {jump[worst]:.2f} {solver.unit(worst)} {where}, from "
+                f"one point to the next (near singular: {solver.singularity(q)})",
+                hint=f"{_OTHERWISE}, or use `path: free`",
                 reason="line",
             )
         q = found.q

@@ -1,6 +1,6 @@
-"""What steps plan with: the robot, the scene, inverse kinematics and collision queries, behind a few questions.
+"""Planner of one task: robot, scene, inverse kinematics and collision queries, behind a few methods.
 
-A step asks the `Planner` about a state, and strings motions together with a `MotionBuilder`.
+A step queries the `Planner` about a state, and builds its motions with a `MotionBuilder`.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ Pairs = frozenset[Pair]
 
 NOTHING: Pairs = frozenset()
 CLEARANCE = 0.004
-"""How far [m] the robot keeps from everything it is not to touch: more than its controllers deviate."""
+"""[m] Distance that the robot keeps from everything it must not touch: more than its controllers deviate."""
 TOUCHING = 0.0045
-"""Bodies nearer than this [m] count as touching: what a held object may leave or come to. Above the clearance, so that
-nothing can stand too near to be left and too far to be left out."""
-NO_WAY_AROUND = "no way around is searched for: `move` to a pose from which the way is free"
-"""The hint where something is in the way of a motion."""
-PUT_APART = "put them apart: `start: POSE` of a task begins elsewhere, `mount` of a robot file moves its base"
-"""The hint where the robot is put too near to something before it moves."""
+"""[m] Bodies nearer than this count as touching: what a held object may leave or approach. It is above the clearance,
+so that every body within the clearance is exempt."""
+NO_WAY_AROUND = "first `move` to a pose from which the path is free (no path around obstacles is searched)"
+"""The hint for a motion that is in collision."""
+PUT_APART = "move them apart: set `start: POSE` in the task, or `mount` in the robot file to move its base"
+"""The hint for a robot that is too near to something before it moves."""
 OF_TWO_LINKS = (
-    "`collision_ignore` in the robot file, if the links have room there (a mesh counts as its hull); "
-    "an attached hand is put right by its `pose` under `attach`"
+    "add the pair to `collision_ignore` in the robot file, if the real links are apart (a mesh counts as its convex "
+    "hull); correct an attached hand with its `pose` under `attach`"
 )
-"""The hint where two links of the robot meet."""
+"""The hint for two links of the robot that collide."""
 ROBOT = "robot/"
-_QUERIES = 8  # kept; the candidates of a step ask the same few
+_QUERIES = 8  # kept; the candidates of a step share a few
 
 
 class Planner:
@@ -64,7 +64,7 @@ class Planner:
             period: control period [s].
             rng: draws the restarts of the inverse kinematics.
             gripper_joints: joints that a gripper controller moves; all others follow trajectories.
-            gripper_speed: at which the hand's references move [rad/s or m/s].
+            gripper_speed: of the hand's references [rad/s or m/s].
         """
         self.robot = robot
         self.scene = scene
@@ -97,8 +97,8 @@ class Planner:
             joints = arm_joints(self.robot, self.gripper_joints)
             if not joints:
                 raise NotPlannable(
-                    f"no joint of robot '{self.robot.name}' moves its tool at link '{tool.link}'",
-                    hint="say another link under `tool` in the robot file",
+                    f"no joint of robot '{self.robot.name}' moves its tool link '{tool.link}'",
+                    hint="set another link under `tool` in the robot file",
                 )
             self._solver = InverseKinematics(self.kinematics, joints, tool.link, X_LT=tool.X_LT)
         return self._solver
@@ -131,7 +131,7 @@ class Planner:
         return self.body_pose(state, name)
 
     def held(self, state: PlanningState, body: str) -> None:
-        """Nothing, if this object is held.
+        """Check that this object is held.
 
         Raises:
             NotPlannable: it is not.
@@ -148,16 +148,16 @@ class Planner:
         )
 
     def free_hand(self, state: PlanningState, body: str) -> None:
-        """Nothing, if the hand can take this object.
+        """Check that the hand can take this object.
 
         Raises:
-            NotPlannable: it holds something already.
+            NotPlannable: the hand already holds something.
         """
         carried = state.carried
         if carried is None:
             return
         if carried.body == body:
-            raise NotPlannable(f"'{body}' is in the hand already")
+            raise NotPlannable(f"'{body}' is already in the hand")
         raise NotPlannable(
             f"the hand cannot take '{body}': it holds '{carried.body}'", hint=f"`place` '{carried.body}' first"
         )
@@ -171,7 +171,7 @@ class Planner:
         """Every pair of these bodies with the hand, and with what it holds."""
         held = () if state.carried is None else (state.carried.body,)
         return frozenset(
-            pair for body in bodies for pair in {*self.hand_contacts(body), *((one, body) for one in held)}
+            pair for body in bodies for pair in {*self.hand_contacts(body), *((name, body) for name in held)}
         )
 
     def held_in_tool(self, state: PlanningState) -> Transform:
@@ -181,7 +181,7 @@ class Planner:
         return self.tool_pose(state).inverse() @ X_WO
 
     def contents(self, state: PlanningState, container: str) -> tuple[str, ...]:
-        """The movable bodies whose middle lies in the hollow of this one."""
+        """The movable bodies whose centre lies in the interior of this one."""
         interior = self.scene.body(container).interior
         if interior is None:
             return ()
@@ -193,9 +193,9 @@ class Planner:
         )
 
     def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
-        """What the arm may hit now, everything `CLEARANCE` around it: the scene, and itself.
+        """Collision query in this state with the scene and the robot itself, with the margin `CLEARANCE`.
 
-        The hand may touch what it holds; what lies in that is out of the way.
+        The hand may touch the held object; the contents of that object are left out.
 
         Args:
             allowed: further pairs that may touch.
@@ -219,7 +219,7 @@ class Planner:
         return self._queries[key]
 
     def free_start(self, state: PlanningState, allowed: Pairs = NOTHING) -> None:
-        """Nothing, if nothing but `allowed` pairs is too near already; else no search among ways from here can succeed.
+        """Check that only `allowed` pairs are too near already; otherwise no path from here can be found.
 
         Raises:
             NotPlannable: names the pair.
@@ -229,7 +229,7 @@ class Planner:
             raise self.refusal(state, hit, "is", "before it moves")
 
     def outside(self, state: PlanningState) -> None:
-        """Nothing, if the robot is inside of no body; where it is, the engine would throw them apart, or wedge them.
+        """Check that the robot is inside no body, where the engine would throw them apart or wedge them.
 
         Raises:
             NotPlannable: names the body and the deepest link.
@@ -245,9 +245,9 @@ class Planner:
     def refusal(
         self, state: PlanningState, hit: CollisionHit, verb: str, when: str, *, move: bool = False
     ) -> NotPlannable:
-        """What to tell about a hit on a way that begins in `state`: `a` `verb` too near to `b`, `when`.
+        """The refusal for a hit on a path that begins in `state`: `a` `verb` too near to `b`, `when`.
 
-        In a `move` it may be meant.
+        In a `move` the contact may be intended.
         """
         carried = state.carried
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
@@ -260,13 +260,13 @@ class Planner:
             hint = PUT_APART
         elif begins:
             if body := self._touchable(state, hit):
-                hint = f"`touch: [{body}]` of the `move` that leaves it lets it"
+                hint = f"add `touch: [{body}]` to the `move` that leaves it"
         elif move and (body := self._touchable(state, hit)):
-            hint = f"{NO_WAY_AROUND}; or `touch: [{body}]`, where the hand shall push it or press on it"
+            hint = f"{NO_WAY_AROUND}; or add `touch: [{body}]`, if the hand is to push it or press on it"
         if begins and hit.distance < 0.0 and not held:
-            cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} already, {when}"
+            cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} {when}"
         else:
-            near = f"{hit.amount} {'apart' if hit.distance >= 0.0 else 'into it'}"
+            near = f"{hit.amount} {'apart' if hit.distance >= 0.0 else 'overlap'}"
             cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
         return NotPlannable(cause, hint=hint, reason="in_the_way" if hint == NO_WAY_AROUND else None)
 
@@ -274,14 +274,14 @@ class Planner:
         """The body that the hand, or what it holds, hit; "" where something else did."""
         pair = frozenset((hit.a, hit.b))
         bodies = [name for name in (hit.a, hit.b) if not name.startswith(ROBOT)]
-        return next((one for one in bodies if pair in map(frozenset, self.may_touch(state, [one]))), "")
+        return next((body for body in bodies if pair in map(frozenset, self.may_touch(state, [body]))), "")
 
     def in_the_way(self, hit: CollisionHit) -> str:
-        """A hit as text; of what does not overlap, also how far apart it was to stay."""
-        return str(hit) if hit.distance < 0.0 else f"{hit}, and {1000 * CLEARANCE:.0f} mm are to stay between them"
+        """A hit as text; with the clearance where the two do not overlap."""
+        return str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {1000 * CLEARANCE:.0f} mm"
 
     def touching(self, state: PlanningState, body: str) -> Pairs:
-        """The pairs of a movable body with what it stands on or leans against."""
+        """The pairs of a movable body with what it stands on or touches."""
         root = self.robot.root
         X_LO = self.robot.X_WB.inverse() @ self.body_pose(state, body)
         carried = Carried(body=body, link=root, X_LO=X_LO)
@@ -289,18 +289,17 @@ class Planner:
         return frozenset((hit.a, hit.b) for hit in there.every(state.position))
 
     def grasping(self, state: PlanningState, body: str, *, margin: float = 0.0) -> CollisionQuery:
-        """Touches where the hand, which carries nothing, is nearer than the `margin` [m] to this body."""
+        """Collision query of the empty hand with this body alone, with a `margin` [m]."""
         return self.checker.at(state.bodies, only=body, margin=margin)
 
     def distance(self, state: PlanningState, body: str) -> float:
-        """How far [m] the robot, which carries nothing, is from this body, negative where they overlap; `CLEARANCE`
-        where it is further."""
+        """Distance [m] of the empty robot from this body, negative where they overlap; at most `CLEARANCE`."""
         hits = self.grasping(state, body, margin=CLEARANCE).every(state.position)
         return min((hit.distance for hit in hits), default=CLEARANCE)
 
 
 def _within(interior: Interior, X_SP: Transform) -> bool:
-    """Whether the origin of P lies in the hollow S."""
+    """Whether the origin of P lies in the interior S."""
     x, y, z = X_SP.p
     shape = interior.shape
     if isinstance(shape, Cylinder):

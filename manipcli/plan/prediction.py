@@ -1,5 +1,7 @@
-"""Where bodies will be: what is held goes with the hand, what lies in that goes with it, or falls into a container;
-what is pushed slides; and where a hand that feels its way will stop."""
+"""Prediction of body poses after a motion: carried with the hand, spilled into a container, or pushed.
+
+Also where a guarded motion stops.
+"""
 
 from __future__ import annotations
 
@@ -16,18 +18,18 @@ from manipcli.plan.trajectory import JointTrajectory
 from manipcli.shapes.primitives import Cylinder
 
 PRESSED: Final = 1e-3
-"""[m] Deeper in it than at the start by this the hand pushes a body: what it only leaves stays where it is."""
-_LOOKS: Final = 60  # at the way of a hand that touches: each takes a fraction of a millisecond
+"""[m] A body is pushed where the hand is deeper in it than at the start by this; one that the hand leaves stays."""
+_SAMPLES: Final = 60  # samples of the path of a touching hand; each takes a fraction of a millisecond
 
 
 def put(planner: Planner, state: PlanningState, where: Mapping[str, Transform]) -> PlanningState:
-    """The state with some movable bodies elsewhere, at X_WO by name."""
+    """The state with some movable bodies moved to X_WO, by name."""
     bodies = zip(planner.scene.movable, state.bodies, strict=True)
     return replace(state, bodies=tuple(where.get(body.name, X_WO) for body, X_WO in bodies))
 
 
 def carried_along(planner: Planner, before: PlanningState, now: PlanningState) -> PlanningState:
-    """What was held `before` has gone with the hand to where the joints are `now`, and what lay in it, too."""
+    """The state `now` with the body held `before`, and its contents, moved along with the hand."""
     carried = before.carried
     if carried is None:
         return now
@@ -40,7 +42,7 @@ def carried_along(planner: Planner, before: PlanningState, now: PlanningState) -
 
 
 def spilled(planner: Planner, state: PlanningState, into: str) -> PlanningState:
-    """What lay in the carried body lies on the floor of the container `into`."""
+    """The state with the contents of the carried body on the floor of the container `into`."""
     carried, interior = state.carried, planner.scene.body(into).interior
     if carried is None or interior is None:
         return state
@@ -58,32 +60,31 @@ def spilled(planner: Planner, state: PlanningState, into: str) -> PlanningState:
 def met(
     planner: Planner, before: PlanningState, now: PlanningState, motion: JointTrajectory, touching: Pairs
 ) -> PlanningState:
-    """`now`, or where on the way there one of the pairs that may touch is about to, or to press deeper than before."""
+    """`now`, or the state on the path there just before a pair that may touch does, or presses deeper than before."""
     query, pairs = planner.query(before), set(map(frozenset, touching))
 
     def depth(q: Array) -> float:
         return min((hit.distance for hit in query.every(q) if {hit.a, hit.b} in pairs), default=np.inf)
 
-    way = _looks(planner, now, motion)
-    deep = min(0.0, depth(way[0])) - PRESSED
-    free = next((k for k, q in enumerate(way) if depth(q) < deep), len(way)) - 1
-    return carried_along(planner, before, now.moved(frozen(way[free])))
+    path = _samples(planner, now, motion)
+    deep = min(0.0, depth(path[0])) - PRESSED
+    free = next((k for k, q in enumerate(path) if depth(q) < deep), len(path)) - 1
+    return carried_along(planner, before, now.moved(frozen(path[free])))
 
 
-def _looks(planner: Planner, state: PlanningState, motion: JointTrajectory) -> Array:
-    """(_LOOKS, n) joint positions on the way, the first and the last among them; other joints are as in `state`."""
-    way = np.tile(state.position, (_LOOKS, 1))
+def _samples(planner: Planner, state: PlanningState, motion: JointTrajectory) -> Array:
+    """(_SAMPLES, n) joint positions on the path, with its first and its last; other joints are as in `state`."""
+    path = np.tile(state.position, (_SAMPLES, 1))
     columns = planner.robot.indices(motion.names)
-    way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
-    return way
+    path[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _SAMPLES).astype(int)]
+    return path
 
 
 def pushed(
     planner: Planner, before: PlanningState, now: PlanningState, motion: JointTrajectory, bodies: Iterable[str]
 ) -> PlanningState:
-    """Each of the `bodies` that can move has slid along the ground as far as the tool went since the hand met it, and
-    what lies in it, too."""
-    way = _looks(planner, before, motion)
+    """The state with each movable body of `bodies`, and its contents, moved horizontally with the tool at contact."""
+    path = _samples(planner, before, motion)
     end = planner.tool_pose(now).p
     held = () if before.carried is None else (before.carried.body,)
     slid: dict[str, Transform] = {}
@@ -92,11 +93,11 @@ def pushed(
         if planner.scene.body(name).fixed:
             continue
         deep = min(0.0, planner.distance(before, name)) - PRESSED
-        met = next((q for q in way if planner.distance(before.moved(q), name) < deep), None)
+        met = next((q for q in path if planner.distance(before.moved(q), name) < deep), None)
         if met is not None:
             x, y, _ = end - planner.tool_pose(before.moved(met)).p
             shift = Transform.of(xyz=(x, y, 0.0))
             slid[name] = shift @ planner.body_pose(before, name)
-            inside = [one for one in planner.contents(before, name) if one not in held]
-            taken |= {one: shift @ planner.body_pose(before, one) for one in inside}
+            inside = [body for body in planner.contents(before, name) if body not in held]
+            taken |= {body: shift @ planner.body_pose(before, body) for body in inside}
     return put(planner, now, taken | slid)

@@ -1,7 +1,7 @@
-"""Time-optimal motion on a straight line in joint space, from rest to rest, with bounded jerk where a limit states it.
+"""Time-optimal motion on a straight line in joint space, from rest to rest, with bounded jerk where a limit is set.
 
-All joints move in phase: q(t) = q0 + s(t) (q1 - q0), so the path is straight and every joint arrives at once. The one
-coordinate s in [0, 1] is bounded by the joint that is tightest: |s'| <= min_i v_i / |q1_i - q0_i|, and likewise for
+All joints move in phase: q(t) = q0 + s(t) (q1 - q0), so the path is straight and all joints arrive together. The
+coordinate s in [0, 1] is bounded by the tightest joint: |s'| <= min_i v_i / |q1_i - q0_i|, and likewise for
 acceleration and jerk; Ruckig (Berscheid and Kroeger, RSS 2021) solves that one-dimensional problem exactly.
 """
 
@@ -18,7 +18,7 @@ from manipcli.plan.trajectory import JointTrajectory
 
 
 def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits, *, period: float) -> JointTrajectory:
-    """The fastest straight move from `start` to `goal` (n) within `limits`, one point a control tick.
+    """The fastest straight move from `start` to `goal` (n) within `limits`, one point per control tick.
 
     Args:
         start, goal: (n) in the order of `limits.names`, rad or m.
@@ -33,7 +33,7 @@ def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits
     q0 = np.asarray(start, dtype=np.float64)
     q1 = np.asarray(goal, dtype=np.float64)
     if not (np.isfinite(q0).all() and np.isfinite(q1).all()):
-        raise NotPlannable("a joint position to start from or to go to is not finite")
+        raise NotPlannable("a start or goal joint position is not finite")
     delta = q1 - q0
     moving = np.abs(delta) > 1e-12
     if not moving.any():
@@ -51,7 +51,7 @@ def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits
     profile = ruckig.Trajectory(1)
     result = ruckig.Ruckig(1).calculate(problem, profile)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise NotPlannable(f"no rest-to-rest motion ({result.name})")
+        raise NotPlannable(f"Ruckig found no rest-to-rest motion ({result.name})")
 
     def curve(times: Array) -> tuple[Array, Array, Array]:
         return _line(q0, delta, np.array([profile.at_time(t) for t in times.tolist()]).reshape(-1, 3))

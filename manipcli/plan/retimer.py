@@ -5,10 +5,11 @@ The path q(s) is a cubic spline through the waypoints over their chord length in
     q' = (dq/ds) s',    q'' = (d2q/ds2) s'^2 + (dq/ds) s''
 
 velocity and acceleration limits bound s'^2 and s'' along the path; TOPP-RA finds the largest s'^2. Between two grid
-points s'' is constant, so s(t) is a parabola there. Jerk is not in that problem: where limits state it, s(t) is
-averaged over a sliding window first, which bounds the slope of s'' and leaves the path as it is. That takes the window
-longer: where it makes up much of the motion, smaller accelerations, which need less of it, are quicker. The samples are
-then checked at the control rate and time is stretched by what they still exceed.
+points s'' is constant, so s(t) is a parabola there. Jerk is not part of that problem: where a jerk limit is set, s(t)
+is first averaged over a sliding window, which bounds the slope of s'' and leaves the path as it is. The motion then
+takes longer by the window. Where the window is a large part of the motion, smaller accelerations need a shorter
+window and are quicker. The samples are then checked at the control rate, and time is stretched by what they still
+exceed.
 """
 
 from __future__ import annotations
@@ -32,15 +33,15 @@ _GRID = 300, 500  # fewest and most grid points: 300 cost 0.12 % of time against
 _PER_WAYPOINT = 4  # grid points between two waypoints, up to the most
 _WINDOWS = 1.0, 2.0  # times acceleration / jerk: jumps of s'' from and to zero need one, full reversals two
 _MUCH = 0.25  # of the time without jerk limits: a window beyond it may be too wide; at half of it, it is
-_HALVINGS = 20  # of the accelerations: a million times more than is of use were meant for something else
+_HALVINGS = 20  # of the accelerations: 2^20 is more than any useful factor
 _ROUNDING = 1e-9
 
 
 def retime(points: Array, limits: MotionLimits, *, period: float) -> JointTrajectory:
-    """The fastest motion along a path within `limits`, one point a control tick, at rest at both ends.
+    """The fastest motion along a path within `limits`, one point per control tick, at rest at both ends.
 
     Args:
-        points: (k, n) on the path; one is a rest, two are a straight line, which `rest_to_rest` times exactly.
+        points: (k, n) on the path; one point is a rest, two are a straight line, which `rest_to_rest` times exactly.
         limits: of the path's joints, in its order.
         period: control period [s].
 
@@ -49,7 +50,7 @@ def retime(points: Array, limits: MotionLimits, *, period: float) -> JointTrajec
     """
     if len(points) <= 2:
         return rest_to_rest(points[0], points[-1], limits, period=period)
-    refuse_endless(points, limits)  # where TOPP-RA may find no timing, for rounding
+    refuse_endless(points, limits)  # where TOPP-RA may find no timing because of rounding
     toppra = library()
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     spline = toppra.SplineInterpolator(np.concatenate(([0.0], np.cumsum(chords))), points)
@@ -84,9 +85,9 @@ def retime(points: Array, limits: MotionLimits, *, period: float) -> JointTrajec
         return sampled(fastest.progress, fastest.duration)
     smooth = []
     for factor in _WINDOWS:
-        one = _quickest(timed, fastest, factor)
-        refuse_endless(points, limits, one.duration + factor * one.window)
-        smooth.append(sampled(*_averaged(one.progress, one.duration, factor * one.window, period)))
+        timing = _quickest(timed, fastest, factor)
+        refuse_endless(points, limits, timing.duration + factor * timing.window)
+        smooth.append(sampled(*_averaged(timing.progress, timing.duration, factor * timing.window, period)))
     return min(smooth, key=lambda motion: motion.duration)
 
 
@@ -95,8 +96,10 @@ Progress = Callable[[Array], tuple[Array, Array, Array]]
 
 
 class Timing(NamedTuple):
-    """A motion along the path that takes `duration` [s] without regard to jerk; averaged over `window` [s] a jump of
-    its s'' from or to zero keeps the limits of jerk."""
+    """A motion along the path that takes `duration` [s] without jerk limits.
+
+    Averaged over `window` [s], a jump of its s'' from or to zero keeps the jerk limits.
+    """
 
     progress: Progress
     duration: float
@@ -104,22 +107,22 @@ class Timing(NamedTuple):
 
 
 def _quickest(timed: Callable[[float], Timing], fastest: Timing, factor: float) -> Timing:
-    """Of the `fastest` motion and those with a half, a quarter ... of the accelerations the one that is over first when
-    it is averaged over `factor` times its window.
+    """The quickest motion after averaging over `factor` times its window.
 
-    A motion takes T(a) + factor a / j, of which the first falls with a, and the second grows; neither does while the
-    grid points are too far apart for so much acceleration.
+    Candidates are the `fastest` motion and those with a half, a quarter, ... of its accelerations a. A motion takes
+    T(a) + factor a / j: the first term falls with a, the second grows. Neither does while the grid points are too far
+    apart for so much acceleration.
     """
     best, share = fastest, 1.0
     if factor * fastest.window <= _MUCH * fastest.duration:
         return best
     for _ in range(_HALVINGS):
         share /= 2.0
-        one = timed(share)
-        longer = one.duration + factor * one.window - best.duration - factor * best.window
+        timing = timed(share)
+        longer = timing.duration + factor * timing.window - best.duration - factor * best.window
         if longer > _ROUNDING:
             break
-        best = one
+        best = timing
     return best
 
 
@@ -154,8 +157,8 @@ def _progress(grid: Array, speeds: Array) -> tuple[Progress, float]:
 def _averaged(progress: Progress, nominal: float, window: float, period: float) -> tuple[Progress, float]:
     """`progress` averaged over a sliding `window` [s]: |s'''| falls to the jump of s'' over the window; T grows by it.
 
-    s, s', s'' are averaged alike (the average commutes with the derivative), on a fine grid of their common cumulative
-    sums; before the start and after the end the motion rests.
+    s, s', s'' are averaged alike (the average commutes with the derivative), by cumulative sums on a fine grid; before
+    the start and after the end the motion rests.
     """
     half = max(1, round(window / period))
     dt = period / 2.0
@@ -179,7 +182,7 @@ def _averaged(progress: Progress, nominal: float, window: float, period: float) 
 
 
 def library() -> ModuleType:
-    """The library, without the half of its import time that goes into matplotlib, which only its plots use."""
+    """The toppra module, imported without matplotlib: only its plots use that, and it is half of the import time."""
     with _late("matplotlib", "matplotlib.pyplot"):
         import toppra
     library: ModuleType = toppra
@@ -188,7 +191,7 @@ def library() -> ModuleType:
 
 @contextmanager
 def _late(*names: str) -> Iterator[None]:
-    """While this holds, importing `names` gives stand-ins, which import the real module at the first use."""
+    """Inside this context, importing `names` gives placeholders, which import the real module at the first use."""
     absent = [name for name in names if name not in sys.modules]
     if "toppra" in sys.modules or len(absent) < len(names):
         yield
@@ -204,7 +207,7 @@ def _late(*names: str) -> Iterator[None]:
 
 
 class _Late(ModuleType):
-    """A module that is imported when it is first used."""
+    """A placeholder for a module, which is imported at the first use."""
 
     def __getattr__(self, attribute: str) -> object:
         if attribute.startswith("__"):

@@ -1,4 +1,4 @@
-"""From a continuous curve of time to a trajectory with one point at every control tick, inside its limits."""
+"""Sampling of a continuous motion to a trajectory with one point per control tick, within its limits."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Curve = Callable[[Array], tuple[Array, Array, Array]]
 """times (k,) [s] -> position, velocity, acceleration, each (k, n)."""
 
 LONGEST = 600.0
-"""[s] of one motion. A longer one comes of a limit that is mistyped, and a trajectory has a point a control tick."""
-_ROUNDS = 12  # each stretches by what the samples exceed; 2 suffice, the rest is for narrow bends and kinks
+"""[s] Limit for one motion. A longer one comes from a mistyped limit, and a trajectory has a point per control tick."""
+_ROUNDS = 12  # each stretches time by the excess of the samples; 2 suffice except for narrow bends and kinks
 
 
 def excess(velocities: Array, accelerations: Array, limits: MotionLimits, *, period: float) -> float:
-    """By which factor time must be stretched so that the samples (k, n) keep the limits; 1 or less if they do.
+    """The factor by which time must be stretched for the samples (k, n) to keep the limits; 1 or less if they do.
 
     Stretching time by f divides velocity by f, acceleration by f^2, jerk by f^3, hence
     f = max(|v|/v_max, sqrt(|a|/a_max), cbrt(|da/dt|/j_max)), with the accelerations of the samples and those between.
@@ -39,7 +39,7 @@ def excess(velocities: Array, accelerations: Array, limits: MotionLimits, *, per
 def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0) -> None:
     """Refuse a motion from rest to rest along `positions` (k, n) that takes longer than `LONGEST`.
 
-    For its way d a joint needs at least d / v and 2 sqrt(d / a), and where the motion is straight cbrt(32 d / j).
+    For a distance d a joint needs at least d / v and 2 sqrt(d / a), and where the motion is straight cbrt(32 d / j).
 
     Args:
         positions: the path, by points on it; two are a straight line.
@@ -47,19 +47,19 @@ def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0
         duration: [s] that the motion is known to take.
 
     Raises:
-        NotPlannable: names the joint that needs longest, and the limit that makes it so slow.
+        NotPlannable: names the slowest joint, and the limit that slows it down.
     """
-    way = np.abs(np.diff(positions, axis=0)).sum(axis=0)
+    distance = np.abs(np.diff(positions, axis=0)).sum(axis=0)
     with np.errstate(over="ignore"):
-        squares, cubes = way / limits.acceleration, way / limits.jerk
-        least = np.array([way / limits.velocity, 2.0 * np.sqrt(squares), np.cbrt(32.0 * cubes)])
+        squares, cubes = distance / limits.acceleration, distance / limits.jerk
+        least = np.array([distance / limits.velocity, 2.0 * np.sqrt(squares), np.cbrt(32.0 * cubes)])
     if max(duration, float(least[: 3 if len(positions) == 2 else 2].max())) <= LONGEST:
         return
     which, k = np.unravel_index(int(np.argmax(least)), least.shape)
     word, joint = ("velocity", "acceleration", "jerk")[which], limits.names[k]
     raise NotPlannable(
-        f"with the {word} limit of joint '{joint}' the motion takes more than {LONGEST:g} s",
-        hint="raise that limit, or the `velocity_scaling` of the step; no motion is planned that takes longer",
+        f"the motion takes more than {LONGEST:g} s with the {word} limit of joint '{joint}'",
+        hint="raise that limit, or the step's `velocity_scaling`; longer motions are not planned",
     )
 
 
@@ -79,7 +79,7 @@ def on_ticks(
     Args:
         curve: rest-to-rest motion.
         nominal: its duration [s].
-        target: (n) position at its end, taken over exactly.
+        target: (n) position at its end, reached exactly.
         limits: what the samples must keep.
         period: control period [s].
 
@@ -90,7 +90,7 @@ def on_ticks(
     path = curve(np.linspace(0.0, nominal, 100))[0]
     for _ in range(_ROUNDS):
         refuse_endless(path, limits, nominal * stretch)
-        # The first tick not before the end, forgiving a millionth of a period of rounding.
+        # The first tick not before the end, with a tolerance of a millionth of a period for rounding.
         ticks = max(1, math.ceil(nominal * stretch / period - 1e-6))
         times = np.arange(ticks + 1) * period
         scale = nominal / times[-1]

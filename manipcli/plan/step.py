@@ -1,6 +1,6 @@
-"""The contract of steps: from the predicted state before a step to the motions that do it and the one after.
+"""Contract of steps: from the predicted state before a step to its motions and the state after it.
 
-Steps are pure: no engine, no clock; randomness comes from the planner's generator. The pipeline turns Motions into
+Steps are pure: no engine, no clock; randomness comes from the planner's generator. The pipeline turns motions into
 controller goals.
 """
 
@@ -30,14 +30,14 @@ class StepMember(Generic[S]):
         name: the verb.
         spec: what the user writes under it.
         plan: (spec, planner, state) -> StepPlan. Begins at the state; raises NotPlannable.
-        check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know.
-        uncommanded: (spec, robot, claims) -> everything in it that these controllers cannot carry out; only to be
-            asked when `check` finds nothing.
-        request: (spec) -> the switch of controllers that it asks for, so that the steps after it are checked against
-            who is active then.
-        guarded: (spec) -> whether it stops where the step's `until` comes to hold.
-        regrasp: (spec, planner, state, grasps) -> as `plan`, with the tool turned to the object in another way than
-            in any of `grasps`, R_WT (3, 3) each; None for a step that takes nothing, or in one way only.
+        check: (spec, robot, scene) -> the names and values in the spec that do not fit this robot and scene.
+        uncommanded: (spec, robot, claims) -> what these controllers cannot carry out; called only if `check` finds
+            nothing.
+        request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
+            controllers that are then active.
+        guarded: (spec) -> whether it stops as soon as the step's `until` holds.
+        alternative: (spec, planner, state, grasps) -> as `plan`, with another tool orientation than in any of
+            `grasps`, R_WT (3, 3) each; None for a step that does not grasp, or has no other grasp.
     """
 
     name: str
@@ -47,4 +47,4 @@ class StepMember(Generic[S]):
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
-    regrasp: Callable[[S, Planner, PlanningState, Sequence[Array]], StepPlan] | None = None
+    alternative: Callable[[S, Planner, PlanningState, Sequence[Array]], StepPlan] | None = None

@@ -1,4 +1,4 @@
-"""Arm and hand moving at the same time: where all joints are meanwhile, how long it takes, what is in the way."""
+"""Simultaneous motion of arm and hand: positions of all joints over time, its duration, and its collisions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manipcli.plan.trajectory import JointTrajectory
 
 
 def grip_time(planner: Planner, state: PlanningState, grip: Grip) -> float:
-    """How long the hand's references take to the target [s].
+    """Time that the hand's references take to the target [s].
 
     Raises:
         NotPlannable: longer than `LONGEST`.
@@ -24,7 +24,8 @@ def grip_time(planner: Planner, state: PlanningState, grip: Grip) -> float:
     here, speed = state.position[planner.robot.indices(grip.joints)], planner.gripper_speed
     duration = float(np.max(np.abs(grip.target - here))) / speed
     if duration > LONGEST:
-        message = f"with the speed of its controller, {speed:g}, the hand takes more than {LONGEST:g} s"
+        unit = planner.robot.joint(grip.joints[0]).unit
+        message = f"the hand takes more than {LONGEST:g} s at its controller's speed of {speed:g} {unit}/s"
         raise NotPlannable(message, hint="raise `speed` of the gripper controller")
     return duration
 
@@ -61,7 +62,7 @@ def refuse_collision(
     *,
     move: bool = False,
 ) -> None:
-    """Nothing, if the `query` finds nothing in the way of this motion, which begins in `state`.
+    """Check this motion, which begins in `state`, for collisions with the `query`.
 
     Raises:
         NotPlannable: names the pair, and the time in the motion of this `label`.
@@ -69,4 +70,4 @@ def refuse_collision(
     times, positions = swept(planner, state, trajectory, grip)
     hit = query.check_trajectory(range(positions.shape[1]), state.position, times, positions)
     if hit is not None:
-        raise planner.refusal(state, hit, "would come", f"at t = {hit.time:.2f} s of '{label}'", move=move)
+        raise planner.refusal(state, hit, "comes", f"at t = {hit.time:.2f} s of '{label}'", move=move)

@@ -1,5 +1,4 @@
-"""Whether the tool frame lies in the hand as steps take it to: +z out of the hand, y the way in which it closes; and
-whether a body fits between the open fingers."""
+"""Plausibility of the tool frame (+z out of the hand, y along the closing direction), and of an object's width."""
 
 from __future__ import annotations
 
@@ -15,24 +14,24 @@ from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import ROBOT, Planner
 
 ALONG = 0.5
-"""Cosine from which on two directions are taken for one."""
+"""Two directions with a larger cosine count as the same."""
 ACROSS = 0.7
-"""Tangent of the angle from which on two directions are taken for two: the fingers close 35 deg aside of y."""
+"""Tangent of the largest angle, 35 deg, between the closing direction of the fingers and y."""
 BEHIND = 0.03
-"""[m] A tool frame so far behind the fingers is not between them."""
+"""[m] A tool frame further behind the fingers than this is not between them."""
 LEAST = 2e-3
-"""[m] Shorter ways have no direction."""
+"""[m] Shorter displacements have no direction."""
 _WRITE = "`tool: {link: ..., pose: {xyz: ..., rpy: ...}}` in the robot file"
 
 
 def too_wide(planner: Planner, state: PlanningState, body: str, opened: str, poses: Sequence[Transform]) -> str | None:
-    """A hint where fingers on both sides of the hand, in its pose `opened`, are in the body wherever the tool is to be.
+    """A hint if the body overlaps fingers on both sides of the hand, at its pose `opened`, in every tool pose.
 
     Args:
-        planner, state: whose robot, and where everything is.
-        body: what is to be taken.
+        planner, state: the robot, and all poses.
+        body: the object to grasp.
         opened: the pose of the hand.
-        poses: `X_WT` that are tried.
+        poses: `X_WT` to check.
     """
     robot, q = planner.robot, _posed(planner, state, opened)
     X_WT = planner.solver.forward(q)
@@ -40,7 +39,7 @@ def too_wide(planner: Planner, state: PlanningState, body: str, opened: str, pos
         ROBOT + link: bool((X_WT.inverse() @ planner.kinematics.forward(q, link)).p[1] > 0.0)
         for link in moved_links(robot, planner.gripper_joints)
     }
-    k = [one.name for one in planner.scene.movable].index(body)
+    k = [movable.name for movable in planner.scene.movable].index(body)
     for goal in poses:
         X_WO = X_WT @ goal.inverse() @ state.bodies[k]  # the body brought to the hand, which needs no arm
         there = replace(state, bodies=(*state.bodies[:k], X_WO, *state.bodies[k + 1 :]))
@@ -61,20 +60,20 @@ def _posed(planner: Planner, state: PlanningState, posture: str) -> Array:
 
 
 def misplaced(planner: Planner, state: PlanningState, opened: str, closed: str) -> str | None:
-    """A hint where the tool frame does not look as if it were the hand's; None where it does.
+    """A hint if the tool frame does not look like a hand's, else None.
 
-    A guess from the shapes of the fingers, good for a hint alone: with two poses of the hand, `opened` and `closed`,
+    A heuristic on the shapes of the fingers, for a hint only: with two poses of the hand, `opened` and `closed`,
 
-        o = mean of the fingers - origin of the last link of the arm,    d_k = way of shape k from open to closed
+        o = mean of the fingers - origin of the last link of the arm,    d_k = displacement of shape k when closing
 
-    in the tool frame. o is to point along +z, the d_k along y, and the mean not to lie ahead of the frame.
+    in the tool frame, o must point along +z, the d_k along y, and the mean must not lie ahead of the frame.
     """
     robot = planner.robot
     fingers = moved_links(robot, planner.gripper_joints)
     last = robot.joint(planner.solver.joints[-1]).child
 
-    def seen(posture: str) -> tuple[Array, Array]:
-        """(k, 3) the fingers' shapes, and (3,) the last link of the arm, in the tool frame."""
+    def in_tool_frame(posture: str) -> tuple[Array, Array]:
+        """(k, 3) the fingers' shapes, and (3,) the last link of the arm."""
         q = _posed(planner, state, posture)
         X_TW = planner.solver.forward(q).inverse()
         shapes = [
@@ -85,20 +84,20 @@ def misplaced(planner: Planner, state: PlanningState, opened: str, closed: str) 
         ]
         return np.array(shapes).reshape(-1, 3), (X_TW @ planner.kinematics.forward(q, last)).p
 
-    before, wrist = seen(opened)
+    before, wrist = in_tool_frame(opened)
     if not len(before):
         return None
     middle = before.mean(axis=0)
     out = middle - wrist
     length = float(np.linalg.norm(out))
     if length > LEAST and out[2] < ALONG * length:
-        where = "back into the hand" if out[2] < -ALONG * length else "aside"
-        return f"the tool's +z is to point out of the hand, and seems to point {where}: {_WRITE}"
+        where = "back into the hand" if out[2] < -ALONG * length else "sideways"
+        return f"point the tool's +z out of the hand (it seems to point {where}): {_WRITE}"
     if middle[2] > BEHIND:
         where = f"{1000 * middle[2]:.0f} mm behind the fingers"
-        return f"the tool frame is to lie between the fingertips, and seems to lie {where}: {_WRITE}"
-    ways = seen(closed)[0] - before
-    across, along = float(np.linalg.norm(ways[:, 0])), float(np.linalg.norm(ways[:, 1]))
+        return f"put the tool frame between the fingertips (it seems to be {where}): {_WRITE}"
+    moved = in_tool_frame(closed)[0] - before
+    across, along = float(np.linalg.norm(moved[:, 0])), float(np.linalg.norm(moved[:, 1]))
     if across > LEAST and across > ACROSS * along:
-        return f"the tool's y is to be the direction in which the fingers close, and seems to be another: {_WRITE}"
+        return f"align the tool's y with the direction in which the fingers close (it seems to be another): {_WRITE}"
     return None

@@ -1,4 +1,4 @@
-"""Joint trajectories: points in time, and what lies between them.
+"""Joint trajectories: points in time, and the interpolation between them.
 
     trajectory = JointTrajectory(["joint_1"], [TrajectoryPoint([1.0], time_from_start=2.0)], start=TrajectoryPoint([0]))
     position, velocity, acceleration = trajectory.sample(0.5)
@@ -28,7 +28,7 @@ Samples = tuple[Array, Array, Array]
 
 Interpolation = Literal["splines", "none"]
 
-NO_JOINT = "the trajectory names no joint"
+NO_JOINT = "the trajectory has no joint names"
 SINGULAR = {"positions": "position", "velocities": "velocity", "accelerations": "acceleration", "efforts": "effort"}
 
 
@@ -40,25 +40,24 @@ class JointTrajectory:
         names: (n) joints, in the order of every point's arrays.
         points: `TrajectoryPoint`s or whatever has their fields, a mapping too; times strictly increasing from the
             start of the goal. Points without positions have theirs integrated from their velocities, or accelerations,
-            by the trapezoid rule; without a `start` such a trajectory cannot be sampled until somebody says where it
-            starts.
+            by the trapezoid rule; such a trajectory can only be sampled with a `start`.
         start: where the joints are at its own `time_from_start`, or their positions (n) at 0 s; leads in to the first
-            point. Velocities and accelerations that it lacks and the first point has count as 0. Unused when the first
-            point's time is not later: the reference then steps to that point.
+            point. Velocities and accelerations that only the first point has are 0 in it. Unused when the first point's
+            time is not later: the reference then steps to that point.
         interpolation: `splines`; or `none`: between two points the later one holds at once (the lead-in holds `start`).
 
     Attributes:
         names: (n).
         times: (k) [s] strictly increasing.
-        positions: (k, n); displacements where `source` says that there is no start yet.
-        velocities, accelerations: (k, n), or None where no point gives them.
+        positions: (k, n); displacements while a start is missing, see `source`.
+        velocities, accelerations: (k, n), or None if no point gives them.
         efforts: (k, n) N m or N, or None.
-        orders: (k) what each point gives: 0 positions, 1 velocities too, 2 accelerations too. None: what the arrays
-            say, the same for all points. A value that a point does not give is 0 in its array and is not used.
+        orders: (k) what each point gives: 0 positions, 1 velocities too, 2 accelerations too. None: the arrays
+            given, the same for all points. A value that a point does not give is 0 in its array and is not used.
         interpolation: see above.
         led_in: whether the first row is a start.
         integrated: whether some positions were integrated.
-        source: the points, while a start is missing from which to integrate the first; else None.
+        source: the points, while the start from which to integrate the first is missing; else None.
 
     Raises:
         InvalidArgument: no name, no point, a repeated name, a wrong number of values, NaN or infinity, a negative first
@@ -86,7 +85,7 @@ class JointTrajectory:
         interpolation: Interpolation = "splines",
     ) -> None:
         if isinstance(names, str):
-            raise InvalidArgument("TRAJ100", f"the names are one text, '{names}'; expected a list of joints")
+            raise InvalidArgument("TRAJ100", f"the joint names are a string, '{names}'; expected a list")
         if not names:
             raise InvalidArgument("TRAJ100", NO_JOINT)
         read = read_points(points, start, len(names))
@@ -174,14 +173,14 @@ class JointTrajectory:
     def sample(self, time: float | npt.ArrayLike) -> Samples:
         """Position, velocity and acceleration at `time` [s] from the start of the goal.
 
-        With T the length of a segment, t the time since its first point, D the way between its points:
+        With T the duration of a segment, t the time since its first point, D the distance between its points:
         linear: p0 + D t / T. Cubic: c2 = (3 D - (2 v0 + v1) T) / T^2, c3 = (-2 D + (v0 + v1) T) / T^3.
         Quintic: c2 = a0 / 2, c3 = (20 D - (8 v1 + 12 v0) T - (3 a0 - a1) T^2) / (2 T^3),
         c4 = (-30 D + (14 v1 + 16 v0) T + (3 a0 - 2 a1) T^2) / (2 T^4),
         c5 = (12 D - 6 (v1 + v0) T + (a1 - a0) T^2) / (2 T^5).
 
-        At the time of a point its own values come back bit by bit, and where two segments meet the later one answers
-        for what the point does not give. After the last point: that point, again and again.
+        At the time of a point its own values are returned exactly; where two segments meet, the later one gives what
+        the point does not. After the last point, the last point is returned.
 
         Args:
             time: a number, or (T,).
@@ -190,8 +189,8 @@ class JointTrajectory:
             Three arrays (n), or (T, n): rad or m, per second, per second squared.
 
         Raises:
-            InvalidArgument: a time that is NaN or before the first point (there is nothing to know there), or a
-                trajectory of integrated points that has no start.
+            InvalidArgument: a time that is NaN or before the first point, or a trajectory of integrated points that has
+                no start.
         """
         t = np.asarray(time, dtype=np.float64)
         flat = np.atleast_1d(t)
@@ -200,7 +199,7 @@ class JointTrajectory:
         return samples if t.ndim else (samples[0][0], samples[1][0], samples[2][0])
 
     def sample_effort(self, time: float | npt.ArrayLike) -> Array:
-        """Effort at `time`, linear between two points: (n), or (T, n); N m or N; 0 where no point gives any.
+        """Effort at `time`, linear between two points: (n), or (T, n); N m or N; 0 if no point gives any.
 
         Raises:
             InvalidArgument: as `sample`.
@@ -217,7 +216,7 @@ class JointTrajectory:
         return efforts if t.ndim else efforts[0]
 
     def of_joints(self, names: Sequence[str]) -> JointTrajectory:
-        """The same for some of its joints, or for all in another order."""
+        """The trajectory of some of its joints, or of all in another order."""
         if tuple(names) == self.names:
             return self
         order = [self.names.index(name) for name in names]
@@ -236,9 +235,9 @@ class JointTrajectory:
         return made
 
     def with_spline_velocities(self, begin: Array | None = None) -> JointTrajectory:
-        """Where points give positions alone: with the velocities of the cubic spline that ends at rest.
+        """With the velocities of the cubic spline that ends at rest, if points give only positions.
 
-        Velocity and acceleration are then continuous. Others come back as they are.
+        Velocity and acceleration are then continuous. Other trajectories are returned unchanged.
 
         Args:
             begin: (n) the velocity of the first point; None: at rest.
@@ -255,7 +254,7 @@ class JointTrajectory:
         )  # fmt: skip
 
     def with_interpolation(self, interpolation: Interpolation) -> JointTrajectory:
-        """The same points, with this between them."""
+        """The same points with this interpolation."""
         if interpolation == self.interpolation:
             return self
         if self.source is not None:
@@ -268,7 +267,9 @@ class JointTrajectory:
     def _refuse(self, t: Array) -> None:
         if self.source is not None:
             hint = "give a start: JointTrajectory(names, points, start)"
-            raise InvalidArgument("TRAJ111", "the first point gives no positions, so they are unknown", hint=hint)
+            raise InvalidArgument(
+                "TRAJ111", "the first point has no positions, and the trajectory has no start", hint=hint
+            )
         if not bool((t >= self.times[0]).all()):
             raise InvalidArgument(
                 "TRAJ110",
@@ -276,7 +277,6 @@ class JointTrajectory:
             )
 
     def _held(self, t: Array) -> npt.NDArray[np.intp]:
-        """The point that holds at each time where nothing is interpolated."""
         index = np.minimum(np.searchsorted(self.times, t, side="right"), len(self.times) - 1)
         if self.led_in:
             index[t < self.times[min(1, len(self.times) - 1)]] = 0
@@ -309,8 +309,8 @@ class JointTrajectory:
                     tau = (t[rows] - self.times[i])[:, None]
                     length = (self.times[i + 1] - self.times[i])[:, None]
                     position[rows], velocity[rows], acceleration[rows] = evaluate(i, tau, length)
-        # The end of a curve is the point itself, not its rounded curve; of what the point lacks, the curve knows more.
-        # Where it lacks the velocity, too, a straight line ends at rest, as it goes on afterwards.
+        # The last point is returned exactly, without rounding of the curve. The curve supplies what the point lacks; a
+        # straight line without velocities ends at rest, because it rests afterwards.
         last = t >= self.times[-1]
         given = self.order if self.orders is None else int(self.orders[-1])
         position[last] = self.positions[-1]
@@ -330,9 +330,9 @@ class JointTrajectory:
     def _cubic(self, i: npt.NDArray[np.intp], tau: Array, length: Array) -> Samples:
         assert self.velocities is not None
         p0, v0, v1 = self.positions[i], self.velocities[i], self.velocities[i + 1]
-        way = self.positions[i + 1] - p0
-        c2 = (3.0 * way - (2.0 * v0 + v1) * length) / length**2
-        c3 = (-2.0 * way + (v0 + v1) * length) / length**3
+        delta = self.positions[i + 1] - p0
+        c2 = (3.0 * delta - (2.0 * v0 + v1) * length) / length**2
+        c3 = (-2.0 * delta + (v0 + v1) * length) / length**3
         return (
             p0 + tau * (v0 + tau * (c2 + tau * c3)),
             v0 + tau * (2.0 * c2 + tau * 3.0 * c3),
@@ -343,11 +343,11 @@ class JointTrajectory:
         assert self.velocities is not None and self.accelerations is not None
         p0, v0, v1 = self.positions[i], self.velocities[i], self.velocities[i + 1]
         a0, a1 = self.accelerations[i], self.accelerations[i + 1]
-        way = self.positions[i + 1] - p0
+        delta = self.positions[i + 1] - p0
         c2 = 0.5 * a0
-        c3 = (20.0 * way - (8.0 * v1 + 12.0 * v0) * length - (3.0 * a0 - a1) * length**2) / (2.0 * length**3)
-        c4 = (-30.0 * way + (14.0 * v1 + 16.0 * v0) * length + (3.0 * a0 - 2.0 * a1) * length**2) / (2.0 * length**4)
-        c5 = (12.0 * way - 6.0 * (v1 + v0) * length + (a1 - a0) * length**2) / (2.0 * length**5)
+        c3 = (20.0 * delta - (8.0 * v1 + 12.0 * v0) * length - (3.0 * a0 - a1) * length**2) / (2.0 * length**3)
+        c4 = (-30.0 * delta + (14.0 * v1 + 16.0 * v0) * length + (3.0 * a0 - 2.0 * a1) * length**2) / (2.0 * length**4)
+        c5 = (12.0 * delta - 6.0 * (v1 + v0) * length + (a1 - a0) * length**2) / (2.0 * length**5)
         return (
             p0 + tau * (v0 + tau * (c2 + tau * (c3 + tau * (c4 + tau * c5)))),
             v0 + tau * (2.0 * c2 + tau * (3.0 * c3 + tau * (4.0 * c4 + tau * 5.0 * c5))),
@@ -361,7 +361,7 @@ def _validate(trajectory: JointTrajectory) -> None:
         raise InvalidArgument("TRAJ100", NO_JOINT)
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
-        raise InvalidArgument("TRAJ104", f"joint '{repeated[0]}' is named twice in the trajectory")
+        raise InvalidArgument("TRAJ104", f"duplicate joint '{repeated[0]}' in the trajectory")
     if times.ndim != 1 or times.size == 0:
         raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")
     shape = (times.size, len(names))
@@ -373,7 +373,7 @@ def _validate(trajectory: JointTrajectory) -> None:
         if array is None:
             continue
         if array.shape != shape:
-            raise InvalidArgument("TRAJ102", f"{field} have the shape {array.shape}; expected {shape}: points, joints")
+            raise InvalidArgument("TRAJ102", f"{field} have the shape {array.shape}; expected {shape} (points, joints)")
         if not np.isfinite(array).all():
             k, j = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
             raise InvalidArgument(

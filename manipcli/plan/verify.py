@@ -1,4 +1,4 @@
-"""Does a trajectory keep its limits? Checked point by point, and against differences of its own positions."""
+"""Verification that a trajectory keeps its limits: point by point, and by finite differences of its positions."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from manipcli.plan.limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
 
 TOLERANCE = 0.005
-"""Relative excess of velocity, acceleration and jerk that is forgiven."""
+"""Relative excess of velocity, acceleration and jerk that is accepted."""
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
-"""What of each is by the second, after the unit of the position."""
+"""Suffix of the unit of each, after the unit of the position."""
 ORDER = {"velocity": 1, "acceleration": 2, "jerk": 3}
-"""With what power of the time of the same path each falls."""
+"""Power of the duration with which each decreases along the same path."""
 _POSITION = 1e-9  # rad or m: rounding of a trajectory that touches its limit
 
 
@@ -30,17 +30,17 @@ def verify(
     tolerance: float = TOLERANCE,
     given: JointTrajectory | None = None,
 ) -> None:
-    """Refuse a trajectory that leaves a limit of position, velocity, acceleration or (where finite) jerk.
+    """Refuse a trajectory that exceeds a limit of position, velocity, acceleration or (where finite) jerk.
 
-    Velocity and acceleration are checked both as stated by the points and as what the positions do: difference
-    quotients between neighbouring points, (q_k+1 - q_k)/dt and (v_k+1 - v_k)/dt, which are means over the
-    interval, so a motion inside its limits passes them, too.
+    Velocity and acceleration are checked both as given by the points and as difference quotients between neighbouring
+    points, (q_k+1 - q_k)/dt and (v_k+1 - v_k)/dt. These are means over the interval, so a motion within its limits
+    passes them, too.
 
     Args:
         trajectory: a point at every control tick; its names are those of `limits`.
         limits: infinite entries are not checked.
         tolerance: relative; position has none.
-        given: the points that a user wrote, if the trajectory is of such: the hint says how to make them slower.
+        given: the points that a user wrote, if any: the hint explains how to slow them down.
 
     Raises:
         NotPlannable: names the joint, the value, the limit and the time.
@@ -69,15 +69,15 @@ def verify_written(
     *,
     when: str = "",
 ) -> None:
-    """Refuse a position that a user wrote outside of its joint's limits.
+    """Refuse a position in the task file that is outside its joint's limits.
 
     Args:
-        robot: whose joints.
-        written: (joint, position, where below the step's verb it stands).
-        when: of a point that has a time.
+        robot: of the joints.
+        written: (joint, position, its location below the step's verb).
+        when: the time of the point, as text.
 
     Raises:
-        NotPlannable: names the joint, the position and the limit, and says where that position stands.
+        NotPlannable: names the joint, the position, the limit, and the location of the position.
     """
     for name, value, loc in written:
         joint = robot.joint(name)
@@ -100,12 +100,12 @@ def _beyond(
     *,
     change: str = "the goal",
 ) -> NotPlannable:
-    """What to tell of a joint that `does` something at a position, {}, beyond this limit; `change` what instead."""
+    """The refusal of a joint that `does` something at a position, {}, beyond this limit; `change` is for the hint."""
     word = ("lower", "upper")[side]
     there, most = told_apart(value, limit, form=".4f")
     bound = f"{'soft ' if soft else ''}{word} limit {most} {unit}"
     message = f"joint '{name}' {does.format(f'{there} {unit}')}, beyond its {bound}"
-    hint = f"plans stay within soft limits: change {change}, or `soft_{word}` or `k_position` in the robot file"
+    hint = f"change {change}, or `soft_{word}` or `k_position` in the robot file; plans stay within soft limits"
     return NotPlannable(message, hint=hint if soft else None)
 
 
@@ -122,7 +122,6 @@ def _outside(trajectory: JointTrajectory, limits: MotionLimits) -> Array:
 
 
 def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
-    """The worst position outside its limits, if any."""
     q, outside = trajectory.positions, _outside(trajectory, limits)
     k, i = np.unravel_index(int(np.argmax(outside)), outside.shape)
     if outside[k, i] > _POSITION:
@@ -154,16 +153,15 @@ def _bounded(
         unit = limits.unit(name) + PER[word]
         longer = math.ceil(100.0 * float(ratio[k, i]) ** (1.0 / ORDER[word])) / 100.0
         raise NotPlannable(
-            f"joint '{name}' would need {word} {needed} {unit} at t = {times[k]:.3f} s; its limit is {most} {unit}",
+            f"joint '{name}' needs {word} {needed} {unit} at t = {times[k]:.3f} s; its limit is {most} {unit}",
             hint=None if given is None else _slower(given, longer),
         )
 
 
 def _slower(given: JointTrajectory, longer: float) -> str:
-    """How the same path takes `longer` times as long."""
-    words = ["every `time_from_start` times that"]
+    words = ["multiply every `time_from_start` by it"]
     if given.velocities is not None:
-        words.append("`velocities` divided by it")
+        words.append("divide `velocities` by it")
     if given.accelerations is not None:
-        words.append("`accelerations` by its square")
-    return f"slower by {longer:g} it is kept: {', '.join(words)}"
+        words.append("divide `accelerations` by its square")
+    return f"slow the trajectory down by a factor of {longer:g}: {', '.join(words)}"

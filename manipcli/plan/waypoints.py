@@ -1,4 +1,4 @@
-"""Points of joint trajectories, as ROS writes them, and from points to arrays."""
+"""Points of joint trajectories, in the form of ROS messages, and their conversion to arrays."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Values = Sequence[float] | Array
 
 
 class RosDuration(Protocol):
-    """builtin_interfaces/Duration; ROS 1's, with `secs` and `nsecs`, will do, too."""
+    """builtin_interfaces/Duration; ROS 1's, with `secs` and `nsecs`, is accepted, too."""
 
     @property
     def sec(self) -> int: ...
@@ -32,7 +32,7 @@ class RosDuration(Protocol):
 
 
 class Waypoint(Protocol):
-    """What a point has: trajectory_msgs/JointTrajectoryPoint. Not given is None or empty; `effort` may be absent."""
+    """Fields of trajectory_msgs/JointTrajectoryPoint. Missing fields are None or empty; `effort` may be absent."""
 
     @property
     def positions(self) -> Values | None: ...
@@ -45,15 +45,15 @@ class Waypoint(Protocol):
 
 
 Point = Waypoint | Mapping[str, object]
-"""Its fields may also stand in a mapping, as a message in YAML does."""
+"""The fields may also be a mapping, as in a YAML message."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrajectoryPoint:
     """One point: `positions` (n) rad or m, its derivatives where given, `time_from_start` [s].
 
-    Positions may be left out where velocities or accelerations are given: they are integrated. `effort` (n) N m or N
-    is added to the command of an effort interface.
+    Positions may be left out where velocities or accelerations are given; they are then integrated. `effort` (n) N m
+    or N is added to the command of an effort interface.
     """
 
     positions: Values | None = None
@@ -70,10 +70,10 @@ class PointArrays:
     Attributes:
         times: (k) [s].
         orders: (k) what each point gives, as above.
-        efforts: (k, n), or None where no point gives any.
+        efforts: (k, n), or None if no point gives any.
         integrated: whether some positions were integrated.
-        source: the points, where the first of them was without a start: positions are displacements from wherever it
-            will be. Else None.
+        source: the points, if the first has no positions and there is no start: positions are then displacements. Else
+            None.
         led_in: whether the first row is the start.
     """
 
@@ -106,28 +106,28 @@ class _Row:
 
 
 def read_points(given: Sequence[Point], begins: Point | Values | None, n: int) -> PointArrays:
-    """Points of `n` joints, after the one where it `begins` (or its positions, at 0 s), if there is one.
+    """Arrays of the points of `n` joints, after a start point `begins` (or its positions, at 0 s), if there is one.
 
-    That one leads in to a first point that is later. Velocities and accelerations that it lacks and the first point has
-    count as 0. Missing positions (velocities) are integrated from the point before by the trapezoid rule:
+    The start leads in to a first point that is later. Velocities and accelerations that only the first point has are 0
+    in the start. Missing positions (velocities) are integrated from the point before by the trapezoid rule:
 
         v1 = v0 + T (a0 + a1) / 2,  p1 = p0 + T (v0 + v1) / 2
 
     Raises:
-        InvalidArgument: no points, a point that gives nothing or a wrong number of values, a mapping without a time,
-            accelerations beside positions but no velocities, efforts at some points and not at others.
+        InvalidArgument: no points, a point without values or with a wrong number of them, a mapping without a time,
+            accelerations with positions but without velocities, efforts at only some points.
     """
     points = _as_points(given)
-    for k, one in enumerate(given):
-        if isinstance(one, Mapping) and "time_from_start" not in one:
+    for k, point in enumerate(given):
+        if isinstance(point, Mapping) and "time_from_start" not in point:
             raise InvalidArgument("TRAJ113", f"point {k} has no time_from_start", hint="give it in seconds")
     start = TrajectoryPoint(begins) if isinstance(begins, Sequence | np.ndarray) else begins
     if not points:
         raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")
-    rows = [_row(point, n, f"point {k}") for k, point in enumerate(points)]
+    rows = [_row(waypoint, n, f"point {k}") for k, waypoint in enumerate(points)]
     begin = None if start is None else _row(_as_point(start, "the start state"), n, "the start state")
     if begin is not None and begin.position is None:
-        raise InvalidArgument("TRAJ102", "the start state has 0 positions; expected " + _one_a_joint(n))
+        raise InvalidArgument("TRAJ102", "the start state has 0 positions; expected " + _one_per_joint(n))
     integrated = any(row.position is None for row in rows)
     relative = rows[0].position is None and begin is None
     before = begin if begin is not None else _Row(0.0, np.zeros(n), None, None, None)
@@ -169,14 +169,14 @@ def _row(point: Waypoint, n: int, what: str) -> _Row:
         try:
             array = np.zeros(0) if given is None else np.atleast_1d(np.asarray(given, dtype=np.float64))
         except (TypeError, ValueError):
-            raise InvalidArgument("TRAJ102", f"{what} has {field} that are no numbers: {given!r}") from None
+            raise InvalidArgument("TRAJ102", f"{what} has {field} that are not numbers: {given!r}") from None
         if array.size and array.shape != (n,):
             message = f"{what} has {array.size} {'efforts' if field == 'effort' else field}; expected "
-            raise InvalidArgument("TRAJ102", message + _one_a_joint(n))
+            raise InvalidArgument("TRAJ102", message + _one_per_joint(n))
         values.append(array if array.size else None)
     position, velocity, acceleration, effort = values
     if position is None and velocity is None and acceleration is None:
-        raise InvalidArgument("TRAJ102", f"{what} has 0 positions; expected {_one_a_joint(n)}")
+        raise InvalidArgument("TRAJ102", f"{what} has 0 positions; expected {_one_per_joint(n)}")
     if position is not None and velocity is None and acceleration is not None:
         raise InvalidArgument("TRAJ103", f"{what} has accelerations but no velocities", hint="give velocities too")
     return _Row(seconds(point, what), position, velocity, acceleration, effort)
@@ -184,7 +184,7 @@ def _row(point: Waypoint, n: int, what: str) -> _Row:
 
 def _as_points(given: Sequence[Point]) -> list[Waypoint]:
     if not isinstance(given, Sequence):
-        raise InvalidArgument("TRAJ101", f"the points are {type(given).__name__}; expected a list of them")
+        raise InvalidArgument("TRAJ101", f"the points are {type(given).__name__}; expected a list")
     return [_as_point(point, f"point {k}") for k, point in enumerate(given)]
 
 
@@ -193,16 +193,18 @@ def _as_point(given: Point, what: str) -> Waypoint:
         known = [field.name for field in fields(TrajectoryPoint)]
         for key in given:
             if key not in known:
-                raise InvalidArgument("TRAJ112", f"{what} has an unknown '{key}'", hint=did_you_mean(str(key), known))
-        return TrajectoryPoint(**given)  # type: ignore[arg-type]  # what they hold is looked at where it is read
+                raise InvalidArgument(
+                    "TRAJ112", f"{what} has an unknown field '{key}'", hint=did_you_mean(str(key), known)
+                )
+        return TrajectoryPoint(**given)  # type: ignore[arg-type]  # values are checked where they are read
     if not hasattr(given, "positions"):
-        message = f"{what} is {given!r}; expected a TrajectoryPoint, or what has its fields"
+        message = f"{what} is {given!r}; expected a TrajectoryPoint, or an object with its fields"
         raise InvalidArgument("TRAJ112", message)
     return given
 
 
 def columns_of(point: Waypoint, order: Sequence[int]) -> TrajectoryPoint:
-    """The point for these of its joints."""
+    """The point with these columns of its joints."""
 
     def chosen(field: str) -> Array | None:
         values = getattr(point, field, None)
@@ -217,7 +219,7 @@ def seconds(point: Waypoint, what: str = "a point") -> float:
     """Its `time_from_start` [s].
 
     Raises:
-        InvalidArgument: it is no time.
+        InvalidArgument: it is not a time.
     """
     time: object = getattr(point, "time_from_start", None)
     if isinstance(time, int | float | np.number):
@@ -225,19 +227,19 @@ def seconds(point: Waypoint, what: str = "a point") -> float:
     if isinstance(time, timedelta):
         return time.total_seconds()
     for pair in (("sec", "nanosec"), ("secs", "nsecs")):
-        said = [time.get(key) if isinstance(time, Mapping) else getattr(time, key, None) for key in pair]
-        whole, nano = (0 if each is None else each for each in said)
-        if said != [None, None] and isinstance(whole, int | np.integer) and isinstance(nano, int | np.integer):
+        parts = [time.get(key) if isinstance(time, Mapping) else getattr(time, key, None) for key in pair]
+        whole, nano = (0 if part is None else part for part in parts)
+        if parts != [None, None] and isinstance(whole, int | np.integer) and isinstance(nano, int | np.integer):
             return float(whole + 1e-9 * nano)
-    raise InvalidArgument("TRAJ113", f"{what} has the time_from_start {time!r}; expected seconds, or a duration of ROS")
+    raise InvalidArgument("TRAJ113", f"{what} has the time_from_start {time!r}; expected seconds, or a ROS duration")
 
 
-def _one_a_joint(n: int) -> str:
-    return f"{n}, one a joint"
+def _one_per_joint(n: int) -> str:
+    return f"{n}, one per joint"
 
 
 def _integrate(before: _Row, row: _Row) -> None:
-    """What `row` lacks, from the row before; what that lacks counts as 0."""
+    """Fills in what `row` lacks, from the row before; missing values there count as 0."""
     period = max(0.0, row.time - before.time)
     v0 = 0.0 if before.velocity is None else before.velocity
     a0 = 0.0 if before.acceleration is None else before.acceleration
@@ -255,5 +257,7 @@ def _efforts(rows: Sequence[_Row], led_in: bool) -> Array | None:
     if len(given) < len(rows):
         k = next(k for k, row in enumerate(rows) if row.effort is None) - led_in
         where = "the start state" if k < 0 else f"point {k}"
-        raise InvalidArgument("TRAJ108", f"{where} gives no efforts, but others do", hint="give them at every point")
+        raise InvalidArgument(
+            "TRAJ108", f"{where} has no efforts, but other points have", hint="give efforts at every point"
+        )
     return np.array(given)

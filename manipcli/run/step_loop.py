@@ -83,7 +83,7 @@ class StepLoop:
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
         self._monitors = Monitors(task.spec.watch, task.spec.expect, live)
-        self._executor = Executor(session, touch=self._physics, told=on_goal, alarm=self._look)
+        self._executor = Executor(session, touch=self._physics, on_goal=on_goal, alarm=self._look)
         replan = task.spec.replan
         self._replans = replan is not False
         self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)

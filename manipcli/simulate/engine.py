@@ -1,7 +1,7 @@
-"""The contract of engines: a world that can be read, commanded and stepped.
+"""Contract of engines: a world that can be read, commanded and stepped.
 
-A constructed engine is usable: the robot stands at its start position, the bodies at theirs. One engine object owns one
-world; two in one process do not meet. Engines know no time: the session counts ticks.
+A constructed engine is ready: the robot and the bodies are at their start poses. One engine object owns one world; two
+engines in one process are independent. Engines have no clock: the session counts ticks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from manipcli.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class EngineSettings:
-    """`step` [s]: one physics step; `substeps`: physics steps a control tick; `start` (n): where the joints begin."""
+    """`step` [s]: one physics step; `substeps`: physics steps per control tick; `start` (n): joint positions."""
 
     step: float
     substeps: int
@@ -32,27 +32,27 @@ class Engine(Protocol):
 
     @property
     def ideal(self) -> bool:
-        """Whether it follows references instead of commands."""
+        """Whether it tracks references exactly, instead of executing commands."""
         ...
 
     def read(self, *, velocities: bool = True) -> WorldState:
-        """The true state now; `time` is the session's to fill. The arrays are overwritten by the next read.
+        """The true state now; the session sets `time`. The arrays are overwritten by the next read.
 
-        Without `velocities` those of the bodies may stay as they were read last.
+        Without `velocities`, the velocities of bodies may be those of an earlier read.
         """
         ...
 
     def write(self, command: JointCommand) -> None:
-        """What the joints obey until the next write; an ideal engine makes the references in it come true."""
+        """Set the command of the joints until the next write; an ideal engine tracks its references exactly."""
         ...
 
     def sense_wrench(self, joint: str) -> Array:
-        """A force/torque sensor at a joint, fixed or not, from now on.
+        """Add a force/torque sensor at a joint, fixed or not.
 
         Returns:
-            (6) force [N] and torque [N m] that the child link, with all that hangs on it, puts on the parent, in the
-            child's frame L and about its origin; overwritten by every read. Zeros before the first tick, and always
-            in an engine without physics.
+            (6) force [N] and torque [N m] of the child link, with all links below it, on the parent, in the child's
+            frame L and about its origin; overwritten by every read. Zeros before the first tick, and always in an
+            engine without physics.
         """
         ...
 
@@ -61,12 +61,12 @@ class Engine(Protocol):
         ...
 
     def touches_changed(self) -> bool:
-        """Whether other things touch than when `contacts` was last asked, or some point of contact of the robot carries
-        much more than any of them did; cheaper than to ask it."""
+        """Whether parts touch or part since the last call of `contacts`, or the force at a contact point of
+        the robot grew a lot; cheaper than `contacts`."""
         ...
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Everything that touches now, sorted by the names of the parts."""
+        """All contacts now, sorted by the names of the parts."""
         ...
 
     def close(self) -> None:
@@ -80,11 +80,11 @@ class EngineMember:
 
     Attributes:
         name: as in `simulation: {engine: ...}`.
-        physics: tells judges what can be known: "none" leaves objects where they stand.
-        refuses: (robot) -> everything for which the engine cannot hold this robot.
-        open: (robot, scene, settings) -> a running engine, for a robot that it does not refuse.
+        physics: for judges: with "none", objects do not move.
+        refuses: (robot) -> all reasons why the engine cannot load this robot.
+        open: (robot, scene, settings) -> a running engine, for a robot without such reasons.
         version: of the engine, for the log.
-        prepare: imports the engine's library, which otherwise the first world does.
+        prepare: imports the engine's library, which is otherwise imported by the first world.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Turns motions into controller goals and steps the session until they are done."""
+"""Execution of motions: sends controller goals and steps the session until they are done."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from manipcli.simulate.session import SLOW, Session
 Until = Callable[[WorldState], bool]
 """Whether the condition that a step waits for holds in a state."""
 Alarm = Callable[[WorldState], str]
-"""What is wrong with the state of a tick, for which everything stops at once; nothing where it may go on."""
+"""Maps the state of a tick to the reason for an immediate stop; empty if there is none."""
 
 UNTIL_TICKS: Final = SLOW
-"""Control ticks between two looks at an `until`."""
+"""Control ticks between two evaluations of an `until`."""
 REST: Final = 0.5
-"""How long [s] the robot holds still after it was stopped."""
+"""[s] Time that the robot holds still after a stop."""
 PATIENCE: Final = 30.0
-"""A motion without a deadline that takes so much longer [s] than planned is given up."""
+"""[s] A motion without a deadline is aborted this long after its planned end."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionEnd:
     """How a motion or a wait ended.
 
-    `awaited`: its time was over because the condition under `until` did not hold; `weak`: it is done, and a finger did
-    not press as hard as it was asked to.
+    `awaited`: it timed out because the condition under `until` did not hold; `weak`: it is done, but a finger pressed
+    with less than the requested force.
     """
 
     outcome: Literal["done", "failed", "timeout"]
@@ -50,17 +50,17 @@ DONE: Final = MotionEnd("done")
 
 
 class Alarmed(Exception):
-    """An alarm went off in the tick before; the robot still moves."""
+    """An alarm was raised in the last tick; the robot still moves."""
 
 
 class Executor:
-    """Carries motions out, one after the other.
+    """Executes motions one after the other.
 
     Args:
         session: what is stepped.
-        touch: whether anything can touch; where nothing can, a hand that closed on nothing is no failure.
-        told: is told of every goal: the name of the controller, and the handle.
-        alarm: is asked after every tick; `run`, `wait` and `hold` raise `Alarmed` with what it answers.
+        touch: whether the engine has contacts; if not, a hand that closed on nothing is not a failure.
+        on_goal: called with every goal: the name of the controller, and the handle.
+        alarm: called after every tick; `run`, `wait` and `hold` raise `Alarmed` with its reason.
     """
 
     def __init__(
@@ -68,34 +68,34 @@ class Executor:
         session: Session,
         *,
         touch: bool = True,
-        told: Callable[[str, GoalHandle], None] | None = None,
+        on_goal: Callable[[str, GoalHandle], None] | None = None,
         alarm: Alarm | None = None,
     ) -> None:
         self._session = session
         self._touch = touch
-        self._tell = told
+        self._on_goal = on_goal
         self._alarm = alarm
         self._handles: tuple[GoalHandle, ...] = ()
         self._serving: tuple[Follower | Hand, ...] = ()
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
-        """Send the motion's goals and tick until all are reached and its duration is over.
+        """Send the motion's goals and tick until all are reached and its duration has passed.
 
         Args:
-            motion: what to do.
-            until: waited for in addition, where the motion awaits it; a guarded one stops where it holds.
-            deadline: simulated time [s] at which the step's time is over; None: `PATIENCE` after the planned end.
+            motion: to execute.
+            until: also waited for, if the motion awaits it; a guarded motion stops when it holds.
+            deadline: simulated time [s] at which the step times out; None: `PATIENCE` after the planned end.
 
-        What does not end well ends with all goals canceled: the controllers bring the joints to rest.
+        On a failure or a timeout all goals are canceled: the controllers bring the joints to rest.
         """
         session = self._session
         latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
-        told = ""
+        switch_text = ""
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
-            told = _told(switched)
+            switch_text = _switch_text(switched)
             if not switched.ok:
-                return MotionEnd("failed", told)
+                return MotionEnd("failed", switch_text)
         handles = self._handles = self._send(motion)
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
@@ -120,16 +120,16 @@ class Executor:
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
                 return replace(DONE, text=f"stopped {when}: `until` held")
             if not busy and (awaited is None or holds):
-                return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
+                return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
             if over and deadline is not None:
-                late = "this motion was" if busy else "the condition under `until` held"
-                late = f"the time of the step was over before {late}"
+                late = "this motion ended" if busy else "the condition under `until` held"
+                late = f"the step timed out before {late}"
                 if busy and session.ticks >= last_tick:  # it should be over by now
                     late += f"; {self._furthest()}"
                 self._cancel()
                 return MotionEnd("timeout", late, awaited=not busy)
             if over:
-                late = f"it is not over {PATIENCE:g} s after its planned end; {self._furthest()}"
+                late = f"the motion has not ended {PATIENCE:g} s after its planned end; {self._furthest()}"
                 self._cancel()
                 return MotionEnd("timeout", late)
 
@@ -142,7 +142,7 @@ class Executor:
             looks = self._session.ticks % UNTIL_TICKS == 0 or self._session.time >= deadline
             if looks and until(state):
                 return DONE
-        return MotionEnd("timeout", "the condition under `until` did not come to hold", awaited=True)
+        return MotionEnd("timeout", "the condition under `until` did not hold in time", awaited=True)
 
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
@@ -150,13 +150,13 @@ class Executor:
             self._tick()
 
     def stop(self) -> None:
-        """Cancel what is on, let the joints slow down within their limits, and hold still; no alarm is heard now."""
+        """Cancel active goals, let the joints stop within their limits, and hold still; alarms are ignored."""
         self._cancel()
         for _ in range(self._ticks(REST)):
             self._session.tick()
 
     def _come_to_rest(self) -> None:
-        """Cancel what is on, and tick until nothing is told to move any more, or a controller fails."""
+        """Cancel active goals, and tick until all references rest, or a controller fails."""
         self._cancel()
         self._tick()
         faults = self._session.manager.faults
@@ -165,13 +165,13 @@ class Executor:
             faults = self._session.manager.faults
 
     def _ticks(self, duration: float) -> int:
-        """In how many ticks `duration` [s] is over."""
+        """The number of ticks in `duration` [s]."""
         return math.ceil(duration / self._session.period - 1e-6)
 
     def _tick(self) -> WorldState:
         """
         Raises:
-            Alarmed: something is wrong with the state.
+            Alarmed: the alarm has a reason to stop.
         """
         state = self._session.tick()
         wrong = "" if self._alarm is None else self._alarm(state)
@@ -193,18 +193,18 @@ class Executor:
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not is_hand(gripper):
-                raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
+                raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is not a gripper")
             handles.append(self._announced(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip))))
             self._serving += (gripper,)
         return tuple(handles)
 
     def _announced(self, controller: str, handle: GoalHandle) -> GoalHandle:
-        if self._tell is not None:
-            self._tell(controller, handle)
+        if self._on_goal is not None:
+            self._on_goal(controller, handle)
         return handle
 
     def _completed(self, trajectory: JointTrajectory, follower: Follower) -> JointTrajectory:
-        """The trajectory with the other joints of its controller, which stay where they are wanted now."""
+        """The trajectory with the other joints of its controller, which keep their present references."""
         others = tuple(name for name in follower.joints if name not in trajectory.names)
         if not others:
             return trajectory
@@ -225,7 +225,7 @@ class Executor:
         )  # fmt: skip
 
     def _furthest(self) -> str:
-        """Of the joints whose goals are still active, the one that is furthest from its reference."""
+        """Text on the joint with an active goal that is furthest from its reference."""
         active = [
             (abs(error), name)
             for controller, handle in zip(self._serving, self._handles, strict=True)
@@ -234,7 +234,7 @@ class Executor:
         ]
         far, name = max(active)
         unit = self._session.robot.joint(name).unit
-        return f"joint '{name}' is {far:.3g} {unit} from its reference, further than the others"
+        return f"joint '{name}' is {far:.3g} {unit} from its reference, the largest error"
 
     def _cancel(self) -> None:
         for handle in self._handles:
@@ -242,19 +242,18 @@ class Executor:
 
 
 def _fault(session: Session) -> MotionEnd:
-    """A controller failed, if only one that nobody waits for: the robot is no longer what the task was planned for."""
+    """A controller failed, even if no step uses it: the robot is no longer the one that the task was planned for."""
     return MotionEnd("failed", session.manager.faults[-1].message)
 
 
-def _told(switched: SwitchResult) -> str:
-    """What came of a switch."""
+def _switch_text(switched: SwitchResult) -> str:
     parts = [f"activated {', '.join(switched.activated)}"] if switched.activated else []
     parts += [f"deactivated {', '.join(switched.deactivated)}"] if switched.deactivated else []
     return "; ".join((*parts, *switched.messages)) or "nothing to switch"
 
 
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:
-    """Done; unless the hand was to hold something and no finger met anything, or to open and something stopped one."""
+    """Done, unless the hand must hold something and no finger met anything, or must open and a finger was stopped."""
     text = "; ".join(handle.result.text for handle in handles if handle.result is not None and handle.result.fingers)
     weak = False
     if motion.grip is not None:

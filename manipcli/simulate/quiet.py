@@ -1,6 +1,6 @@
-"""Keeps what C libraries print off stdout, where only results belong.
+"""Redirection of the output of C libraries away from stdout, which is for results.
 
-Works on file descriptors, because C code knows nothing of `sys.stdout`; one that is closed stays closed.
+It works on file descriptors, because C code does not use `sys.stdout`; a closed descriptor stays closed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ STDOUT, STDERR = 1, 2
 
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
-    """What is written to stdout in this block goes to stderr; nowhere, if that is closed."""
+    """Redirect stdout to stderr in this block; drop the output if stderr is closed."""
     if not _is_open(STDERR):
         with silence():
             yield
@@ -27,7 +27,7 @@ def stdout_to_stderr() -> Iterator[None]:
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """What is written to stdout or stderr in this block is dropped: the banner of a library that is loaded, say."""
+    """Drop all output to stdout and stderr in this block, for example the banner of a library."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         with _sent(STDOUT, nowhere), _sent(STDERR, nowhere):
@@ -38,7 +38,7 @@ def silence() -> Iterator[None]:
 
 @contextmanager
 def _sent(descriptor: int, target: int) -> Iterator[None]:
-    """C code that buffers its output is flushed on both sides, as Python's own is."""
+    """Redirect a descriptor; buffers of Python and of C code are flushed before and after."""
     _flush()
     saved = os.dup(descriptor) if _is_open(descriptor) else None
     try:
@@ -63,7 +63,7 @@ def _is_open(descriptor: int) -> bool:
 
 def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
-        # None or closed when the process was started without it; a reader that went away is met when a result is told.
+        # None or closed if the process was started without it; a broken pipe is handled where results are printed.
         if stream is not None and not stream.closed:
             with suppress(OSError):
                 stream.flush()

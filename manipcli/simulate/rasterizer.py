@@ -1,4 +1,4 @@
-"""Pictures of triangle meshes through PyBullet's software renderer; no window, no GPU."""
+"""Rendering of triangle meshes with PyBullet's software renderer, without window or GPU."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """White light from `direction` (3,), as seen from the scene; the shares of its components, 0 to 1."""
+    """White light from `direction` (3,), as seen from the scene; its components are shares from 0 to 1."""
 
     direction: Vector
     ambient: float
@@ -40,7 +40,7 @@ class Light:
 
 
 class Rasterizer:
-    """Meshes in a PyBullet client of their own, and pictures of them."""
+    """Meshes in a separate PyBullet client, and their rendering."""
 
     def __init__(self) -> None:
         with silence():  # its banner
@@ -50,11 +50,11 @@ class Rasterizer:
         self._client: int = pybullet.connect(pybullet.DIRECT)
 
     def close(self) -> None:
-        """Disconnect the client; nothing may be called afterwards."""
+        """Disconnect the client; no method may be called afterwards."""
         self._bullet.disconnect(self._client)
 
     def add(self, vertices: Array, faces: npt.NDArray[np.integer], normals: Array, rgba: Vector) -> int:
-        """A mesh of `vertices` (n, 3) [m], `faces` (m, 3) and vertex `normals` (n, 3); its number."""
+        """Add a mesh of `vertices` (n, 3) [m], `faces` (m, 3) and vertex `normals` (n, 3); returns its number."""
         visual = self._bullet.createVisualShape(
             self._bullet.GEOM_MESH,
             vertices=vertices.tolist(),
@@ -75,10 +75,10 @@ class Rasterizer:
     def render(
         self, size: tuple[int, int], view: View, light: Light
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
-        """A picture of `size` (width, height) [pixel].
+        """An image of `size` (width, height) [pixel].
 
         Returns:
-            Colours (h, w, 3), depth (h, w) as the depth buffer has it, and where any mesh is seen (h, w).
+            Colours (h, w, 3), depth (h, w) as in the depth buffer, and the mask of visible meshes (h, w).
         """
         width, height = size
         _, _, pixels, depth, seen = self._bullet.getCameraImage(

@@ -1,7 +1,7 @@
-"""The contract of sensors: the true state in, a reading out, once per control tick before the controllers are updated.
+"""Contract of sensors: the true state in, a reading out, once per control tick before the controllers are updated.
 
-A controller asks for sensors with `sensors`, a `SensorRequest` each; the session opens them on its engine and hands the
-controller their readings.
+A controller requests sensors with `sensors`, a `SensorRequest` each; the session opens them on its engine and passes
+their readings to the controller.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Sensor(Protocol):
 
     @property
     def reading(self) -> Array:
-        """(width) what was sensed last, zeros before; the same array for the sensor's life."""
+        """(width) the last reading, zeros before the first; always the same array."""
         ...
 
     def sense(self, state: WorldState, rng: np.random.Generator) -> Array:
-        """The reading in this state of the world, written into `reading`; all randomness comes from `rng`."""
+        """Write the reading for this state into `reading`; all randomness comes from `rng`."""
         ...
 
 
@@ -36,10 +36,10 @@ class SensorMember:
     """A member of the seam.
 
     Attributes:
-        name: of the sensor, in requests; the log has what a broadcaster publishes of it in `/CONTROLLER/<name>`.
+        name: of the sensor, in requests; a broadcaster publishes it in the log as `/CONTROLLER/<name>`.
         message: ROS type of that topic, one for which `record/write/rows.py` has a template.
-        width: how many numbers a reading has, in the order of the message.
-        open: (engine, request) -> the sensor, which may ask the engine to measure from now on.
+        width: numbers in a reading, in the order of the message.
+        open: (engine, request) -> the sensor, which may register with the engine.
     """
 
     name: str

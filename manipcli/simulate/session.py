@@ -1,11 +1,10 @@
-"""The stepping: one control tick at a time, in one order and no other.
+"""Simulation session: steps engine, sensors, controllers and actuators, one control tick at a time.
 
-read engine -> sensors -> controllers -> joint limits -> actuators -> write -> observe -> physics. Whoever wants to see
-a tick (the recorder, the progress line) is an observer; nothing else happens in the loop.
+Order: read engine -> sensors -> controllers -> joint limits -> actuators -> write -> observe -> physics. The recorder
+and the progress line are observers; the loop does nothing else.
 
-Nothing in a tick lets go of the interpreter lock, as `np.dot`, `take` and `norm` do for a vector of any size: it wakes
-the recorder's thread, which costs more than ten microseconds, and takes the lock from it before it could begin.
-`np.vdot`, `np.matmul` and an index do the same and keep it.
+No call in a tick releases the interpreter lock, as `np.dot`, `take` and `norm` do for vectors of any size: that wakes
+the recorder's thread and costs more than ten microseconds. `np.vdot`, `np.matmul` and indexing keep the lock.
 """
 
 from __future__ import annotations
@@ -33,33 +32,33 @@ from manipcli.simulate.sensor import Sensor
 from manipcli.simulate.sensors import SENSORS
 
 SLOW: Final = 10
-"""Control ticks between two looks at what need not be seen at every one: the velocities of bodies (at the last tick
-before a multiple of it), all contacts, the plausibility of the state."""
+"""Control ticks between two updates of slow quantities: body velocities (at the last tick before a multiple of it), all
+contacts, and the plausibility of the state."""
 RUNAWAY_FACTOR: Final = 3.0
-"""A joint this many times faster than its velocity limit has left its controller."""
+"""A joint that exceeds its velocity limit by this factor is unstable."""
 RUNAWAY_SPEED: Final = 90.0
-"""The same for a joint without a limit [rad/s or m/s]; Bullet clamps joints at 100."""
+"""[rad/s or m/s] The same for a joint without a limit; Bullet clamps joints at 100."""
 BODY_SPEED: Final = 50.0
-"""No body of a manipulation task is as fast as this [m/s]."""
+"""[m/s] A faster body means that the simulation diverged."""
 FALLEN: Final = -10.0
-"""A body below this height [m] falls for ever."""
+"""[m] A body below this height has fallen out of the scene."""
 
 
 class Observer(Protocol):
-    """Sees every tick before the physics moves on. The arrays are only valid during the call."""
+    """Observes every tick before the physics step. The arrays are only valid during the call."""
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
-        """The state at the start of control tick `tick`, and what each loaded controller answered; None: not active."""
+        """The state at the start of control tick `tick`, and the output of each loaded controller; None: not active."""
         ...
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
-        """Everything that touches."""
+        """All contacts at control tick `tick`."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Silent:
-    """Observes nothing: for the time before the start."""
+    """Observes nothing, before the start of the recording."""
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None: ...
 
@@ -89,7 +88,7 @@ class Session:
         self.state = engine.read()
         self._limiter = JointLimiter([joint.limits for joint in robot.moving_joints], robot.joint_names)
         self.actuation = Actuation(robot, period)
-        hands = {name for one in manager.controllers if is_hand(one) for name in one.joints}
+        hands = {name for controller in manager.controllers if is_hand(controller) for name in controller.joints}
         self._motors = MotorLimits(robot, pressing=hands)
         self._counted = np.array([not engine.ideal and name not in hands for name in robot.joint_names])
         self._obeyed = -1
@@ -108,7 +107,7 @@ class Session:
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
         self._touching: tuple[Contact, ...] = ()
-        self._watchful = 0  # the tick up to which contacts are looked at every time
+        self._watchful = 0  # the tick up to which contacts are read at every tick
 
     @property
     def time(self) -> float:
@@ -117,25 +116,25 @@ class Session:
 
     @property
     def saturations(self) -> Array:
-        """(n) in how many ticks each joint's command was cut, or the engine's motor at it gave all it may.
+        """(n) number of ticks in which each joint's command, or the engine's motor at the joint, was saturated.
 
-        0 of joints of hands, which press on what they hold, or on their stops, by intent; and of all in an engine where
-        references come true whatever the effort.
+        0 for joints of hands, which press on objects or on their stops by intent, and for all joints in an engine with
+        ideal tracking.
         """
         return np.where(self._counted, self._limiter.saturations, 0.0)
 
     @property
     def saturations_by_kind(self) -> Array:
-        """(k, n) in how many of these ticks by each of the `KINDS` of limits."""
+        """(k, n) number of these ticks by each of the `KINDS` of limits."""
         return np.where(self._counted, self._limiter.by_kind, 0.0)
 
     @property
     def touching(self) -> tuple[Contact, ...]:
-        """What touched when it was last looked at; at most ten ticks ago."""
+        """The contacts of the last reading, at most ten ticks ago."""
         return self._touching
 
     def restart_clock(self, observer: Observer) -> None:
-        """The next tick is number 0, and the first that `observer` sees; the world stays as it is."""
+        """Make the next tick number 0, and the first for `observer`; the world is unchanged."""
         self.ticks = 0
         self.observer = observer
         self._limiter.reset()
@@ -146,7 +145,7 @@ class Session:
         """One control period.
 
         Raises:
-            SimulationFailed: the state is not finite, a joint runs away, a body flies or falls for ever.
+            SimulationFailed: the state is not finite, or a joint or a body is implausibly fast or low.
         """
         state = self.state = self.engine.read(velocities=self.ticks % SLOW == SLOW - 1)
         time = self.ticks * self.period
@@ -160,7 +159,7 @@ class Session:
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
         if manager.faults:
-            self._refuse_runaway(state)  # a controller that is told nonsense is not to blame
+            self._refuse_runaway(state)  # an implausible state is the cause, not the controller
         try:
             self._limiter.apply(command, state.position, state.velocity, self.period)
         except NotFinite as bad:
@@ -184,7 +183,7 @@ class Session:
         return state
 
     def _drive(self, command: JointCommand, state: WorldState) -> None:
-        """Writes what the actuators make of the command; the manager writes all of it anew at the next tick."""
+        """Apply the actuator model and write the command; the manager overwrites all of it at the next tick."""
         effort = command.effort
         applied = self.actuation.apply(effort, state.position, state.velocity)
         if applied is not effort:
@@ -192,10 +191,10 @@ class Session:
         self.engine.write(command)
 
     def _touch(self, state: WorldState) -> None:
-        """What touches, and the force on what each joint moves.
+        """Read the contacts, and the contact force on the links that each joint moves.
 
-        Looked at at every tenth tick, at every one while a controller asks for forces, and for ten ticks from when
-        other things touch than before, or a point of the robot is pressed much harder: no short touch is lost.
+        This happens at every tenth tick, at every tick while a controller needs forces, and for ten ticks after the
+        set of touching parts changes or a force on the robot grows a lot, so that no short contact is lost.
         """
         ticks = self.ticks
         slow = ticks % SLOW == 0
@@ -226,8 +225,10 @@ class Session:
         speeds = np.abs(state.velocity)
         if np.count_nonzero(speeds < self._runaway) < len(speeds):
             k = int(np.argmax(np.where(np.isfinite(speeds), speeds / self._runaway, np.inf)))
+            name = self.robot.joint_names[k]
+            unit = self.robot.joint(name).unit
             raise SimulationFailed(
-                f"joint '{self.robot.joint_names[k]}' runs away at {state.velocity[k]:.3g} per second; "
+                f"joint '{name}' runs away at {state.velocity[k]:.3g} {unit}/s; "
                 "its controller may be unstable (gains too high for the control period), or too weak to hold its "
                 "weight (gains, clamps or effort too low, no gravity compensation)",
                 time=self.time,
@@ -239,20 +240,22 @@ class Session:
         for k, body in enumerate(self.scene.movable):
             speed = float(np.linalg.norm(state.body_linear[k]))
             if not speed < BODY_SPEED:
-                raise SimulationFailed(f"'{body.name}' flies off at {speed:.3g} m/s", time=self.time)
+                raise SimulationFailed(
+                    f"'{body.name}' flies off at {speed:.3g} m/s; the limit is {BODY_SPEED:g} m/s", time=self.time
+                )
             if not state.body_position[k, 2] > FALLEN:
-                raise SimulationFailed(f"'{body.name}' has fallen out of the scene", time=self.time)
+                raise SimulationFailed(f"'{body.name}' has fallen out of the scene, below {FALLEN:g} m", time=self.time)
 
 
 def _joint_of_part(robot: RobotModel) -> tuple[dict[str, int], tuple[tuple[int, int], ...]]:
-    """Which joints feel what touches a part.
+    """The joints that sense the contacts of a part.
 
-    Links below a joint that mimics one above it count as that one's, as the tip of a linkage. Where the mimic hangs
-    elsewhere, as the other jaw of a gripper with one motor, its driver feels the side that is pressed harder.
+    Links below a joint that mimics a joint above it belong to that joint, as the tip of a linkage. If the mimic joint
+    is elsewhere, as at the other jaw of a gripper with one motor, its driver senses the larger of the two forces.
 
     Returns:
-        For every part `robot/<link>` the joint vector index of the joint that moves it last; base parts are absent.
-        And (driver, mimic): pairs of indices of joints of which the first also feels what the second does.
+        For every part `robot/<link>`, the joint vector index of the last joint that moves it; base parts are absent.
+        And (driver, mimic): pairs of indices of joints; the first also senses the force of the second.
     """
     names = robot.joint_names
     index: dict[str, int] = {}

@@ -136,8 +136,8 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
     try:
         if state.at_start:
             planner.outside(state)
-        if grasps and member.regrasp is not None:
-            return member.regrasp(step.body, planner, state, grasps)
+        if grasps and member.alternative is not None:
+            return member.alternative(step.body, planner, state, grasps)
         return member.plan(step.body, planner, state)
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
@@ -153,15 +153,15 @@ def _steps(
 ) -> tuple[PlannedStep, ...]:
     """Plans each step from the predicted end of the previous one; backtracks to other grasps."""
     done: list[PlannedStep] = []
-    regrasps = GraspBacktracking(planner)
+    backtracking = GraspBacktracking(planner)
     while (k := len(done)) < len(task.spec.steps):
-        grasps = regrasps.of(k)
+        grasps = backtracking.of(k)
         retry = ", with another grasp" if grasps else ""
         on_progress(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{retry}")
         try:
             done.append(_planned(task, planner, k, done[-1].plan.end if done else start, grasps))
         except NotPlannable as refusal:
-            del done[regrasps.back(refusal, [(step.verb, step.plan.end) for step in done]) :]
+            del done[backtracking.back(refusal, [(step.verb, step.plan.end) for step in done]) :]
     return tuple(done)
 
 

@@ -118,7 +118,7 @@ def test_what_each_state_allows():  # [56]
     manager.unload("one")
     assert manager.list() == ()
     for absent in (manager.configure, manager.unload, manager.cleanup):
-        with pytest.raises(InvalidArgument, match="no controller 'one' is loaded"):
+        with pytest.raises(InvalidArgument, match="controller 'one' is not loaded"):
             absent("one")
     assert not manager.switch(["one"]).ok
 
@@ -127,9 +127,9 @@ def test_an_unknown_type_and_a_second_of_the_same_name_are_not_loaded():  # [56]
     with pytest.raises(KeyError, match="joint_trajectory"):
         CONTROLLERS["joint_trajectry"]
     manager = manager_of(Spring("one"))
-    with pytest.raises(InvalidArgument, match="two controllers are named 'one'"):
+    with pytest.raises(InvalidArgument, match="duplicate controller name 'one'"):
         manager.load(Spring("one"))
-    with pytest.raises(InvalidInput, match="no such moving joint"):
+    with pytest.raises(InvalidInput, match="is not a moving joint"):
         manager.load(Spring("two", ["x"]))
     assert states(manager) == {"one": "inactive"}
 
@@ -242,12 +242,12 @@ def test_the_rate_that_the_hint_names_is_taken(rate, period, ticks):
     with pytest.raises(InvalidArgument) as refused:
         ticks_between(rate, period)
     hint = refused.value.findings[0].hint
-    assert ticks_between(float(hint.removeprefix("say ").removesuffix(" Hz")), period) == ticks
+    assert ticks_between(float(hint.removeprefix("use ").removesuffix(" Hz")), period) == ticks
 
 
 @pytest.mark.parametrize("wrong", [0.0, -5.0, math.nan, math.inf])
 def test_a_rate_or_period_that_is_not_above_zero_is_refused(wrong):
-    with pytest.raises(InvalidArgument, match="expected one above 0"):
+    with pytest.raises(InvalidArgument, match="expected a rate above 0"):
         ControllerManager(joints=JOINTS, period=PERIOD).load(Spring("one"), update_rate=wrong)
     with pytest.raises(InvalidArgument, match="expected a time above 0"):
         ControllerManager(joints=JOINTS, period=wrong)
@@ -273,7 +273,7 @@ def test_measured_vectors_are_arrays_of_one_number_a_joint(wrong):
     manager = manager_of(Spring("one"), active=["one"])
     world = World()
     world.velocity = wrong
-    with pytest.raises(InvalidArgument, match=r"measured velocity: .* expected an array of 3 numbers"):
+    with pytest.raises(InvalidArgument, match=r"measured velocity is .*; expected an array of 3 numbers"):
         manager.update(0.0, world)
     assert manager.faults == ()
 
@@ -334,7 +334,7 @@ def test_who_commands_no_finite_number_is_stopped_and_nobody_else(interface, val
     manager.update(PERIOD, World())
     manager.stop_non_finite(PERIOD)
     (fault,) = manager.faults
-    assert fault.message == f"controller 'bad' failed in its update: it commands a/{interface} to be {value}"
+    assert fault.message == f"controller 'bad' failed in its update: its command for a/{interface} is {value}"
     command = manager.update(2 * PERIOD, World())
     assert command.modes == ("brake", interface, "brake")
     assert np.isfinite([command.effort, command.position, command.velocity]).all()

@@ -74,7 +74,7 @@ def test_a_limit_below_nothing_is_refused(name, wrong):
 
 @pytest.mark.parametrize("ends", [(1.0, -1.0), (math.nan, 1.0), (0.0, math.nan), ([0.0, 1.0], [1.0, 0.5])])
 def test_a_lower_limit_above_the_upper_one_is_refused(ends):
-    with pytest.raises(InvalidArgument, match="expected no lower one above its upper one"):
+    with pytest.raises(InvalidArgument, match="expected each lower limit at or below its upper"):
         refuse_limits(*ends)
     refuse_limits([0.0, -math.inf], [0.0, math.inf])
 

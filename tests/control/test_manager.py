@@ -175,7 +175,7 @@ def test_serving_and_lookup():
     assert manager.serving(["elbow"]).name == "arm"
     with pytest.raises(InvalidArgument, match="elbow, left_1"):
         manager.serving(["elbow", "left_1"])
-    with pytest.raises(InvalidArgument, match="no controller 'leg'"):
+    with pytest.raises(InvalidArgument, match="controller 'leg' is not loaded"):
         manager["leg"]
 
 
@@ -188,9 +188,9 @@ def test_two_controllers_on_one_joint_are_refused_with_both_names():
         ControllerManager([controller("one", "effort"), controller("two", "velocity")], joints=["a"], period=0.001)
     with pytest.raises(InvalidInput, match="'one' and 'two' both claim a/effort"):
         ControllerManager([controller("one", "effort"), controller("two", "effort")], joints=["a"], period=0.001)
-    with pytest.raises(InvalidInput, match="no such moving joint"):
+    with pytest.raises(InvalidInput, match="is not a moving joint"):
         ControllerManager([controller("one", "effort")], joints=["b", "c"], period=0.001)
-    with pytest.raises(InvalidInput, match="follows another joint"):
+    with pytest.raises(InvalidInput, match="mimics another joint"):
         ControllerManager([controller("one", "effort")], joints=["a"], period=0.001, following=["a"])
 
 
@@ -205,9 +205,7 @@ def test_two_that_follow_with_one_joint_are_a_warning_and_a_feed_forward_is_none
         return [f.message for f in found if f.code == "CTRL149"]
 
     (text,) = warned(arm=arm, push=push)
-    assert text.startswith(
-        "controllers 'arm' and 'push' are both active on elbow, shoulder: a joint obeys the positions"
-    )
+    assert text.startswith("controllers 'arm' and 'push' are both active on elbow, shoulder: a joint tracks positions")
     assert warned(arm=arm, push=push | {"active": False}) == warned(arm=arm, add=add) == []
 
 
@@ -225,7 +223,7 @@ def test_positions_in_steps_that_the_limits_of_accelerations_cut_are_a_warning(i
     for joints, expected in ((quick, told), (model.joints, False)):
         found = controller_findings(written, replace(model, joints=joints), 0.001)
         texts = [f.message for f in found if (f.code, f.severity) == ("CTRL170", "warning")]
-        assert [("once in 10 control ticks" in text, "shoulder" in text) for text in texts] == [(True, True)] * expected
+        assert [("every 10 control ticks" in text, "shoulder" in text) for text in texts] == [(True, True)] * expected
 
 
 def test_all_findings_of_a_file_come_at_once_each_with_its_place():
@@ -246,7 +244,7 @@ def test_all_findings_of_a_file_come_at_once_each_with_its_place():
         "joint 'elbwo' is not in robot 'toy' | did you mean 'elbow'?",
         "joint 'mount' is fixed",
         "joint 'follower' mimics 'left_1'",
-        "'left_1' has gains, but is not one of its joints",
+        "'left_1' has gains, but is not a joint of the controller",
         "the gains of joint 'elbwo' are all zero",
         "the gains of joint 'left_2' are all zero",
     ):
@@ -270,14 +268,17 @@ def test_gains_of_no_joint_of_the_controller_point_to_a_joint_without_gains():
     assert hints["CTRL102"] == "did you mean 'lfet_1'?"
     spare = spec(hand={"joints": ["left_2"], "gains": gains(["left_1", "left_2"])})
     hints = {finding.code: finding.hint for finding in findings(spare)}
-    assert hints["CTRL102"] == "take them out, or add 'left_1' to `joints`"
+    assert hints["CTRL102"] == "remove them, or add 'left_1' to `joints`"
 
 
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
         ({"command_interface": "velocity", "gains": {}}, "on the velocity interface it would not move"),
-        ({"command_interface": "position", "gravity_compensation": True}, "gravity_compensation adds an effort"),
+        (
+            {"command_interface": "position", "gravity_compensation": True},
+            "gravity_compensation needs the effort interface",
+        ),
         ({"constraints": {"joints": {"sholder": {"goal": 0.1}}}}, "'sholder' has tolerances"),
         (
             {"joints": ["shoulder", "elbow", "left_1"], "gains": gains(["shoulder", "elbow", "left_1"])},
@@ -322,7 +323,7 @@ def test_a_controller_cannot_change_what_was_measured():
         with pytest.raises(InvalidArgument) as refused:
             manager.serving(["a"])
         (finding,) = refused.value.findings
-        assert finding.message.endswith("(none is active)") and finding.hint == manager.faults[0].message
+        assert finding.message.endswith("(no controller is active)") and finding.hint == manager.faults[0].message
 
 
 def test_a_position_controller_is_not_told_the_velocity_and_effort_of_the_one_before():

@@ -59,5 +59,5 @@ def test_a_first_point_at_once_may_be_whole_turns_away(followed: Follow) -> None
     at_once = "{{positions: [{}, 0], time_from_start: 0}}, {{positions: [{}, 0], time_from_start: 2}}"
     way = followed(at_once.format(0.5 - math.tau, 1.0 - math.tau))
     np.testing.assert_allclose(way[[0, -1], 0], [0.5, 1.0], atol=1e-9)
-    with pytest.raises(NotPlannable, match=r"joint 'wheel' at 0\.6000; it is at 0\.5000 then"):
+    with pytest.raises(NotPlannable, match=r"joint 'wheel' at 0\.6000 rad, but the joint is at 0\.5000 rad"):
         followed(at_once.format(0.6 - math.tau, 1.0))

@@ -54,7 +54,7 @@ def test_what_cannot_be_lifted_as_it_is_held_is_taken_otherwise(tmp_path: Path) 
     lift = task_of(tmp_path, PICK + LIFT).spec.steps[1]
     alone = plan_task(task_of(tmp_path, PICK))
     end = alone.steps[0].plan.end
-    with pytest.raises(NotPlannable, match="no height to lift"):
+    with pytest.raises(NotPlannable, match="cannot lift"):
         plan_step(alone.planner, lift, end)
     whole = plan_task(task_of(tmp_path, PICK + LIFT + PLACE))
     assert [step.verb for step in whole.steps] == ["pick", "lift", "place"]
@@ -97,8 +97,8 @@ def test_no_other_grasp_is_tried_for_a_value_that_is_wrong_with_each(tmp_path: P
     with pytest.raises(NotPlannable) as refused:
         plan_task(task, on_progress=told.append)
     assert len(told) == 3
-    assert refused.value.cause == "[1.5, 0] m lies beside 'table', whose middle is at [0.55, 0] m"
-    assert refused.value.hint == "`at` is in the world; 'table' offers 0.6 m x 0.8 m about its middle"
+    assert refused.value.cause == "[1.5, 0] m is outside 'table', whose centre is at [0.55, 0] m"
+    assert refused.value.hint == "`at` is in the world frame; 'table' offers 0.6 m x 0.8 m about its centre"
     assert refused.value.place is not None and (refused.value.place.line, refused.value.place.column) == (
         12,
         place.index("[") + 1,

@@ -66,7 +66,9 @@ def test_a_goal_near_the_seed_gives_positions_near_the_seed(solver: InverseKinem
     assert np.max(np.abs(q - middle)) < 0.1
 
 
-@pytest.mark.parametrize(("joints", "leaving"), [(3, "turn"), (4, "turn"), (5, "spin"), (7, "spin"), (7, "turn")])
+@pytest.mark.parametrize(
+    ("joints", "leaving"), [(3, "rotation"), (4, "rotation"), (5, "spin"), (7, "spin"), (7, "rotation")]
+)
 def test_what_a_goal_leaves_open_does_not_count_and_the_rest_does(
     solver: InverseKinematics, middle: Array, joints: int, leaving: Open
 ) -> None:
@@ -92,10 +94,10 @@ def test_a_point_that_is_reached_and_not_in_that_direction_is_told_so(solver: In
     away = Transform.of(xyz=made.p, R=made.R @ matrix_from_rpy([1.0, 0.0, 0.0]))
     with pytest.raises(NotPlannable) as refused:
         few.solve(away, np.array([*arm[:3] + 0.02, *middle[3:]]), np.random.default_rng(0))
-    assert refused.value.hint == "without `pointing` the point is reached, with the tool 57 deg off"
+    assert refused.value.hint == "remove `pointing`: the tool then reaches the point, pointing 57 deg off"
 
 
-@pytest.mark.parametrize("leaving", ["nothing", "spin", "turn"])
+@pytest.mark.parametrize("leaving", ["nothing", "spin", "rotation"])
 def test_the_jacobian_is_that_of_the_error_at_the_goal(solver: InverseKinematics, middle: Array, leaving: Open) -> None:
     """Central differences of the error; away from the goal the one of a rotation vector is another."""
     own = solver.leaving(leaving)
@@ -148,7 +150,9 @@ def test_an_arm_of_few_joints_is_told_of_points(
     two = InverseKinematics(Kinematics(make_arm7()), ARM[:2], "link_7", X_LT=X_LT)
     with pytest.raises(NotPlannable) as refused:
         two.solve(goal, middle, np.random.default_rng(0))
-    assert "an arm of 2 joints takes few of them at a place: `move: {point: ...}`" in (refused.value.hint or "")
+    assert "an arm of 2 joints reaches few orientations: leave it open with `move: {point: ...}`" in (
+        refused.value.hint or ""
+    )
     with pytest.raises(NotPlannable) as refused:
         solver.solve(Transform.of(xyz=(3.0, 0.0, 0.8)), middle, np.random.default_rng(0))
     assert "few" not in (refused.value.hint or "")
@@ -156,7 +160,7 @@ def test_an_arm_of_few_joints_is_told_of_points(
 
 def test_a_pose_that_is_barely_missed_is_told_with_what_would_have_counted(middle: Array) -> None:
     told = Solution(middle, position_error=2.4e-6, angle_error=1.5e-4, at_limit=()).explain()
-    assert told.startswith("the nearest pose is 0.0024 mm and 0.0086 deg off, and up to 0.01 mm and 0.0057 deg counts")
+    assert told.startswith("the nearest pose is 0.0024 mm and 0.0086 deg off, the tolerance is 0.01 mm and 0.0057 deg")
     assert Solution(middle, 0.03, 0.1, ()).explain() == "the nearest pose is 30.0 mm and 5.7 deg off, out of reach"
 
 
@@ -165,7 +169,7 @@ def test_limits_that_hold_the_arm_back_are_named(make_arm7: Callable[..., RobotM
     solver = InverseKinematics(Kinematics(make_arm7()), ("joint_1",), "link_7")
     past = middle.copy()
     past[0] = 3.1
-    with pytest.raises(NotPlannable, match="held back by the limits of joint_1"):
+    with pytest.raises(NotPlannable, match="at the limits of joint_1"):
         solver.solve(solver.forward(past), middle, np.random.default_rng(0))
 
 

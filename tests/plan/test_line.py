@@ -66,7 +66,7 @@ def test_a_line_for_which_a_joint_is_missing_tells_the_limit(make_arm7: Callable
 
     def walk(within: InverseKinematics) -> Array:
         if within is not solver:
-            raise NotPlannable("the straight line ends here")
+            raise NotPlannable("the straight line is unreachable")
         return joint_path(corner)
 
     with pytest.raises(NotPlannable, match=r"joint 'joint_6' goes to 2\.\d+ rad .* beyond its upper limit 2\."):

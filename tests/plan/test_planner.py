@@ -115,7 +115,7 @@ def test_the_way_of_the_hand_is_checked_too(bench: Make) -> None:
     post = f"  post: {{box: {{size: [1 cm, 1 cm, 30 cm]}}, pose: {{xyz: {place}}}, fixed: true}}"
     blocked = bench(scene=f"\n{post}\n", more="floor: false")
     cause = blocked.refused("move", {"to": "wrap"}).cause
-    assert "'post' would come within 4 mm of 'robot/finger_" in cause
+    assert "'post' comes within 4 mm of 'robot/finger_" in cause
     assert "s of 'move'" in cause
 
 
@@ -145,7 +145,7 @@ def test_a_robot_that_begins_in_something_is_told_so(bench: Make) -> None:
     at = f"[{x:.4f}, {y:.4f}, {z:.4f}]"
     arm = bench(scene=f"{{wall: {{box: {{size: [20 cm, 20 cm, 20 cm]}}, pose: {{xyz: {at}}}, fixed: true}}}}")
     refusal = arm.refused("move", {"to": {"joint_1": 0.3}})
-    assert re.match(r"'robot/\w+' and 'wall' overlap by [\d.]+ mm already, at t = 0.00 s of 'move'$", refusal.cause)
+    assert re.match(r"'robot/\w+' and 'wall' overlap by [\d.]+ mm at t = 0.00 s of 'move'$", refusal.cause)
     assert refusal.hint is not None and "`start: POSE`" in refusal.hint
 
 
@@ -157,8 +157,8 @@ def test_a_later_step_that_begins_in_something_is_told_what_lets_it_leave(bench:
     arm.do("move", {"pose": {**above, "xyz": [0.7, -0.2, 0.43]}, "path": "linear", "touch": ["desk"]})
     refusal = arm.refused("move", {"pose": above})
     assert "'desk' and 'robot/" in refusal.cause
-    assert "already, before it moves" in refusal.cause
-    assert refusal.hint == "`touch: [desk]` of the `move` that leaves it lets it"
+    assert "before it moves" in refusal.cause
+    assert refusal.hint == "add `touch: [desk]` to the `move` that leaves it"
     arm.do("move", {"pose": above, "path": "linear", "touch": ["desk"]})
 
 
@@ -167,13 +167,13 @@ def test_a_hand_that_hits_something_on_its_move_is_told_how_it_may_and_an_arm_is
     above = {"xyz": [0.7, -0.2, 0.54], "rpy": [0, "90 deg", 0]}
     arm.do("move", {"pose": above})
     hint = arm.refused("move", {"pose": {**above, "xyz": [0.7, -0.2, 0.43]}, "path": "linear"}).hint or ""
-    assert hint.endswith("; or `touch: [desk]`, where the hand shall push it or press on it")
+    assert hint.endswith("; or add `touch: [desk]`, if the hand is to push it or press on it")
     arm.now = replace(arm.now, carried=Carried("cup", "palm", Transform.identity()))
     held = CollisionHit("cup", "desk", -0.002, time=0.3)
-    assert "`touch: [desk]`" in (arm.planner.refusal(arm.now, held, "would come", "", move=True).hint or "")
+    assert "`touch: [desk]`" in (arm.planner.refusal(arm.now, held, "comes", "", move=True).hint or "")
     for move, link in ((False, "palm"), (True, "link_3")):
         hit = CollisionHit("desk", f"robot/{link}", -0.002, time=0.3)
-        assert "touch" not in (arm.planner.refusal(arm.now, hit, "would come", "", move=move).hint or "")
+        assert "touch" not in (arm.planner.refusal(arm.now, hit, "comes", "", move=move).hint or "")
 
 
 def test_links_that_overlap_are_told_of_the_robot_file(bench: Make) -> None:

@@ -20,13 +20,13 @@ def test_a_range_rises() -> None:
     lengths: TypeAdapter[tuple[float, float]] = TypeAdapter(Range)
     assert lengths.validate_python(["8 cm", "20 cm"]) == (0.08, 0.2)
     assert lengths.validate_python("8 cm") == (0.08, 0.08)
-    with pytest.raises(ValidationError, match="the least, 200 mm, is above the most, 80 mm"):
+    with pytest.raises(ValidationError, match="minimum 200 mm is above maximum 80 mm"):
         lengths.validate_python(["20 cm", "8 cm"])
     assert lengths.validate_python([0, 0.1]) == (0.0, 0.1)
     for below in ("-5 cm", ["-5 cm", "5 cm"]):
         with pytest.raises(ValidationError, match="must be at least 0, not -50 mm") as refused:
             lengths.validate_python(below)
-        assert refused.value.errors()[0]["ctx"]["hint"] == "write [least, most], neither below 0, or one length"
+        assert refused.value.errors()[0]["ctx"]["hint"] == "write [minimum, maximum], both 0 or more, or one length"
 
 
 def test_the_first_that_can_be_planned_is_taken_and_no_other_is_tried() -> None:
@@ -56,7 +56,7 @@ def test_a_refusal_tells_the_commonest_reasons_with_the_hint_of_the_commonest() 
     with pytest.raises(NotPlannable) as refusal:
         first_feasible(attempt, reasons, what="no way")
     assert refusal.value.cause == (
-        "no way, 7 ways tried: off by -0.5 mm (3 of 7); joint 'joint_4' goes to 2.5 at t = 0.1 s (2 of 7); "
+        "no way, all 7 candidates failed: off by -0.5 mm (3 of 7); joint 'joint_4' goes to 2.5 at t = 0.1 s (2 of 7); "
         "joint 'joint_2' goes to 2.5 at t = 0.1 s (1 of 7); and 1 other reason"
     )
     assert refusal.value.hint == "nearer"
@@ -69,7 +69,7 @@ def test_a_single_candidate_is_refused_with_its_own_words() -> None:
     with pytest.raises(NotPlannable) as refusal:
         first_feasible(attempt, [1], what="no way")
     assert (refusal.value.cause, refusal.value.hint) == ("no way: too far", "nearer")
-    with pytest.raises(NotPlannable, match="there is nothing to try"):
+    with pytest.raises(NotPlannable, match="there is no candidate"):
         first_feasible(attempt, [], what="no way")
 
 

@@ -149,9 +149,9 @@ def test_what_cannot_be_lifted_or_put_so_far_is_told_what_those_steps_can_do_abo
     lift = arm.refused("lift", {"object": "cup", "by": 1.5})
     arm.now = story.steps["lift"][1].end
     place = arm.refused("place", {"object": "cup", "at": [1.12, 0.45], "onto": "desk"})
-    assert "the straight line ends" in lift.cause and "the straight line ends" in place.cause
+    assert "the straight line is unreachable" in lift.cause and "the straight line is unreachable" in place.cause
     assert (lift.hint or "").startswith("lift it less, `by: ...`; or ")
-    assert (place.hint or "").startswith("put it where the arm reaches, `at: [x, y]`; or ")
+    assert (place.hint or "").startswith("place it within reach, `at: [x, y]`; or ")
 
 
 def test_what_is_not_held_is_not_lifted(bench: Make, story: Story) -> None:
@@ -171,7 +171,7 @@ def test_a_hand_that_holds_takes_nothing_else(bench: Make, story: Story) -> None
     assert refusal.cause == "the hand cannot take 'ball': it holds 'cup'"
     assert refusal.hint == "`place` 'cup' first"
     assert arm.refused("grasp", {"object": "ball"}).cause == refusal.cause
-    assert arm.refused("pick", {"object": "cup"}).cause == "'cup' is in the hand already"
+    assert arm.refused("pick", {"object": "cup"}).cause == "'cup' is already in the hand"
 
 
 def test_a_hand_that_opens_to_back_off_need_not_open_all_the_way(bench: Make, story: Story) -> None:
@@ -194,11 +194,12 @@ def test_out_of_reach_says_so_once_for_all_ways(bench: Make) -> None:
     scene = "\n  post: {box: {size: [0.1, 0.1, 0.4]}, pose: {xyz: [1.2, 0.4, 0.2]}, fixed: true}\n"
     scene += "  can: {cylinder: {radius: 3 cm, height: 10 cm}, mass: 0.1, rests_on: post, at: [1.2, 0.4]}\n"
     refusal = bench(scene=scene).refused("pick", {"object": "can", "grasp": {"posture": "wrap"}})
-    assert "no way to pick 'can', 126 ways tried: approach: no joint positions reach (1.200, 0.400, 0.450) m, 1.3" in (
-        refusal.cause
+    assert (
+        "cannot pick 'can', all 126 candidates failed: approach: no joint positions reach (1.200, 0.400, 0.450) m, 1.3"
+        in (refusal.cause)
     )
     assert "(126 of 126)" in refusal.cause
-    assert refusal.hint.startswith("move 'can', or say from where and how high it is taken")
+    assert refusal.hint.startswith("move 'can', or change the approach, the height of the grasp")
 
 
 def test_what_is_taller_than_the_fingers_is_taken_higher_from_above(bench: Make) -> None:
@@ -230,7 +231,7 @@ def test_a_ball_and_what_is_too_wide_are_not_taken_higher(bench: Make) -> None:
     scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
     scene += "  ball: {sphere: {radius: 7 cm}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}\n"
     refusal = bench("panda", scene=scene).refused("pick", {"object": "ball", "approach": {"from": "top"}})
-    assert "36 ways tried" in refusal.cause
+    assert "all 36 candidates failed" in refusal.cause
     assert "`open: ...`" in refusal.hint
     assert "'ball' is wider than the hand opens in its pose 'open'; or move 'ball'" in refusal.hint
 
@@ -255,7 +256,7 @@ def test_only_a_pick_speaks_of_its_height_where_closing_fingers_have_no_room(ben
     narrow.now, _ = clear.at(clear.now, clear.plan("pick", spec), "close")
     refusal = narrow.refused("grasp", {"object": "block"})
     assert "'plate'" in refusal.cause and "of 'close'" in refusal.cause
-    assert refusal.hint == "no way around is searched for: `move` to a pose from which the way is free"
+    assert refusal.hint == "first `move` to a pose from which the path is free (no path around obstacles is searched)"
 
 
 def test_a_cup_behind_a_wall_names_the_wall_and_the_motion(bench: Make) -> None:

@@ -38,9 +38,9 @@ def turned(arm: Any, **change: Any) -> Planner:
         ((0.3, 0.3, 0.3), None),
         ((2 * QUARTER, 0, 0), "seems to point back into the hand"),
         ((0, 2 * QUARTER, 0), "seems to point back into the hand"),
-        ((0, QUARTER, 0), "seems to point aside"),
-        ((0, 0, QUARTER), "the tool's y is to be the direction in which the fingers close"),
-        ((0, 0, QUARTER / 2), "the tool's y is to be the direction in which the fingers close"),
+        ((0, QUARTER, 0), "seems to point sideways"),
+        ((0, 0, QUARTER), "align the tool's y with the direction in which the fingers close"),
+        ((0, 0, QUARTER / 2), "align the tool's y with the direction in which the fingers close"),
     ],
 )
 def test_a_turned_tool_is_told_by_the_axis_that_is_wrong(
@@ -60,7 +60,7 @@ def test_a_tool_frame_at_the_flange_is_told(bench: Make) -> None:
     arm = bench("panda")
     hint = misplaced(turned(arm, link="panda_link8"), arm.start, "open", "closed")
     assert hint is not None
-    assert "seems to lie 58 mm behind the fingers: `tool: {link: ..., pose: " in hint
+    assert "seems to be 58 mm behind the fingers): `tool: {link: ..., pose: " in hint
 
 
 @pytest.mark.slow
@@ -68,7 +68,7 @@ def test_a_pick_with_a_wrong_tool_says_so_and_one_with_a_right_tool_does_not(ben
     arm = bench("panda")
     spec = {"object": "block", "approach": {"from": "top"}}
     arm.planner = turned(arm, rpy=(2 * QUARTER, 0, 0))
-    assert arm.refused("pick", spec).hint.startswith("the tool's +z is to point out of the hand")
+    assert arm.refused("pick", spec).hint.startswith("point the tool's +z out of the hand")
     arm.planner = turned(arm)
     arm.do("pick", spec)
     arm = bench("panda")

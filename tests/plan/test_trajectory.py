@@ -116,7 +116,7 @@ def test_accelerations_alone_are_integrated_twice():
 def test_integrated_points_without_a_start_cannot_be_sampled():
     points = [TrajectoryPoint(velocities=[1.0, 2.0], time_from_start=1.0)]
     trajectory = JointTrajectory(("a", "b"), points)
-    with pytest.raises(InvalidArgument, match="gives no positions"):
+    with pytest.raises(InvalidArgument, match="has no positions"):
         trajectory.sample(1.0)
     start = TrajectoryPoint([10.0, 20.0])
     placed = JointTrajectory(("b", "a"), trajectory.of_joints(("b", "a")).source, start)
@@ -158,7 +158,7 @@ def test_efforts_are_linear_and_given_at_all_points():
     trajectory = JointTrajectory(("j",), points, at(0, 0.0))
     assert [trajectory.sample_effort(t)[0] for t in (0.5, 1.0, 1.25, 9.0)] == pytest.approx([1.0, 2.0, 3.0, 6.0])
     assert one_joint(at(0, 0.0)).sample_effort(np.array([0.0, 1.0])).tolist() == [[0.0], [0.0]]
-    with pytest.raises(InvalidArgument, match="point 1 gives no efforts"):
+    with pytest.raises(InvalidArgument, match="point 1 has no efforts"):
         one_joint(points[0], at(1, 2.0))
 
 
@@ -262,8 +262,8 @@ def arrays(**changes):
         ({"times": [0.0, 1.0, 2.0]}, r"positions have the shape \(2, 2\); expected \(3, 2\)"),
         ({"velocities": [[0.0, 0.0]]}, "velocities have the shape"),
         ({"accelerations": [[0, 0], [0, 0]]}, "accelerations but no velocities"),
-        ({"names": ("a", "a")}, "'a' is named twice"),
-        ({"names": ()}, "names no joint"),
+        ({"names": ("a", "a")}, "duplicate joint 'a'"),
+        ({"names": ()}, "has no joint names"),
         ({"times": [], "positions": np.zeros((0, 2))}, "no points"),
     ],
 )
@@ -316,16 +316,16 @@ def test_durations_of_both_ros_are_read():
 @pytest.mark.parametrize(
     ("names", "points", "text"),
     [
-        ("ab", [at([1, 1], 1)], "the names are one text, 'ab'; expected a list"),
-        ([], [at([], 1)], "the trajectory names no joint"),
+        ("ab", [at([1, 1], 1)], "the joint names are a string, 'ab'; expected a list"),
+        ([], [at([], 1)], "the trajectory has no joint names"),
         (["a"], at(1, 1), "the points are TrajectoryPoint; expected a list"),
         (["a"], [3.0], "point 0 is 3.0; expected a TrajectoryPoint"),
-        (["a"], [{"position": [1]}], "point 0 has an unknown 'position'"),
+        (["a"], [{"position": [1]}], "point 0 has an unknown field 'position'"),
         (["a"], [{"positions": [1], "time_from_start": 0}, {"positions": [1]}], "point 1 has no time_from_start"),
         (["a"], [{"positions": [1]}], "point 0 has no time_from_start"),
         (["a"], [at(1, None)], "point 0 has the time_from_start None; expected seconds"),
         (["a"], [at(1, {"secs": "3"})], "time_from_start {'secs': '3'}; expected seconds"),
-        (["a"], [{"positions": "x", "time_from_start": 1}], "point 0 has positions that are no numbers: 'x'"),
+        (["a"], [{"positions": "x", "time_from_start": 1}], "point 0 has positions that are not numbers: 'x'"),
     ],
 )
 def test_what_is_no_point_is_told_as_such(names, points, text):

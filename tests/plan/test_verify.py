@@ -72,7 +72,7 @@ def test_a_soft_limit_is_called_so_and_the_hint_says_where_it_is_stated() -> Non
         with pytest.raises(NotPlannable) as refused:
             verify(sine(), each)
         told.append((refused.value.cause, refused.value.hint))
-    within, stated = "plans stay within soft limits: change ", "`k_position` in the robot file"
+    within, stated = "change ", "`k_position` in the robot file; plans stay within soft limits"
     assert told == [
         (
             "joint 'j' begins at 0.0000 rad, beyond its soft lower limit 0.1000 rad",

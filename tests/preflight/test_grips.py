@@ -86,7 +86,7 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
         run_task(pick, overrides=overrides, log=pick.with_suffix(".mcap"), force=True, progress=Listener(heard))
         return " ".join(heard)
 
-    felt = re.search(r"where it felt ([\d.]+) N of the 7 N asked", told_of([f"{gain}=500"]))
+    felt = re.search(r"with ([\d.]+) N of the requested 7 N", told_of([f"{gain}=500"]))
     assert felt is not None
     assert float(felt[1]) == pytest.approx(5.0, rel=0.1)
     assert "felt" not in told_of([f"{gain}=840"])

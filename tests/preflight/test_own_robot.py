@@ -108,8 +108,8 @@ def test_a_tool_that_cannot_point_so_is_told_apart_from_an_object_out_of_reach(t
         ((_, error),) = errors(write(tmp_path, pick.format(way)))
         assert miss in error.message
         assert error.hint is not None
-        assert "the tool's +z has to point to the object" in error.hint
-        assert error.hint.endswith(f"or say `approach: {{from: {other}}}`")
+        assert "the tool's +z must point to the object" in error.hint
+        assert error.hint.endswith(f"or set `approach: {{from: {other}}}`")
     task = write(tmp_path, pick.format("top"))
     (tmp_path / "scara.yaml").write_text(ROBOT.replace("-0.06]", "-0.06], rpy: [180 deg, 0, 0]"))
     assert errors(task) == []

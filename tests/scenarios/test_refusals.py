@@ -186,7 +186,7 @@ def test_an_impossible_step_is_refused_before_anything_moves(call: Call, tmp_pat
 @pytest.mark.slow
 def test_a_cup_out_of_reach_is_told_with_its_step(call: Call, tmp_path: Path) -> None:
     text = unplannable(call("run", ROOT / "tasks" / "pour.yaml", "--set", "scene.cup.at=[1.12, 0.0]"))
-    assert "step 'pick_1': no way to pick 'cup'" in text
+    assert "step 'pick_1': cannot pick 'cup'" in text
     assert "reach" in text
     assert not files(tmp_path)
 

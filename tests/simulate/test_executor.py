@@ -136,12 +136,12 @@ def test_the_timeout_comes_at_its_time_and_says_what_was_on(session_of: SessionO
     session = session_of()
     end = Executor(session).run(wait(0.1), until=lambda _: False, deadline=0.3)
     assert (end.outcome, session.ticks) == ("timeout", 300)
-    assert end.text == "the time of the step was over before the condition under `until` held"
+    assert end.text == "the step timed out before the condition under `until` held"
 
     session = session_of()
     end = Executor(session).run(move(), until=None, deadline=0.3)
     assert (end.outcome, session.ticks) == ("timeout", 300)
-    assert end.text == "the time of the step was over before this motion was"
+    assert end.text == "the step timed out before this motion ended"
 
 
 def test_after_a_timeout_the_joints_stop_where_they_are(session_of: SessionOf) -> None:
@@ -160,7 +160,7 @@ def test_wait_holds_until_the_condition_or_the_deadline(session_of: SessionOf) -
     assert session.ticks == 70
     end = Executor(session).wait(lambda _: False, deadline=0.2)
     assert (end.outcome, session.ticks) == ("timeout", 200)
-    assert "did not come to hold" in end.text
+    assert "did not hold in time" in end.text
 
 
 def test_a_joint_that_does_not_follow_fails_the_motion_with_joint_value_limit_and_time(
@@ -228,7 +228,7 @@ def test_a_hand_that_meets_something_holds(session_of: SessionOf, scripted: Any)
     assert not end.weak
     end = Executor(session_of(scripted(touch))).run(close(force=9.0), until=None, deadline=None)
     assert (end.outcome, end.weak) == ("done", True)
-    assert "where it felt 8 N of the 9 N asked" in end.text
+    assert "with 8 N of the requested 9 N" in end.text
 
 
 def test_a_hand_that_never_comes_to_an_end_is_given_up(
@@ -243,14 +243,14 @@ def test_a_hand_that_never_comes_to_an_end_is_given_up(
 
     session = session_of(scripted(swing))
     handles: list[Any] = []
-    end = Executor(session, told=lambda _, one: handles.append(one)).run(close(), until=None, deadline=None)
+    end = Executor(session, on_goal=lambda _, one: handles.append(one)).run(close(), until=None, deadline=None)
     assert end.outcome == "timeout"
     assert [handle.status for handle in handles] == ["canceled"]
     assert session.time == pytest.approx(0.2 + 2.0, abs=0.002)
-    furthest = r"; joint '(knuckle|tip)' is 0\.9\d* rad from its reference, further than the others$"
+    furthest = r"; joint '(knuckle|tip)' is 0\.9\d* rad from its reference, the largest error$"
     assert re.search(furthest, end.text)
     end = Executor(session_of(scripted(swing))).run(close(), until=None, deadline=1.5)
-    assert re.fullmatch("the time of the step was over before this motion was" + furthest, end.text)
+    assert re.fullmatch("the step timed out before this motion ended" + furthest, end.text)
 
 
 def test_an_alarm_ends_a_motion_a_wait_and_a_hold_in_the_tick_that_sets_it_off(session_of: SessionOf) -> None:
@@ -269,7 +269,9 @@ def test_an_alarm_ends_a_motion_a_wait_and_a_hold_in_the_tick_that_sets_it_off(s
 def test_a_stop_cancels_what_is_on_and_holds_still_deaf_to_alarms(session_of: SessionOf) -> None:
     session = session_of()
     handles: list[Any] = []
-    executor = Executor(session, told=lambda _, one: handles.append(one), alarm=lambda s: "!" if s.time >= 0.25 else "")
+    executor = Executor(
+        session, on_goal=lambda _, one: handles.append(one), alarm=lambda s: "!" if s.time >= 0.25 else ""
+    )
     with pytest.raises(Alarmed):
         executor.run(move(), until=None, deadline=None)
     assert [handle.status for handle in handles] == ["active"]
@@ -290,7 +292,7 @@ def test_a_joint_that_fails_takes_the_rest_of_the_motion_with_it(session_of: Ses
         engine.state.velocity[1:] = 1.0 if engine.tick % 40 < 20 else -1.0
 
     handles: list[Any] = []
-    executor = Executor(session_of(scripted(swing)), told=lambda _, handle: handles.append(handle))
+    executor = Executor(session_of(scripted(swing)), on_goal=lambda _, handle: handles.append(handle))
     both = Motion("both", move().trajectory, close().grip, 0.5)
     assert executor.run(both, until=None, deadline=None).outcome == "failed"
     assert [handle.status for handle in handles] == ["aborted", "canceled"]
@@ -309,7 +311,7 @@ def test_a_controller_that_fails_stops_the_motions_of_the_others(session_of: Ses
 
     hand.update = broken  # type: ignore[method-assign]
     handles: list[Any] = []
-    executor = Executor(session, told=lambda _, handle: handles.append(handle))
+    executor = Executor(session, on_goal=lambda _, handle: handles.append(handle))
     end = executor.run(move(), until=None, deadline=None)
     assert end.outcome == "failed"
     assert "controller 'hand' failed" in end.text
@@ -321,7 +323,7 @@ def test_a_controller_that_fails_stops_the_motions_of_the_others(session_of: Ses
 
 def test_a_motion_for_which_there_is_no_controller_is_refused(session_of: SessionOf) -> None:
     both = Motion("both", None, Grip(("slide",), np.zeros(1), None, False), 0.1)
-    with pytest.raises(InvalidArgument, match="'arm' is no gripper"):
+    with pytest.raises(InvalidArgument, match="'arm' is not a gripper"):
         Executor(session_of()).run(both, until=None, deadline=None)
     trajectory = JointTrajectory.of_arrays(("tip",), np.array([1.0]), np.zeros((1, 1)), None, None)
     with pytest.raises(InvalidArgument, match="'hand' does not follow trajectories"):

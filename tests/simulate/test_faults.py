@@ -78,7 +78,7 @@ def test_a_command_that_is_no_finite_number_never_reaches_the_engine(
     breaks(session, "arm", at=50, value=value)
     end = Executor(session).run(move(0.05), until=None, deadline=None)
     assert end.outcome == "failed"
-    assert f"controller 'arm' failed in its update: it commands slide/effort to be {value}" in end.text
+    assert f"controller 'arm' failed in its update: its command for slide/effort is {value}" in end.text
     assert np.isfinite([effort for _, effort in written]).all()
     assert written[-1][0] == ("brake", "effort", "effort")
 

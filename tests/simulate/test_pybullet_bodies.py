@@ -113,5 +113,5 @@ def test_a_body_that_the_engine_cuts_is_told(
 ) -> None:
     p, client = bullet
     monkeypatch.setattr(pybullet_world, "MAX_SHAPES", 100)
-    with pytest.raises(ManipcliError, match="another body than 'cup': it has 16 shapes instead of 25"):
+    with pytest.raises(ManipcliError, match="different body than 'cup': it has 16 shapes instead of 25"):
         add_body(p, client, _cup(24, fixed=True), tmp_path)

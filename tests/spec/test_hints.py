@@ -166,7 +166,7 @@ def test_positions_of_a_group_are_told_to_go_by_joint(to: str) -> None:
     finding = told(f"steps: [{{move: {{to: {to}}}}}]")
     assert finding.code == "TASK205"
     where = "steps[0].move.to" if to.startswith("[") else "steps[0].move.to.arm"
-    assert finding.message == f"{where}: positions go by joint, not as a list"
+    assert finding.message == f"{where}: joint positions are a mapping by joint, not a list"
     written = re.search(r"\{joint: 30 deg\}", finding.hint or "")
     assert written is not None, finding.hint
     load_task_text(f"{TASK}steps: [{{move: {{to: {written.group()}}}}}]", "t.yaml", model=task_spec())

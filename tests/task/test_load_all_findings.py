@@ -225,7 +225,7 @@ def test_a_faulty_point_of_a_trajectory_is_told_at_its_line(tmp_path: Path) -> N
         ("[a, b]", "{positions: [0, 0, 0], time_from_start: 1}", "points[1].positions: 3 positions for 2 joints"),
         ("[a, b]", "{positions: [0, 0], time_from_start: 0.5}", "points[1].time_from_start: 0.5 s is not after 0.5 s"),
         ("[a, b]", "{positions: [0, 0], time_from_start: -1}", "points[1].time_from_start: must be 0 or more, not -1"),
-        ("[a, a]", "{positions: [0, 0], time_from_start: 1}", "joint_names[1]: joint 'a' stands twice"),
+        ("[a, a]", "{positions: [0, 0], time_from_start: 1}", "joint_names[1]: duplicate joint 'a'"),
     )
     text = "steps:\n" + "".join(
         f"  - follow:\n      joint_names: {names}\n      points:\n"
@@ -351,7 +351,7 @@ def test_names_of_the_scene_are_told_where_the_robot_cannot_be_built(tmp_path: P
     assert told == [
         ("TASK231", 2, f"there is no file '{tmp_path / 'nowhere.yaml'}'"),
         ("TASK230", 8, "'cupp' is not a movable body of the scene"),
-        ("TASK230", 9, "there is no frame 'dsk'"),
+        ("TASK230", 9, "unknown frame 'dsk'"),
         ("TASK230", 13, "'cu' is not a body of the scene or a part of the robot"),
         ("TASK230", 14, "the task has no step 'nowhere'"),
     ]

@@ -51,7 +51,7 @@ def test_a_robot_that_starts_inside_of_a_body_is_told_so_also_where_nothing_move
     assert finding.place is not None
     assert (finding.place.line, finding.place.column) == (8, 5)
     both = rf"('robot/\w+' and '{name}'|'{name}' and 'robot/\w+')"
-    assert re.fullmatch(rf"step 'wait_1': {both} overlap by [\d.]+ mm already, at the start", finding.message)
+    assert re.fullmatch(rf"step 'wait_1': {both} overlap by [\d.]+ mm at the start", finding.message)
     assert finding.hint is not None
     assert "`start: POSE`" in finding.hint
 

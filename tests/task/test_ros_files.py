@@ -166,7 +166,7 @@ def test_an_empty_list_of_command_interfaces_is_refused(tmp_path: Path) -> None:
 def test_an_update_rate_that_does_not_divide_the_control_rate_is_an_error(tmp_path: Path) -> None:  # [63]
     text = ROS_2.replace("state_interfaces:", "update_rate: 300\n      state_interfaces:")
     (line,) = errors(tmp_path, text)
-    assert "controllers.yaml:12:20: error[CTRL163]: controller 'arm_controller': an update rate of 300 Hz" in line
+    assert "controllers.yaml:12:20: error[CTRL163]: controller 'arm_controller': update rate 300 Hz" in line
     faster = ROS_2.replace("state_interfaces:", "update_rate: 2000\n      state_interfaces:")
     assert "CTRL163" in errors(tmp_path, faster)[0]
     assert errors(tmp_path, text.replace("300", "250")) == []

@@ -64,18 +64,18 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
     [
         (
             "  - switch_controllers: soft_rm\n",
-            "TASK232 6 steps[0].switch_controllers.to[0]: there is no controller 'soft_rm' in the controllers file | "
+            "TASK232 6 steps[0].switch_controllers.to[0]: controller 'soft_rm' is not in the controllers file | "
             "did you mean 'soft_arm'?",
         ),
         (
             "  - switch_controllers: {deactivate: [arm], activate: [soft_am]}\n",
-            "TASK232 6 steps[0].switch_controllers.activate[0]: there is no controller 'soft_am' in the controllers "
+            "TASK232 6 steps[0].switch_controllers.activate[0]: controller 'soft_am' is not in the controllers "
             "file | did you mean 'soft_arm'?",
         ),
         (
             "  - switch_controllers: {activate: [soft_arm]}\n",
-            "TASK233 6 steps[0].switch_controllers: a joint cannot be commanded on all of these at once: "
-            "joint_1/velocity (arm), joint_1/effort (soft_arm); the same of joint_2, joint_3, joint_4, and 3 more | "
+            "TASK233 6 steps[0].switch_controllers: conflicting command interfaces of one joint: "
+            "joint_1/velocity (arm), joint_1/effort (soft_arm); likewise for joint_2, joint_3, joint_4, and 3 more | "
             "name the controllers to activate under `to`: it deactivates conflicting ones",
         ),
         (
@@ -90,19 +90,19 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
         ),
         (
             "  - switch_controllers: {deactivate: [arm]}\n" + MOVE,
-            "TASK232 7 steps[1].move.to: controller 'arm', which follows trajectories of joint 'joint_1', is not "
-            "active here | add a step before it: `switch_controllers: arm`",
+            "TASK232 7 steps[1].move.to: controller 'arm' is not active here; it follows trajectories "
+            "of joint 'joint_1' | add a step before it: `switch_controllers: arm`",
         ),
         (
             "  - move: {to: {finger_1_distal: 0.1}}\n",
             "TASK232 6 steps[0].move.to: no controller follows trajectories of joint 'finger_1_distal' | "
-            "add the joint to a controller of a type that does, in the controllers file: `joint_trajectory`, "
-            "`computed_torque` or `cartesian_impedance`",
+            "add the joint to a controller of type `joint_trajectory`, "
+            "`computed_torque` or `cartesian_impedance` in the controllers file",
         ),
-        ("  - switch_controllers: {}\n", "TASK208 6 steps[0].switch_controllers: say either `to`"),
+        ("  - switch_controllers: {}\n", "TASK208 6 steps[0].switch_controllers: needs either `to`"),
         (
             "  - switch_controllers: {to: arm, activate: [soft_arm]}\n",
-            "TASK208 6 steps[0].switch_controllers: say either `to`",
+            "TASK208 6 steps[0].switch_controllers: needs either `to`",
         ),
         ("  - switch_controllers: {to: arm, strictness: auto}\n", "TASK203 6 steps[0].switch_controllers.strictness"),
     ],
@@ -134,7 +134,7 @@ def test_a_hand_is_moved_by_the_gripper_that_is_active(tmp_path: Path) -> None:
     assert told(task_file(tmp_path, grasp, more=GRIPPERS)) == []
     assert told(task_file(tmp_path, f"  - switch_controllers: other\n{grasp}", more=GRIPPERS)) == []
     (problem,) = told(task_file(tmp_path, "  - switch_controllers: {deactivate: [hand]}\n" + grasp, more=GRIPPERS))
-    assert "controller 'hand', which opens and closes a hand with joint 'finger_1_proximal', is not active" in problem
+    assert "controller 'hand' is not active here; it opens and closes a hand with joint 'finger_1_proximal'" in problem
 
 
 def test_a_run_switches_and_the_log_tells_of_it(tmp_path: Path) -> None:

@@ -89,25 +89,25 @@ def test_a_hand_under_another_type_is_told_with_its_controller(tmp_path: Path) -
     assert of_pick
     for found in of_pick:
         assert "controller 'c1' (" in found
-        assert "controllers.yaml:3:14), of type `joint_trajectory` | give it `type: gripper`" in found
+        assert "controllers.yaml:3:14) of type `joint_trajectory` | change it to `type: gripper`" in found
     (found,) = told(tmp_path, claims, "  - move: {to: home}\n")
-    assert "if one of them moves a hand, give it `type: gripper`" in found
+    assert "if one of them moves a hand, change it to `type: gripper`" in found
     mixed = told(tmp_path, HANDLESS, "  - release: {}\n")
-    assert "| take the hand's joints from 'c0', and add a controller of type `gripper`" in mixed[0]
+    assert "| remove the hand's joints from 'c0', and add a controller of type `gripper`" in mixed[0]
 
 
 def test_an_arm_under_a_type_that_follows_nothing_is_told_with_its_controller(tmp_path: Path) -> None:
     joints = ", ".join(ARM)
     claims = f"controllers:\n  arm: {{type: forward_command, joints: [{joints}], command_interface: effort}}\n"
     (found,) = told(tmp_path, claims, "  - lift: {object: block}\n")
-    assert "'panda_joint1': it is one of controller 'arm' (" in found
-    assert "controllers.yaml:2:15), of type `forward_command` | give 'arm' a type that does: `joint_traj" in found
+    assert "'panda_joint1': it belongs to controller 'arm' (" in found
+    assert "controllers.yaml:2:15) of type `forward_command` | change the type of 'arm' to `joint_traj" in found
 
 
 def test_a_trajectory_for_the_joint_of_a_gripper_is_refused(tmp_path: Path) -> None:
     follow = "  - follow: {joint_names: [panda_finger_joint1], points: [{positions: [0.02], time_from_start: 1}]}\n"
     (found,) = told(tmp_path, WHOLE, follow)
-    assert "follows no trajectory" in found
+    assert "does not follow trajectories" in found
     assert told(tmp_path, HANDLESS, follow) == []
 
 

@@ -1,4 +1,4 @@
-"""The types of controllers."""
+"""Registry of controller types."""
 
 from typing import Any
 

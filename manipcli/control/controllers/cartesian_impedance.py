@@ -1,4 +1,4 @@
-"""Holds the tool on its reference as a spring and a damper would; for work in contact.
+"""`cartesian_impedance`: controller that holds the tool on its reference like a spring and damper, for contact tasks.
 
     controllers:
       arm_controller:
@@ -9,18 +9,18 @@
         axes: tool
         posture: {stiffness: 10}
 
-With the tool frame T at the measured joints q and its reference R, which is where the joints' reference q_r would put
-it, or what `set_pose` says, and with the Jacobian J of T:
+With the tool frame T at the measured joints q, its reference R (at the joints' reference q_r, or from `set_pose`), and
+the Jacobian J of T:
 
     u = J^T (K e + D J (v_r - v)) + N (k (q_r - q) + d (v_r - v)) + g(q)
     e = (p_R - p_T, the rotation vector of R_WR R_WT^T)
 
 K [N/m, N m/rad] and D [N s/m, N m s/rad] are diagonal along the axes of the world or of R. By a damping ratio z,
-D_ii = 2 z sqrt(K_ii m_i) with the mass m_i = 1 / (J M^-1 J^T)_ii that the tool has along that axis. Joints that the
-tool leaves free are drawn to the posture q_r through N = 1 - J^T (J J^T + s^2)^-1 J, which takes from it what would
-push the tool. Nothing is inverted that can be singular: s bounds the one, and m_i only damps.
+D_ii = 2 z sqrt(K_ii m_i) with the effective mass m_i = 1 / (J M^-1 J^T)_ii of the tool along that axis. The null space
+of the tool is drawn to the configuration q_r through N = 1 - J^T (J J^T + s^2)^-1 J, which removes the part that pushes
+the tool. No singular matrix is inverted: s bounds one inverse, and m_i only scales the damping.
 
-Where the reference rests, a force F on the tool brings it off by K^-1 F. Hogan, Impedance control (1985); Ott,
+At rest, a force F on the tool displaces it by K^-1 F. Hogan, Impedance control (1985); Ott,
 Cartesian Impedance Control of Redundant and Flexible-Joint Robots (2008), chapters 3 and 4.
 """
 
@@ -53,11 +53,11 @@ from manipcli.spec.base import Model
 from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, Interface, Role
 
 SINGULAR: Final = 1e-3
-"""s: directions of the tool that the joints move by less than this [m or rad per rad] are left to the posture."""
+"""s: tool directions in which the joints move less than this [m or rad per rad] belong to the null space."""
 LIGHTEST: Final = 1e-9
-"""[1/kg] or [1/(kg m2)]: mobilities below this count as this."""
+"""[1/kg] or [1/(kg m2)] Lower bound for mobilities."""
 WEIGHED: Final = 10
-"""Updates between two looks at the masses, which only scale the damping and change slowly."""
+"""Updates between two computations of the masses, which only scale the damping and change slowly."""
 
 
 NotNegative = Annotated[float, Field(ge=0)]
@@ -65,14 +65,14 @@ Axes3 = tuple[NotNegative, NotNegative, NotNegative]
 
 
 class TaskSpaceSpec(Model):
-    """Along and about three axes: one number for all three, or a list of x, y, z."""
+    """Values along and about three axes: one number for all three, or a list of x, y, z."""
 
     translation: NotNegative | Axes3 = Field(description="Stiffness [N/m] or damping [N s/m], 0 or more.")
     rotation: NotNegative | Axes3 = Field(description="Stiffness [N m/rad] or damping [N m s/rad], 0 or more.")
 
 
 class PostureSpec(Model):
-    """What draws the joints to those of the reference where that does not move the tool."""
+    """Stiffness of the joints towards the reference configuration, in the null space of the tool."""
 
     stiffness: NotNegative = Field(10.0, description="Of each joint [N m/rad or N/m], 0 or more. Default 10.")
     damping_ratio: NotNegative = Field(
@@ -81,26 +81,28 @@ class PostureSpec(Model):
 
 
 class CartesianImpedanceSpec(ControllerSpec):
-    """Holds the tool on its reference as a spring and a damper would; for work in contact."""
+    """Holds the tool on its reference like a spring and damper, for contact tasks."""
 
     role: ClassVar[Role] = "follower"
 
     type: Literal["cartesian_impedance"] = Field(description="`cartesian_impedance`.")
-    joints: tuple[str, ...] = Field(description="The joints that it claims: all between the base and the tool.")
-    link: str | None = Field(None, description="The link whose frame is led. Default: the robot's tool frame.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims: all between base and tool.")
+    link: str | None = Field(None, description="The link whose frame is controlled. Default: the robot's tool frame.")
     stiffness: TaskSpaceSpec = Field(description="Of the spring [N/m, N m/rad].")
     damping_ratio: NotNegative = Field(
         1.0, description="Damping 2 ratio sqrt(stiffness x effective mass), 0 or more. Default 1."
     )
-    damping: TaskSpaceSpec | None = Field(None, description="Instead of the ratio [N s/m, N m s/rad]. Default: none.")
-    axes: Literal["world", "tool"] = Field("world", description="Whose axes stiffness and damping mean. Default world.")
-    posture: PostureSpec = Field(PostureSpec(), description="Of the joints that the tool leaves free.")
+    damping: TaskSpaceSpec | None = Field(
+        None, description="Damping, instead of the ratio [N s/m, N m s/rad]. Default: none."
+    )
+    axes: Literal["world", "tool"] = Field("world", description="Axes of stiffness and damping. Default world.")
+    posture: PostureSpec = Field(PostureSpec(), description="Stiffness of the joints in the null space of the tool.")
     inverse_dynamics: bool = Field(
-        False, description="Add the effort that the reference's acceleration needs, to gravity. Default false."
+        False, description="Add the effort of the reference's acceleration, besides gravity. Default false."
     )
     constraints: ConstraintsSpec = Field(
         ConstraintsSpec(),
-        description="Tolerances of the joints and goal time; a contact brings a joint off its reference.",
+        description="Tolerances of the joints and goal time; contacts displace joints from their references.",
     )
 
     @property
@@ -116,18 +118,18 @@ class CartesianImpedanceController:
         name: of the controller.
         joints: (n) distinct names.
         kinematics: of the robot.
-        link, offset: the tool frame T stands at `offset` X_LT in the link.
+        link, offset: the tool frame T is at `offset` X_LT in the link.
         stiffness: (6) along and about the axes [N/m, N m/rad].
         damping_ratio: see the module.
         damping: (6) [N s/m, N m s/rad], instead of the ratio.
-        axes: whose stiffness and damping mean.
+        axes: of stiffness and damping.
         posture_stiffness: of each joint [N m/rad or N/m].
         posture_damping_ratio: d = 2 ratio sqrt(k M_jj).
-        feed_forward: `gravity`; `inverse_dynamics` adds what the reference's acceleration needs.
+        feed_forward: `gravity`; `inverse_dynamics` adds the effort of the reference's acceleration.
         constraints, limits, types, compat: see `JointTrajectoryController`.
 
     Raises:
-        InvalidArgument: no or repeated joints, numbers that are negative or not finite, no stiffness at all.
+        InvalidArgument: no or duplicate joints, numbers that are negative or not finite, zero stiffness.
     """
 
     role: Role = "follower"
@@ -170,7 +172,7 @@ class CartesianImpedanceController:
             if not 0.0 <= value < np.inf:
                 raise InvalidArgument("CTRL185", f"controller '{name}': {what} is {value}; expected 0 or more")
         if not self._stiffness.any() and posture_stiffness == 0.0:
-            raise InvalidArgument("CTRL185", f"controller '{name}': no stiffness at all; it would not move")
+            raise InvalidArgument("CTRL185", f"controller '{name}': all stiffnesses are 0; it would not move")
         self._scale = 2.0 * damping_ratio * np.sqrt(self._stiffness)
         self._posture = posture_stiffness
         self._posture_scale = 2.0 * posture_damping_ratio * np.sqrt(posture_stiffness)
@@ -192,7 +194,7 @@ class CartesianImpedanceController:
     def _six(self, what: str, values: npt.ArrayLike) -> Array:
         given = np.array(values, dtype=np.float64)
         if given.shape != (6,) or not (np.isfinite(given).all() and (given >= 0.0).all()):
-            message = f"controller '{self.name}': {what} {given.tolist()}; expected 6 numbers of 0 or more"
+            message = f"controller '{self.name}': {what} is {given.tolist()}; expected 6 numbers of 0 or more"
             raise InvalidArgument("CTRL185", message)
         return given
 
@@ -204,7 +206,7 @@ class CartesianImpedanceController:
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
     ) -> GoalHandle:
-        """Accepts a trajectory, see `JointTrajectoryController.send_goal`; a pose that was set is forgotten."""
+        """Accept a trajectory, see `JointTrajectoryController.send_goal`; a pose that was set is cleared."""
         if self._pose is None:
             return self._follower.send_goal(trajectory, constraints=constraints)
         self._follower.deactivate(self._time)
@@ -213,21 +215,21 @@ class CartesianImpedanceController:
         return handle
 
     def set_pose(self, X_WT: Transform) -> None:
-        """The reference of the tool from the next update on; an active goal ends as aborted.
+        """Set the reference pose of the tool from the next update on; an active goal is aborted.
 
-        The spring pulls at once, as hard as the pose is far: lead far ways by trajectories. The posture stays that of
-        the moment, and is what counts as the joints' reference.
+        The spring pulls at once, in proportion to the distance: use trajectories for long distances. The present
+        configuration is held as the joints' reference.
 
         Raises:
             InvalidArgument: numbers that are not finite.
         """
         if not (np.isfinite(X_WT.R).all() and np.isfinite(X_WT.p).all()):
-            raise InvalidArgument("CTRL185", f"controller '{self.name}': a pose that is not finite")
+            raise InvalidArgument("CTRL185", f"controller '{self.name}': the pose is not finite")
         self._follower.deactivate(self._time, "preempted by a pose")
         self._pose = X_WT
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        """Abort its goal and reset its state; the next update re-activates it."""
         self._follower.deactivate(time, reason)
         self._pose = self._held = None
         self._updates = 0
@@ -264,7 +266,7 @@ class CartesianImpedanceController:
         return output
 
     def _refer(self, time: float, period: float, measured: JointState) -> None:
-        """Writes the reference of the joints."""
+        """Write the reference of the joints."""
         output = self.output
         if self._pose is None:
             output.rows[:3] = self._follower.update(time, period, measured).rows[:3]
@@ -319,18 +321,20 @@ def _six(spec: TaskSpaceSpec) -> Array:
 
 
 def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
-    """Tolerances of joints that it does not have; a tool that is not there, that other joints move, too, or that one of
-    its joints does not move; no stiffness."""
+    """Tolerances of other joints; a missing tool, a tool that other joints move, too, or that one of its joints does
+    not move; zero stiffness."""
     yield from strangers(
         robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
     )
     if not _six(spec.stiffness).any() and spec.posture.stiffness == 0.0:
-        yield Problem(("stiffness",), "no stiffness at all; it would not move", "give stiffness.translation", "CTRL185")
+        yield Problem(
+            ("stiffness",), "all stiffnesses are 0; it would not move", "give stiffness.translation", "CTRL185"
+        )
     link, _ = _frame(spec, robot)
-    names = [one.name for one in robot.links]
+    names = [own.name for own in robot.links]
     if link not in names:
         if spec.link is None:
-            hint = "say `link`, or add `tool: {link: ...}` to the robot file"
+            hint = "set `link`, or add `tool: {link: ...}` to the robot file"
             yield Problem((), f"robot '{robot.name}' has no tool frame", hint, "CTRL186")
         else:
             hint = did_you_mean(link, names, kind="links") or ""
@@ -340,15 +344,15 @@ def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
     missing = [name for name in movers if name not in spec.joints]
     if missing:
         message = f"{listed(missing)} {'moves' if len(missing) == 1 else 'move'} link '{link}', too"
-        yield Problem(("joints",), message, "its joints are all between the base and the tool", "CTRL186")
+        yield Problem(("joints",), message, "list all joints between base and tool", "CTRL186")
     for k, name in enumerate(spec.joints):
         if name in robot.joint_names and name not in movers:
             message = f"joint '{name}' does not move link '{link}'"
-            yield Problem(("joints", k), message, f"joints that do: {listed(movers)}", "CTRL186")
+            yield Problem(("joints", k), message, f"use joints that do: {listed(movers)}", "CTRL186")
 
 
 def loop(spec: CartesianImpedanceSpec) -> ControlLoop:
-    """None to examine: its damping follows the inertia, and a stiffness is chosen for the contact."""
+    """No loop to examine: its damping follows the inertia, and its stiffness is chosen for the contact."""
     return NoLoop("its damping follows the inertia, and its stiffness is chosen for the contact")
 
 

@@ -1,4 +1,4 @@
-"""Follows joint trajectories by inverse dynamics: the robot is made to look like one unit mass a joint.
+"""`computed_torque`: controller that follows joint trajectories by inverse dynamics, with decoupled unit masses.
 
     controllers:
       arm_controller:
@@ -10,8 +10,8 @@
 
     u = M(q) (a_r + d (v_r - v) + p (q_r - q)) + C(q, v) v + g(q) + D v_r
 
-so that, where the model is right, every error obeys e'' + d e' + p e = 0, with p = (2 pi f)^2 and d = 4 pi f ratio of
-the bandwidth f [Hz] and the damping ratio; the damping D of the joints themselves is on top of d. Siciliano et al.,
+so that, with an exact model, every error obeys e'' + d e' + p e = 0, with p = (2 pi f)^2 and d = 4 pi f ratio of
+the bandwidth f [Hz] and the damping ratio; the damping D of the joints adds to d. Siciliano et al.,
 Robotics: Modelling, Planning and Control (2009), 8.5.2.
 The manager's feed-forward multiplies by the inertia and adds the rest (see `ModelFeedForward`).
 """
@@ -68,10 +68,10 @@ class ComputedTorqueSpec(ControllerSpec):
 
 
 class ComputedTorqueController:
-    """A joint trajectory controller whose PID asks for accelerations, which inverse dynamics turns into efforts.
+    """A joint trajectory controller whose PID computes accelerations, which inverse dynamics converts to efforts.
 
-    Goals, tolerances, results and what it holds are those of `JointTrajectoryController`. Its own command is 0: all of
-    the effort comes from the feed-forward, so nothing moves where nobody adds that.
+    Goals, tolerances, results and holding are those of `JointTrajectoryController`. Its own command is 0: all of the
+    effort comes from the feed-forward, so nothing moves without it.
 
     Args:
         name: of the controller.
@@ -82,7 +82,7 @@ class ComputedTorqueController:
         constraints, limits, types, compat: see `JointTrajectoryController`.
 
     Raises:
-        InvalidArgument: no or repeated joints, gains of an unknown joint, gains or a bandwidth of zero.
+        InvalidArgument: no or duplicate joints, gains of an unknown joint, gains or a bandwidth of zero.
     """
 
     role: Role = "follower"
@@ -105,9 +105,7 @@ class ComputedTorqueController:
         compat: Compat | None = None,
     ) -> None:
         if not bandwidth > 0.0:
-            raise InvalidArgument(
-                "CTRL180", f"controller '{name}': a bandwidth of {bandwidth} Hz; expected more than 0"
-            )
+            raise InvalidArgument("CTRL180", f"controller '{name}': bandwidth is {bandwidth} Hz; expected more than 0")
         common = error_gains(bandwidth, damping_ratio)
         self._follower = JointTrajectoryController(
             name=name,
@@ -133,11 +131,11 @@ class ComputedTorqueController:
         )
 
     def send_goal(self, trajectory: JointTrajectory, *, constraints: ConstraintsSpec | None = None) -> GoalHandle:
-        """Accepts a trajectory; see `JointTrajectoryController.send_goal`."""
+        """Accept a trajectory; see `JointTrajectoryController.send_goal`."""
         return self._follower.send_goal(trajectory, constraints=constraints)
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        """Abort its goal and reset its state; the next update re-activates it."""
         self._follower.deactivate(time, reason)
 
     def update(
@@ -167,15 +165,15 @@ def build(name: str, spec: ComputedTorqueSpec, context: BuildContext) -> Compute
 
 
 def check(spec: ComputedTorqueSpec, robot: RobotModel) -> Iterator[Problem]:
-    """Gains and tolerances of joints that it does not have, and gains all zero."""
+    """Gains and tolerances of other joints, and gains all zero."""
     yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
     yield from strangers(
         robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
     )
     for joint, gains in spec.gains.items():
         if joint in spec.joints and gains.p == gains.i == gains.d == 0.0:
-            hint = f"give gains.{joint}.p [1/s2] and d [1/s], or leave them out for those of the bandwidth"
-            message = f"the gains of joint '{joint}' are all zero; nothing would bring it back to its reference"
+            hint = f"give gains.{joint}.p [1/s2] and d [1/s], or remove them to use the bandwidth"
+            message = f"the gains of joint '{joint}' are all zero; it would not return to its reference"
             yield Problem(("gains", joint), message, hint, "CTRL103")
 
 

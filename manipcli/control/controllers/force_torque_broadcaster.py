@@ -1,18 +1,18 @@
-"""Measures the wrench that a link puts on the one that carries it, as a force/torque sensor between the two would.
+"""`force_torque_broadcaster`: publishes the wrench of a link on its parent, like a force/torque sensor between them.
 
     controllers:
       wrist_sensor:
         type: force_torque_broadcaster
         link: palm
 
-The force [N] and the torque about the link's origin [N m] are those that the link, with all that hangs on it, exerts on
+The force [N] and the torque about the link's origin [N m] are those that the link, with all links below it, exerts on
 its parent, in the link's frame (Gazebo's `child_to_parent`): a link that hangs at rest pulls with its weight. The log
-has it as geometry_msgs/WrenchStamped in /NAME/wrench at every control tick, programs as
+has it as geometry_msgs/WrenchStamped in /NAME/wrench at every control tick; programs read
 `manager["wrist_sensor"].wrench`. An engine without physics measures zeros.
 
-It is what moves and what touches, over the last step of the physics, that is measured: weight, inertia, contact. What
-drives a joint is in it, as is what couples a mimic joint, and shakes of single steps are, too. One thing is not: the
-moment that a body carries by `spinning_friction` or `rolling_friction` (0 unless given) at a point of contact.
+The sensor measures weight, inertia and contact over the last physics step, including joint drives, mimic couplings, and
+the noise of single steps. It does not measure the moment of `spinning_friction` or `rolling_friction` (0 unless given)
+at a point of contact.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from manipcli.spec.controllers import ControllerSpec, Interface, Role
 
 
 class ForceTorqueBroadcasterSpec(ControllerSpec):
-    """Claims nothing; measures the wrench that a link puts on its parent; the log has it in `/NAME/wrench`."""
+    """Claims no joint; measures the wrench of a link on its parent, in the log as `/NAME/wrench`."""
 
     type: Literal["force_torque_broadcaster"] = Field(description="`force_torque_broadcaster`.")
-    link: str = Field(description="Measured where this link meets its parent, in this link's frame [N, N m].")
+    link: str = Field(description="Link whose wrench on its parent is measured, in this link's frame [N, N m].")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ class Wrench:
 
 
 class ForceTorqueBroadcaster:
-    """Publishes what it is attached to: `output.rows` (1, 6) are force and torque at the last update.
+    """Publishes the reading of its sensor: `output.rows` (1, 6) are force and torque at the last update.
 
     Args:
         name: of the controller.
@@ -88,17 +88,17 @@ class ForceTorqueBroadcaster:
         self._time = 0.0
 
     def attach(self, readings: Sequence[Array]) -> None:
-        """From now on it publishes the reading (6) of its sensor: force and torque."""
+        """Attach the reading (6) of its sensor: force and torque."""
         (self._source,) = readings
 
     @property
     def wrench(self) -> Wrench:
-        """What was measured at the last update; zeros before the first."""
+        """The wrench of the last update; zeros before the first."""
         values = self.output.rows[0]
         return Wrench(self._time, self.link, frozen(values[:3]), frozen(values[3:]))
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Nothing ends."""
+        """No effect."""
 
     def update(
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
@@ -116,19 +116,19 @@ def build(name: str, spec: ForceTorqueBroadcasterSpec, context: BuildContext) ->
 
 
 def check(spec: ForceTorqueBroadcasterSpec, robot: RobotModel) -> Iterator[Problem]:
-    """A link that is not there, or that nothing carries; joints, of which it has none."""
+    """An unknown link, or the root; joints, which it does not have."""
     if spec.joints:
-        yield Problem(("joints",), "it reads no joints", "leave `joints` out: `link` says where it measures", "CTRL184")
-    carried = [one.child for one in robot.joints]
+        yield Problem(("joints",), "it reads no joints", "remove `joints`; `link` sets where it measures", "CTRL184")
+    carried = [joint.child for joint in robot.joints]
     if spec.link not in carried:
         root = spec.link == robot.root
-        message = "is the root: nothing carries it" if root else f"is not in robot '{robot.name}'"
+        message = "is the root and has no parent" if root else f"is not in robot '{robot.name}'"
         hint = did_you_mean(spec.link, carried, kind="links")
         yield Problem(("link",), f"link '{spec.link}' {message}", hint, "CTRL184")
 
 
 def loop(spec: ForceTorqueBroadcasterSpec) -> ControlLoop:
-    """None: it commands nothing."""
+    """No loop: it commands nothing."""
     return NoLoop("it commands nothing")
 
 

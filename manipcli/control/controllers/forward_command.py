@@ -1,4 +1,4 @@
-"""Passes commands on: positions, velocities or efforts.
+"""`forward_command`: controller that forwards positions, velocities or efforts to the joints.
 
     controllers:
       arm_controller:
@@ -6,11 +6,11 @@
         joints: [joint_1, joint_2]
         command_interface: velocity
 
-Steps cannot use it; a program in Python does:
+Steps cannot use it; it is for Python programs:
 
     manager["arm_controller"].set_command([0.1, 0.0])  # rad/s, from the next update on
 
-Until the first command it holds: the measured position, no velocity, no effort.
+Until the first command it holds: the measured position, zero velocity, zero effort.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from manipcli.spec.controllers import ControllerSpec, Interface, Role
 
 
 class ForwardCommandSpec(ControllerSpec):
-    """Passes on what it is told with `set_command`; until then it holds: the position, no velocity, no effort."""
+    """Forwards the values of `set_command`; until then it holds: the measured position, zero velocity, zero effort."""
 
     type: Literal["forward_command"] = Field(description="`forward_command`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
     command_interface: Literal["position", "velocity", "effort"] = Field(description="What it commands.")
     gravity_compensation: bool = Field(
-        False, description="Add the effort that holds against gravity, to efforts. Default false."
+        False, description="Add the effort that compensates gravity, to efforts. Default false."
     )
 
     @property
@@ -55,19 +55,19 @@ class ForwardCommandSpec(ControllerSpec):
 
 
 class ForwardCommandController:
-    """Forwards what `set_command` says, on one interface.
+    """Forwards the values of `set_command` on one interface.
 
-    What it reports as its reference: the position that it commands; with velocities, that velocity and the position
-    one period on; with efforts, what is measured.
+    Its reference is the commanded position; with velocities, the commanded velocity and the position one period ahead;
+    with efforts, the measured state.
 
     Args:
         name: of the controller.
         joints: (n) distinct names.
-        interface: what the commands are.
-        feed_forward: what shall be added to efforts.
+        interface: of the commands.
+        feed_forward: added to efforts.
 
     Raises:
-        InvalidArgument: no or repeated joints.
+        InvalidArgument: no or duplicate joints.
     """
 
     role: Role = "other"
@@ -85,31 +85,31 @@ class ForwardCommandController:
         self._interface = interface
         self.output = ControllerOutput.of(n, 1)
         self._wanted = np.zeros(n)
-        self._told = False
+        self._commanded = False
 
     def set_command(self, values: npt.ArrayLike) -> None:
-        """What is commanded from the next update on, until it is deactivated.
+        """Set the command from the next update on, until deactivation.
 
         Args:
             values: (n) rad, rad/s or N m; m, m/s or N.
 
         Raises:
-            InvalidArgument: not as many finite numbers as joints; the command before stays.
+            InvalidArgument: not one finite number per joint; the previous command is kept.
         """
         self._wanted = finite_values(self.name, self.joints, values)
-        self._told = True
+        self._commanded = True
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Forgets what it was told; the next update holds."""
-        self._told = False
+        """Clear the command; the next update holds."""
+        self._commanded = False
 
     def update(
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
     ) -> ControllerOutput:
         """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
         output, command = self.output, self.output.command
-        if not self._told:
-            self._told = True
+        if not self._commanded:
+            self._commanded = True
             self._wanted = np.array(measured.position) if self._interface == "position" else np.zeros(len(self.joints))
         command[:] = self._wanted
         if self._interface == "position":
@@ -125,14 +125,14 @@ class ForwardCommandController:
 
 
 def finite_values(name: str, joints: Sequence[str], values: npt.ArrayLike) -> Array:
-    """(n) a copy of finite numbers, one a joint.
+    """(n) a copy of finite numbers, one per joint.
 
     Raises:
         InvalidArgument: they are not.
     """
     given = np.array(values, dtype=np.float64)
     if given.shape != (len(joints),):
-        message = f"controller '{name}': values of shape {given.shape}; expected {len(joints)}, one a joint"
+        message = f"controller '{name}': values of shape {given.shape}; expected {len(joints)}, one per joint"
         raise InvalidArgument("CTRL181", message, hint=f"joints: {', '.join(joints)}")
     bad = np.flatnonzero(~np.isfinite(given))
     if len(bad):
@@ -148,15 +148,20 @@ def build(name: str, spec: ForwardCommandSpec, context: BuildContext) -> Forward
 
 
 def check(spec: ForwardCommandSpec, robot: RobotModel) -> Iterator[Problem]:
-    """An effort added where there is none."""
+    """Gravity compensation without an effort command."""
     if spec.gravity_compensation and spec.command_interface != "effort":
-        message = f"gravity_compensation adds an effort, but its interface is {spec.command_interface}"
-        yield Problem(("gravity_compensation",), message, "use command_interface: effort, or leave it out", "CTRL147")
+        message = f"gravity_compensation needs the effort interface, not {spec.command_interface}"
+        yield Problem(
+            ("gravity_compensation",),
+            message,
+            "use command_interface: effort, or remove gravity_compensation",
+            "CTRL147",
+        )
 
 
 def loop(spec: ForwardCommandSpec) -> ControlLoop:
-    """None: a program closes it."""
-    return NoLoop("it passes commands on and has no gains")
+    """No loop: a program closes it."""
+    return NoLoop("it forwards commands and has no gains")
 
 
 MEMBER = ControllerMember(name="forward_command", spec=ForwardCommandSpec, build=build, check=check, loop=loop)

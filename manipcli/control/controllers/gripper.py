@@ -1,4 +1,4 @@
-"""Closes and opens a hand: each finger's reference moves at a speed and stops on contact, on stall, or at its target.
+"""`gripper`: controller of a hand; each finger's reference moves until contact, stall, or its target.
 
     controllers:
       hand_controller:
@@ -9,14 +9,13 @@
         max_effort: 2
         allow_stalling: true
 
-Effort: u = PID(e, de/dt), clamped to the maximum effort; what holds the fingers against gravity comes on top. Where a
-finger stops, its reference stays: the spring of the gains keeps pressing with what it had built up, and so does the
-integral of one that presses as hard as asked. Position: u = the reference; the joints' own effort limits say how hard
-it presses.
+Effort: u = PID(e, de/dt), clamped to the maximum effort; gravity compensation is added. When a finger stops, its
+reference stays: the gains keep pressing with the effort built up so far, and the integral of a finger with the
+requested force is frozen. Position: u = the reference; the effort limits of the joints determine how hard it presses.
 
-Goals, results and parameters are those of ROS's GripperCommand: a position for all joints or one each, `max_effort`,
-`stalled`, `reached_goal`, `allow_stalling`. What stalls against an object has grasped it, so that stalling is allowed
-unless the file says otherwise (in ROS it is the other way round).
+Goals, results and parameters are those of ROS's GripperCommand: a position for all joints or one per joint,
+`max_effort`, `stalled`, `reached_goal`, `allow_stalling`. A finger that stalls against an object has grasped it, so
+stalling is allowed by default (in ROS it is not).
 """
 
 from __future__ import annotations
@@ -45,10 +44,10 @@ __all__ = ["MEMBER", "GripperController", "GripperGoal"]
 
 STALL_VELOCITY: Final = 0.02
 STALL_SPEED: Final = 0.001
-"""A finger joint slower than this is stalled, where nobody says [rad/s; m/s]."""
+"""Default speed below which a finger joint is stalled [rad/s; m/s]."""
 GOAL_ANGLE: Final = 0.05
 GOAL_DISTANCE: Final = 0.002
-"""A finger joint this near to its target has arrived, where nobody says [rad; m]: far less than a hand's stroke."""
+"""Default tolerance of a finger joint's target [rad; m]: far less than a hand's stroke."""
 
 
 class GripperSpec(ControllerSpec):
@@ -60,22 +59,24 @@ class GripperSpec(ControllerSpec):
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
     command_interface: Literal["position", "effort"] = Field("effort", description="What it commands. Default effort.")
     gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
-    gravity_compensation: bool = Field(True, description="Add the effort that holds against gravity. Default true.")
+    gravity_compensation: bool = Field(True, description="Add the effort that compensates gravity. Default true.")
     speed: Annotated[JointVelocity, Field(gt=0)] | None = Field(
-        None, description="Of the reference, above 0. Default 1 rad/s or m/s, or the least limit of its joints."
+        None, description="Of the reference, above 0. Default 1 rad/s or m/s, at most the least limit of its joints."
     )
     max_effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
-        None, description="Greatest effort a joint [N m or N], above 0. Default: the joint's limit."
+        None, description="Largest effort per joint [N m or N], above 0. Default: the joint's limit."
     )
     stall_velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
-        None, description="Slower counts as stalled, above 0. Default 0.02 rad/s or 1 mm/s."
+        None, description="A slower joint counts as stalled, above 0. Default 0.02 rad/s or 1 mm/s."
     )
-    stall_time: Annotated[Time, Field(gt=0, description="Stalled so long is stopped, above 0. Default 0.2 s.")] = 0.2
+    stall_time: Annotated[
+        Time, Field(gt=0, description="Time stalled before the finger stops, above 0. Default 0.2 s.")
+    ] = 0.2
     allow_stalling: bool = Field(
-        True, description="Whether a stalled finger has grasped; otherwise its goal is aborted. Default true."
+        True, description="A stalled finger counts as a grasp; otherwise its goal is aborted. Default true."
     )
     goal_tolerance: JointTolerance | None = Field(
-        None, description="Distance that counts as arrived, above 0 to pi. Default 0.05 rad or 2 mm."
+        None, description="Tolerance of the target, above 0 to pi. Default 0.05 rad or 2 mm."
     )
 
     @property
@@ -108,19 +109,19 @@ def build(name: str, spec: GripperSpec, context: BuildContext) -> GripperControl
 
 
 def _each(joints: Sequence[Joint], stated: float | None, *, turning: float, sliding: float) -> Array:
-    """(n) what was stated, or the default of each joint's type."""
+    """(n) the stated value, or the default of each joint's type."""
     defaults = [sliding if joint.type == "prismatic" else turning for joint in joints]
     return np.array(defaults if stated is None else [stated] * len(joints))
 
 
 def check(spec: GripperSpec, robot: RobotModel) -> Iterator[Problem]:
-    """Gains of joints that it does not have, and gains all zero; an effort limit of positions."""
+    """Gains of other joints, gains all zero; a maximum effort on the position interface."""
     yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
     if spec.command_interface == "effort":
         yield from idle_gains(robot, spec.joints, spec.gains, "effort")
     elif spec.max_effort is not None:
-        hint = "use command_interface: effort, or the effort limits of the joints"
-        yield Problem(("max_effort",), "positions know no maximum effort", hint, "CTRL147")
+        hint = "use command_interface: effort, or set the effort limits of the joints"
+        yield Problem(("max_effort",), "max_effort needs the effort interface, not position", hint, "CTRL147")
 
 
 def loop(spec: GripperSpec) -> ControlLoop:

@@ -1,4 +1,4 @@
-"""Offers measured joints to Python; claims nothing and commands nothing.
+"""`joint_state_broadcaster`: offers measured joint states to Python; claims and commands no joint.
 
     controllers:
       joint_state_broadcaster:
@@ -6,8 +6,8 @@
         joints: [joint_1, joint_2]
         state_interfaces: [position, velocity]
 
-The log has all joints in /joint_states, whoever is loaded; this one is for files that name it, and for programs that
-want some joints at a rate of their own: `manager["joint_state_broadcaster"].state`.
+The log always has all joints in /joint_states. This controller is for files that name it, and for programs that read
+some joints at their own rate: `manager["joint_state_broadcaster"].state`.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from manipcli.spec.controllers import ControllerSpec, Interface, Role
 
 
 class JointStateBroadcasterSpec(ControllerSpec):
-    """Claims nothing; offers measured joints to Python. The log has all joints in /joint_states, with or without it."""
+    """Claims no joint; offers measured joint states to Python. The log always has all joints in /joint_states."""
 
     type: Literal["joint_state_broadcaster"] = Field(description="`joint_state_broadcaster`.")
-    joints: tuple[str, ...] = Field((), description="The joints that it reads. Default: all that move.")
+    joints: tuple[str, ...] = Field((), description="The joints that it reads. Default: all moving joints.")
     state_interfaces: Annotated[
         tuple[Literal["position", "velocity", "effort"], ...],
-        Field(min_length=1, description="What of them. Default [position, velocity, effort]."),
+        Field(min_length=1, description="Measured values. Default [position, velocity, effort]."),
     ] = ("position", "velocity", "effort")
 
 
@@ -57,15 +57,15 @@ class BroadcastState:
 
 
 class JointStateBroadcaster:
-    """Keeps what was measured at its last update.
+    """Keeps the measured state of its last update.
 
     Args:
         name: of the controller.
         joints: (n) distinct names.
-        state_interfaces: what of them is offered.
+        state_interfaces: the measured values to keep.
 
     Raises:
-        InvalidArgument: repeated joints, or an interface that is not measured.
+        InvalidArgument: duplicate joints, or an interface that is not measured.
     """
 
     role: Role = "other"
@@ -94,12 +94,12 @@ class JointStateBroadcaster:
 
     @property
     def state(self) -> BroadcastState:
-        """What was measured at the last update; zeros before the first."""
+        """The state at the last update; zeros before the first."""
         rows = [frozen(row) if wanted else frozen([]) for row, wanted in zip(self._seen, self._wanted, strict=True)]
         return BroadcastState(self._time, self.joints, *rows)
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Nothing ends."""
+        """No effect."""
 
     def update(
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
@@ -117,12 +117,12 @@ def build(name: str, spec: JointStateBroadcasterSpec, context: BuildContext) -> 
 
 
 def check(spec: JointStateBroadcasterSpec, robot: RobotModel) -> Iterator[Problem]:
-    """Nothing: the joints are looked at for every controller."""
+    """Nothing: the joints are checked for every controller."""
     return iter(())
 
 
 def loop(spec: JointStateBroadcasterSpec) -> ControlLoop:
-    """None: it commands nothing."""
+    """No loop: it commands nothing."""
     return NoLoop("it commands nothing")
 
 

@@ -1,4 +1,4 @@
-"""Follows joint trajectories on position, velocity and effort interfaces, with tolerances that name what broke them.
+"""`joint_trajectory`: controller that follows joint trajectories on position, velocity or effort interfaces.
 
     controllers:
       arm_controller:
@@ -16,8 +16,8 @@ With the reference q, v, a at t, at t + period marked by ', and the effort tau o
     [position], [position, velocity], [position, velocity, acceleration]: q', v', a'
     [position, effort]    q', tau'
 
-The error, and so every tolerance, is reference(t) - measured(t); what is fed forward looks one period ahead, because it
-is what the joint shall have when the next tick measures it.
+The error, and so every tolerance, is reference(t) - measured(t); the feed-forward is one period ahead, because the
+joint executes it by the time the next tick measures it.
 """
 
 from __future__ import annotations
@@ -42,21 +42,21 @@ __all__ = ["MEMBER", "JointTrajectoryController"]
 
 
 class SpeedScalingSpec(Model):
-    """How fast the clock of trajectories runs."""
+    """Speed of the clock of trajectories."""
 
     initial_scaling_factor: Annotated[float, Field(ge=0)] = Field(
-        1.0, description="Seconds of the trajectory a second, 0 or more: 0 pauses. Default 1."
+        1.0, description="Trajectory seconds per second, 0 or more: 0 pauses. Default 1."
     )
 
 
 class UpsamplingSpec(Model):
-    """Velocities for goals that give positions alone."""
+    """Velocities for goals with only positions."""
 
     enable: bool = Field(False, description="Follow the cubic spline through the positions. Default false.")
 
 
 class JointTrajectorySpec(ControllerSpec):
-    """Follows joint trajectories: PID with feed-forward (effort, velocity), or passes the reference on (position)."""
+    """Follows joint trajectories: PID with feed-forward (effort, velocity), or forwards the reference (position)."""
 
     role: ClassVar[Role] = "follower"
 
@@ -67,40 +67,40 @@ class JointTrajectorySpec(ControllerSpec):
         description="What it commands: [position], [position, velocity], [position, velocity, acceleration], "
         "[velocity], [effort] or [position, effort]. Default [effort].",
     )
-    command_interface: Interface | None = Field(None, description="Short for a list of one of them.")
+    command_interface: Interface | None = Field(None, description="Short for a list with one interface.")
     state_interfaces: tuple[str, ...] = Field(
         ("position", "velocity"),
-        description="What it may read: position, also velocity, also acceleration. Default [position, velocity].",
+        description="Measured values: position, also velocity, also acceleration. Default [position, velocity].",
     )
     gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
-    gravity_compensation: bool = Field(False, description="Add the effort that holds against gravity. Default false.")
+    gravity_compensation: bool = Field(False, description="Add the effort that compensates gravity. Default false.")
     inverse_dynamics: bool = Field(False, description="Add the effort that the reference needs. Default false.")
     constraints: ConstraintsSpec = Field(ConstraintsSpec(), description="Tolerances and goal time.")
-    allow_partial_joints_goal: bool = Field(False, description="Goals may leave joints out. Default false.")
+    allow_partial_joints_goal: bool = Field(False, description="Goals may omit joints. Default false.")
     allow_nonzero_velocity_at_trajectory_end: bool = Field(
-        False, description="Goals may end in motion; the last position is held then. Default false."
+        False, description="Goals may end in motion; the last position is then held. Default false."
     )
     allow_integration_in_goal_trajectories: bool = Field(
         False, description="Goals may give velocities or accelerations without positions. Default false."
     )
     allow_trajectory_replacement: bool = Field(
-        True, description="A new goal goes on from the old path; else the old one ends at once. Default true."
+        True, description="A new goal continues from the old trajectory; otherwise that ends at once. Default true."
     )
     interpolation_method: Literal["splines", "none"] = Field(
         "splines", description="Between points: `splines`, or `none` to step to the next point. Default splines."
     )
     interpolate_from_desired_state: bool = Field(
-        True, description="Goals start from the reference; else from what is measured. Default true."
+        True, description="Goals start from the reference; otherwise from the measured state. Default true."
     )
     cmd_timeout: Annotated[Time, Field(ge=0)] = Field(
-        0.0, description="After the end of a trajectory a goal that is not reached is given up; above goal_time, or 0: "
+        0.0, description="Time after the end of a trajectory to abort an unreached goal; above goal_time, or 0: "
         "never. Default 0."
     )  # fmt: skip
     stop_trajectory_duration: Annotated[Time, Field(ge=0)] = Field(
-        0.0, description="After a cancel stop in this time, instead of by deceleration. Default 0: not."
+        0.0, description="Duration of the stop after a cancel; 0: by deceleration. Default 0."
     )
-    speed_scaling: SpeedScalingSpec = Field(SpeedScalingSpec(), description="How fast trajectories run at first.")
-    positions_upsampling: UpsamplingSpec = Field(UpsamplingSpec(), description="For goals of positions alone.")
+    speed_scaling: SpeedScalingSpec = Field(SpeedScalingSpec(), description="Initial speed of trajectories.")
+    positions_upsampling: UpsamplingSpec = Field(UpsamplingSpec(), description="For goals with only positions.")
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
@@ -139,15 +139,15 @@ def build(name: str, spec: JointTrajectorySpec, context: BuildContext) -> JointT
 
 
 def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
-    """Interfaces that do not go together; gains and tolerances of joints that it does not have, gains all zero; an
-    effort added where none is commanded."""
+    """Incompatible interfaces; gains and tolerances of other joints, gains all zero; a feed-forward effort without an
+    effort command."""
     yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
     yield from strangers(
         robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
     )
     key = "command_interfaces" if spec.command_interfaces else "command_interface"
     if spec.command_interface is not None and spec.command_interfaces:
-        yield Problem((key,), "command_interface and command_interfaces say the same", "keep the list", "CTRL107")
+        yield Problem((key,), "command_interface and command_interfaces are both set", "keep the list", "CTRL107")
     wrong = refused(spec.interfaces, spec.state_interfaces)
     if wrong is not None:
         where = key if wrong[0].startswith(("command", "unknown command")) else "state_interfaces"
@@ -158,8 +158,8 @@ def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
     if "effort" not in spec.interfaces:
         for word in ("gravity_compensation", "inverse_dynamics"):
             if getattr(spec, word):
-                message = f"{word} adds an effort, but its interface is {', '.join(spec.interfaces)}"
-                yield Problem((word,), message, "use command_interface: effort, or leave it out", "CTRL147")
+                message = f"{word} needs the effort interface, not {', '.join(spec.interfaces)}"
+                yield Problem((word,), message, f"use command_interface: effort, or remove {word}", "CTRL147")
 
 
 def loop(spec: JointTrajectorySpec) -> ControlLoop:

@@ -1,4 +1,4 @@
-"""Leads each joint to a reference with a PID of its own.
+"""`pid`: controller with one PID per joint.
 
     controllers:
       wrist_controller:
@@ -8,13 +8,13 @@
         reference_and_state_interfaces: [position, velocity]
         gains: {joint_6: {p: 80, i: 20, d: 3, i_clamp: 5}, joint_7: {p: 30, d: 0.4, feedforward_gain: 0.1}}
 
-Steps cannot use it; a program in Python does:
+Steps cannot use it; it is for Python programs:
 
     manager["wrist_controller"].set_reference([0.3, -0.2])
 
-u = ff r + PID(r - x, d/dt). With one interface, r is the reference of it, and the PID takes the derivative of the error
-itself: (e - last e) / period, the first one from 0. With two, the PID is given the error of the second, and ff goes
-with the second reference: u = ff r' + PID(r - x, r' - x').
+u = ff r + PID(r - x, d/dt). With one interface, r is its reference, and the PID computes the derivative of the error:
+(e - last e) / period, from 0 at first. With two, the error of the second interface is the derivative, and ff applies to
+the second reference: u = ff r' + PID(r - x, r' - x').
 """
 
 from __future__ import annotations
@@ -52,30 +52,34 @@ class PidGainsSpec(GainsSpec):
     """PID gains of one joint of a `pid` controller."""
 
     feedforward_gain: float = Field(
-        0.0, description="Factor on the reference (on its derivative, where there are two), added. Default 0."
+        0.0, description="Factor of the added reference (of its derivative, with two interfaces). Default 0."
     )
     angle_wraparound: bool | None = Field(
-        None, description="The error of a position is the shortest angle. Default: where the joint is continuous."
+        None, description="The position error is the shortest angle. Default: for continuous joints."
     )
     save_i_term: bool = Field(True, description="Keep the integral term while it is not active. Default true.")
 
 
 class PidSpec(ControllerSpec):
-    """Leads each joint to a reference with a PID of its own; `set_reference` says which."""
+    """Controls each joint with its own PID; `set_reference` sets the references."""
 
     type: Literal["pid"] = Field(description="`pid`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
     command_interface: Literal["velocity", "effort"] = Field("effort", description="What it commands. Default effort.")
     reference_and_state_interfaces: Annotated[
         tuple[Literal["position", "velocity"], ...],
-        Field(min_length=1, max_length=2, description="What is led: [position], [position, velocity], or [velocity]."),
+        Field(
+            min_length=1,
+            max_length=2,
+            description="Controlled values: [position], [position, velocity], or [velocity].",
+        ),
     ] = ("position",)
     gains: dict[str, PidGainsSpec] = Field(description="PID gains by joint.")
     gravity_compensation: bool = Field(
-        False, description="Add the effort that holds against gravity, to efforts. Default false."
+        False, description="Add the effort that compensates gravity, to efforts. Default false."
     )
     set_current_state_as_first_setpoint: bool = Field(
-        True, description="Hold what is measured until a reference is set; otherwise command 0. Default true."
+        True, description="Hold the measured state until a reference is set; otherwise command 0. Default true."
     )
 
     @property
@@ -91,15 +95,15 @@ class PidController:
         name: of the controller.
         joints: (n) distinct names.
         gains: by joint name, a `PidGainsSpec` or its fields.
-        interface: what the command is.
-        led: what the reference is of: position, position and velocity, or velocity.
-        types: (n) joint types: the position error of a `continuous` joint is the shortest angle, unless its gains say.
-        hold_first: hold what is measured at activation until a reference is set; otherwise command 0 until then.
-        feed_forward: what shall be added to efforts.
+        interface: of the command.
+        led: controlled values: position, position and velocity, or velocity.
+        types: (n) joint types: the position error of a `continuous` joint is the shortest angle by default.
+        hold_first: hold the state at activation until a reference is set; otherwise command 0 until then.
+        feed_forward: added to efforts.
         compat: order of the PID integration.
 
     Raises:
-        InvalidArgument: no or repeated joints, gains that are missing, wrong, all zero or of other joints, other `led`.
+        InvalidArgument: no or duplicate joints; gains that are missing, invalid, zero or of other joints; other `led`.
     """
 
     role: Role = "other"
@@ -125,12 +129,12 @@ class PidController:
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
         if tuple(led) not in (("position",), ("position", "velocity"), ("velocity",)):
-            raise InvalidArgument("CTRL182", f"controller '{name}': {list(led)} cannot be led together")
+            raise InvalidArgument("CTRL182", f"controller '{name}': {list(led)} cannot be controlled together")
         for joint in {*gains} ^ {*self.joints}:
-            kind = "is not one of its joints" if joint in gains else "has no gains"
+            kind = "has gains, but is not a joint of the controller" if joint in gains else "has no gains"
             raise InvalidArgument("CTRL102", f"controller '{name}': '{joint}' {kind}")
         own = tuple(gains_of(name, joint, gains[joint], PidGainsSpec) for joint in self.joints)
-        # What is fed forward makes a joint move, too.
+        # Feed-forward alone makes a joint move, too.
         counted = tuple(g.model_copy(update={"ff_velocity_scale": g.feedforward_gain}) for g in own)
         self._pid = build_pid(name, self.joints, counted, compat)
         self._forward = np.array([g.feedforward_gain for g in own])
@@ -152,33 +156,33 @@ class PidController:
         self._error, self._error_rate = self._errors
         self._all_errors = self._errors.reshape(-1)
         self._fed, self._before = np.zeros((2, n))
-        # ROS 1 knows no derivative before there is a second error.
+        # ROS 1 has no derivative before the second error.
         self._first_rate = compat != "ros1"
         self._has_before = False
         self._reference, self._rate = np.zeros((2, n))
-        self._told = self._activated = False
+        self._has_reference = self._activated = False
 
     def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
-        """What the joints shall have from the next update on, until it is deactivated.
+        """Set the reference from the next update on, until deactivation.
 
         Args:
-            values: (n) rad or m; of velocities, rad/s or m/s.
-            rates: (n) rad/s or m/s, only with positions and velocities; 0 by default.
+            values: (n) rad or m; for velocities, rad/s or m/s.
+            rates: (n) rad/s or m/s, only with both positions and velocities; 0 by default.
 
         Raises:
-            InvalidArgument: not as many finite numbers as joints, or rates that are not led.
+            InvalidArgument: not one finite number per joint, or rates without the velocity interface.
         """
         if rates is not None and not self._given_rates:
-            message = f"controller '{self.name}' does not lead a second interface"
-            raise InvalidArgument("CTRL182", message, hint="reference_and_state_interfaces: [position, velocity]")
+            message = f"controller '{self.name}' does not control a second interface"
+            raise InvalidArgument("CTRL182", message, hint="set reference_and_state_interfaces: [position, velocity]")
         reference = finite_values(self.name, self.joints, values)
         self._rate = np.zeros(len(self.joints)) if rates is None else finite_values(self.name, self.joints, rates)
         self._reference = reference
-        self._told = True
+        self._has_reference = True
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
-        """Forgets its reference, and the integral unless that is saved."""
-        self._told = self._activated = False
+        """Clear its reference, and the integral unless that is saved."""
+        self._has_reference = self._activated = False
 
     def update(
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
@@ -191,10 +195,10 @@ class PidController:
             self._pid.reset(keep_integral=bool(self._saves.all()))
             self._before[:] = 0.0
             self._has_before = self._first_rate
-            if not self._told and self._hold_first:
-                self._told = True
+            if not self._has_reference and self._hold_first:
+                self._has_reference = True
                 self._reference, self._rate = np.array(state), np.zeros(len(self.joints))
-        if not self._told:
+        if not self._has_reference:
             output.rows[:] = 0.0
             output.position[:] = measured.position
             return output
@@ -241,7 +245,7 @@ def build(name: str, spec: PidSpec, context: BuildContext) -> PidController:
 
 
 def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
-    """Gains of joints that it does not have, that are missing or all zero; interfaces that cannot be led together."""
+    """Gains of other joints, missing gains, gains all zero; interfaces that cannot be controlled together."""
     yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
     for joint in own_joints(robot, spec.joints):
         own = spec.gains.get(joint)
@@ -250,21 +254,28 @@ def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
             loc = ("gains",) if own is None else ("gains", joint)
             yield Problem(loc, f"joint '{joint}' {what}; it would not move", f"give gains.{joint}.p", "CTRL103")
         elif own.ff_velocity_scale:
-            message, hint = "ff_velocity_scale counts for nothing in a `pid` controller", "say feedforward_gain"
+            message, hint = "ff_velocity_scale has no effect in a `pid` controller", "use feedforward_gain"
             yield Problem(("gains", joint, "ff_velocity_scale"), message, hint, "CTRL182")
     if len({gains.save_i_term for gains in spec.gains.values()}) > 1:
-        yield Problem(("gains",), "save_i_term differs between its joints", "use a controller for each", "CTRL182")
+        yield Problem(
+            ("gains",), "save_i_term differs between its joints", "use one controller for each value", "CTRL182"
+        )
     if spec.reference_and_state_interfaces not in (("position",), ("position", "velocity"), ("velocity",)):
-        message = f"{list(spec.reference_and_state_interfaces)} cannot be led together"
-        hint = "[position], [position, velocity] or [velocity]"
+        message = f"{list(spec.reference_and_state_interfaces)} cannot be controlled together"
+        hint = "use [position], [position, velocity] or [velocity]"
         yield Problem(("reference_and_state_interfaces",), message, hint, "CTRL182")
     if spec.gravity_compensation and spec.command_interface != "effort":
-        message = f"gravity_compensation adds an effort, but its interface is {spec.command_interface}"
-        yield Problem(("gravity_compensation",), message, "use command_interface: effort, or leave it out", "CTRL147")
+        message = f"gravity_compensation needs the effort interface, not {spec.command_interface}"
+        yield Problem(
+            ("gravity_compensation",),
+            message,
+            "use command_interface: effort, or remove gravity_compensation",
+            "CTRL147",
+        )
 
 
 def loop(spec: PidSpec) -> ControlLoop:
-    """A PID loop where the velocity is led, too; else de/dt is a difference of errors, which is another law."""
+    """A PID loop if the velocity is controlled, too; otherwise de/dt is a difference of errors, another law."""
     if spec.reference_and_state_interfaces != ("position", "velocity"):
         return NoLoop("its de/dt is a difference of errors, for which no gains are proposed")
     return PidLoop(spec.gains, spec.gravity_compensation, tunable=False)

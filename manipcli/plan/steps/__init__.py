@@ -1,4 +1,4 @@
-"""The verbs of a task."""
+"""Registry of the steps of a task."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""`follow`: a JointTrajectory, written as ROS writes it.
+"""`follow`: follow a JointTrajectory in the form of a ROS message.
 
 - follow:
     joint_names: [joint_1, joint_2]
@@ -32,11 +32,11 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointAcceleration, JointValue, JointVelocity, Time
 
 HERE = 1e-3
-"""A first point at 0 s nearer than this [rad or m] to where the robot is counts as there: messages are rounded."""
+"""[rad or m] A first point at 0 s that is nearer to the robot's position counts as equal: messages are rounded."""
 
 
 class DurationSpec(Model):
-    """A duration in ROS 1's (`secs`, `nsecs`) or ROS 2's words (`sec`, `nanosec`)."""
+    """A duration with the fields of ROS 1 (`secs`, `nsecs`) or ROS 2 (`sec`, `nanosec`)."""
 
     secs: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 1.")] = 0
     nsecs: Annotated[int, Field(ge=0, lt=1_000_000_000, description="Nanoseconds beside them, in ROS 1.")] = 0
@@ -48,7 +48,7 @@ class DurationSpec(Model):
         first, second = self.model_fields_set & {"secs", "nsecs"}, self.model_fields_set & {"sec", "nanosec"}
         if any(getattr(self, word) for word in first) and any(getattr(self, word) for word in second):
             word = min(second)
-            message = f"'{min(first)}' is a word of ROS 1, '{word}' one of ROS 2: say the time in one of them"
+            message = f"'{min(first)}' is a field of ROS 1, '{word}' a field of ROS 2; use those of one of them"
             raise problem("conflict", message, at=(word,), key=True)
         return self
 
@@ -58,13 +58,15 @@ class DurationSpec(Model):
 
 
 class PointSpec(Model):
-    """One point; the curve between two is linear, cubic or quintic by what both give."""
+    """One point; the curve between two points is linear, cubic or quintic, by what both give."""
 
     positions: tuple[JointValue, ...] = Field(description="One for each joint, in the order of `joint_names`.")
     velocities: tuple[JointVelocity, ...] = Field((), description="One for each joint, or none.")
     accelerations: tuple[JointAcceleration, ...] = Field((), description="One for each joint, or none.")
-    effort: tuple[()] = Field((), description="Stays empty.")
-    time_from_start: Time | DurationSpec = Field(description="From the start of the trajectory, later than the last.")
+    effort: tuple[()] = Field((), description="Must be empty.")
+    time_from_start: Time | DurationSpec = Field(
+        description="From the start of the trajectory, later than the point before."
+    )
 
     @property
     def seconds(self) -> float:
@@ -74,12 +76,12 @@ class PointSpec(Model):
 
 
 class FollowSpec(Model):
-    """The joints follow a trajectory_msgs/JointTrajectory, written as ROS writes it.
+    """Follow a trajectory_msgs/JointTrajectory, in the form of the ROS message.
 
-    Between two points the curve is linear, cubic or quintic by what both give; the first is led to from where the robot
-    is, at rest, by continuous joints the short way round. Position and velocity limits hold for every curve; a linear
-    one has infinite acceleration at its points and a cubic one infinite jerk, so those limits are asked only of curves
-    that can keep them.
+    Between two points the curve is linear, cubic or quintic, by what both give. The robot moves to the first point from
+    its position, at rest; continuous joints take the shortest rotation. Position and velocity limits apply to every
+    curve. A linear curve has infinite acceleration at its points and a cubic one infinite jerk, so those limits apply
+    only to curves that can keep them.
     """
 
     header: dict[str, Any] = Field({}, description="Ignored, so that a message can be pasted.")
@@ -91,24 +93,24 @@ class FollowSpec(Model):
         n, before, last = len(self.joint_names), -1.0, len(self.points) - 1
         for k, name in enumerate(self.joint_names):
             if name in self.joint_names[:k]:
-                raise problem("duplicate", f"joint '{name}' stands twice", at=("joint_names", k))
+                raise problem("duplicate", f"duplicate joint '{name}'", at=("joint_names", k))
         for k, point in enumerate(self.points):
             for word in ("positions", "velocities", "accelerations"):
                 values = getattr(point, word)
                 if len(values) != n and (values or word == "positions"):
                     raise problem("count", f"{len(values)} {word} for {n} joints", at=("points", k, word))
             if point.accelerations and not point.velocities:
-                message = "accelerations without velocities say no curve; add velocities"
+                message = "accelerations need velocities; add velocities"
                 raise problem("conflict", message, at=("points", k, "accelerations"))
             at = ("points", k, "time_from_start")
             if point.seconds < 0.0:
                 raise problem("range", f"must be 0 or more, not {point.seconds:g} s", at=at)
             if point.seconds <= before:
-                message = f"{point.seconds:g} s is not after {before:g} s, that of the point before"
+                message = f"{point.seconds:g} s is not after {before:g} s, the time of the previous point"
                 raise problem("conflict", message, at=at)
             before = point.seconds
         if before <= 0.0:
-            message = "the last point is at 0 s: there is no time to move in"
+            message = "the last point is at 0 s: the trajectory has no duration"
             raise problem("conflict", message, at=("points", last, "time_from_start"))
         for k, v in enumerate(self.points[-1].velocities):
             if v != 0.0:
@@ -118,11 +120,11 @@ class FollowSpec(Model):
 
 
 def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """The points as they are, from the state on; those of continuous joints by whole turns nearer to it.
+    """The points as given, from the state on; those of continuous joints shifted by whole turns to be near it.
 
     Raises:
-        NotPlannable: a limit is left (names joint, value, limit and time), something is in the way, or a first point at
-            0 s is not where the robot is.
+        NotPlannable: a limit is exceeded (names joint, value, limit and time), a body is in the way, or a first point
+            at 0 s is not the robot's position.
     """
     names = spec.joint_names
     start = state.position[planner.robot.indices(names)]
@@ -141,9 +143,10 @@ def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
         off = np.abs(first - start)
         worst = int(np.argmax(off))
         if off[worst] > HERE:
+            unit = planner.robot.joint(names[worst]).unit
             raise NotPlannable(
-                f"the first point, at 0 s, has joint '{names[worst]}' at {first[worst]:.4f}; "
-                f"it is at {start[worst]:.4f} then",
+                f"the first point, at 0 s, has joint '{names[worst]}' at {first[worst]:.4f} {unit}, "
+                f"but the joint is at {start[worst]:.4f} {unit}",
                 hint="give the point a later time_from_start, or `move` there first",
             )
         points[0] = replace(points[0], positions=start)
@@ -154,7 +157,7 @@ def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
 
 
 def _limits(robot: RobotModel, trajectory: JointTrajectory) -> MotionLimits:
-    """What every curve between two points can keep; infinite where one cannot."""
+    """The limits that every curve between two points can keep; infinite where a curve cannot."""
     orders = trajectory.orders
     lowest = trajectory.order if orders is None else int(np.minimum(orders[:-1], orders[1:]).min())
     limits = MotionLimits.of(robot, trajectory.names)
@@ -172,7 +175,7 @@ def check(spec: FollowSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, .
 
 
 def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """Joints of two controllers, or of the hand."""
+    """Joints of two controllers, or joints of the hand."""
     return unfollowed(claims, spec.joint_names, ("joint_names",))
 
 

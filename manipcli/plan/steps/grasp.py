@@ -25,21 +25,21 @@ DEFAULT_FORCE = 8.0
 
 
 class GraspSpec(Model):
-    """The hand closes until each finger meets `force`; what it holds, it holds by friction alone.
+    """Close the hand until each finger meets `force`; the object is held by friction alone.
 
-    It stays closed, also where it met nothing, until `release` or `place` opens it.
+    The hand stays closed, even if it met nothing, until `release` or `place` opens it.
     """
 
-    object: str | None = Field(None, description="What is grasped; carried from then on. Default: not said.")
+    object: str | None = Field(None, description="The object to grasp, carried from then on. Default: unknown.")
     posture: str = Field("closed", description="The named pose that the hand closes towards.")
     force: Force = Field(
         DEFAULT_FORCE,
         gt=0,
-        description="Contact force at which a finger stops [N]; commanded by position it presses with its effort limit "
-        "all the same.",
+        description="Contact force at which a finger stops [N]; a position-controlled finger presses with its effort "
+        "limit regardless.",
     )
     until: Literal["contact", "posture"] = Field(
-        "contact", description="`contact`: fails if no finger touches; `posture`: reaching the posture is fine, too."
+        "contact", description="`contact`: fails if no finger touches; `posture`: reaching the posture succeeds, too."
     )
 
 
@@ -47,7 +47,7 @@ def plan(spec: GraspSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion of the hand.
 
     Raises:
-        NotPlannable: the hand holds something already, or would not touch the object.
+        NotPlannable: the hand already holds something, or does not touch the object.
     """
     if spec.object is not None:
         planner.free_hand(state, spec.object)
@@ -63,7 +63,7 @@ def check(spec: GraspSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
 
 
 def uncommanded(spec: GraspSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """A hand, or the tool that it is to hold with, that nothing moves."""
+    """A hand or, with an object, a tool without a controller."""
     tool = () if spec.object is None else unmoved_tool(claims, robot, ("object",))
     return tool + unmoved_hand(claims, robot, spec.posture, ("posture",))
 

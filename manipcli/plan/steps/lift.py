@@ -23,15 +23,15 @@ from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
-_LESS = "lift it less, `by: ...`; or take it in another way: `approach: {yaw: ...}` of its `pick`"
+_LESS = "lift it less, `by: ...`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
 
 
 class LiftSpec(Model):
-    """Raise what is held straight up, by a height in a range of which the middle is tried first."""
+    """Raise a held object straight up, by a height in a range whose middle is tried first."""
 
     renamed: ClassVar = RENAMED
 
-    object: str = Field(description="What is held and lifted.")
+    object: str = Field(description="The held object to lift.")
     by: Annotated[Range, Field(description="Height [m].")] = (0.08, 0.2)
     velocity_scaling: VelocityScaling = 0.5
 
@@ -50,7 +50,7 @@ def plan(spec: LiftSpec, planner: Planner, state: PlanningState) -> StepPlan:
             raise NotPlannable(refusal.cause, hint=_LESS if refusal.reason == "line" else refusal.hint) from refusal
         return builder.plan()
 
-    return first_feasible(attempt, spread(spec.by), what=f"no height to lift '{spec.object}' by")
+    return first_feasible(attempt, spread(spec.by), what=f"cannot lift '{spec.object}'")
 
 
 def check(spec: LiftSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
@@ -59,7 +59,7 @@ def check(spec: LiftSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
 
 
 def uncommanded(spec: LiftSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """A tool that nothing moves."""
+    """A tool without a controller."""
     return unmoved_tool(claims, robot, ("object",))
 
 

@@ -1,4 +1,4 @@
-"""`move`: the robot to a named pose, to joint positions, or the tool to a pose in a frame.
+"""`move`: move the robot to a named pose or joint positions, or the tool to a pose or a point in a frame.
 
 - move: {to: home}
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, velocity_scaling: 0.5}
@@ -42,22 +42,22 @@ RENAMED = {"speed": "velocity_scaling"}
 
 
 class MoveSpec(Model):
-    """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` or a `point` in a `frame`.
+    """Move the robot to a named pose or joint positions (`to`), or its tool to a `pose` or a `point` in a `frame`.
 
-    At a `point` the tool may be turned in any way; with `pointing`, about its z axis alone. That suits arms of fewer
-    than six joints, which can take few poses. Three joints take the tool to a point; to point there, too, it takes five
-    of which none only turns the tool about its z axis.
+    At a `point` the orientation of the tool is free; with `pointing`, only its rotation about the z axis is. Use this
+    for arms with fewer than six joints, which reach few poses. Three joints suffice for a point; `pointing` needs five,
+    none of which may only rotate the tool about its z axis.
 
-    After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it:
-    of a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
+    After `pick` or `grasp` the hand stays closed, even if it met nothing, until `release` or `place` opens it. Until
+    then a named pose moves only the joints of the arm, and explicit positions for joints of the hand are refused.
 
-    What `touch` names is no obstacle to the hand: it is pushed, or pressed on. Name it in the move that leaves it, too.
-    The plan takes it to slide with the tool; where it does not, later steps are planned again.
+    Bodies under `touch` are not obstacles to the hand: it pushes them or presses on them. Name them in the move that
+    leaves them, too. The plan assumes that they slide with the tool; if one does not, later steps are re-planned.
 
-    A `guarded` move is planned to its end and stops on its way there, slowing down within its limits, where the step's
-    `until` comes to hold; later steps are planned again from the position that it is commanded to hold then, a little
-    inside of what it presses on. Until it runs it is taken to stop where it meets what it may `touch`. At its end it
-    waits for `until` as other steps do.
+    A `guarded` move is planned to its end and stops, slowing down within its limits, as soon as the step's `until`
+    holds. Later steps are re-planned from the position that is then held, a little inside of what the tool presses on.
+    The plan assumes that the move stops where it meets a body under `touch`. At its end it waits for `until` as other
+    steps do.
     """
 
     renamed: ClassVar = RENAMED
@@ -65,16 +65,17 @@ class MoveSpec(Model):
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
     pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")
     point: Vector3 | None = Field(
-        None, description="Where the tool's origin goes, in `frame` [m]; its turn is left open."
+        None, description="Where the tool's origin goes, in `frame` [m]; its orientation is left open."
     )
     pointing: tuple[float, float, float] | None = Field(
-        None, description="With `point`: a direction in `frame`, in which the tool's z axis points then. Default: any."
+        None, description="With `point`: the direction of the tool's z axis, in `frame`. Default: any."
     )
     frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
     path: Literal["free", "joint", "linear"] = Field(
         "free",
         description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
-        "posture. `free`: the same, to another posture where the way to the nearest one is not free. Default `free`.",
+        "configuration. `free`: the same, or to another configuration if the path to the nearest one is not free. "
+        "Default `free`.",
     )
     velocity_scaling: VelocityScaling = 1.0
     touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
@@ -86,32 +87,34 @@ class MoveSpec(Model):
         by_name = to.items() if isinstance(to, Mapping) else [("", to)]
         listed = next((name for name, value in by_name if isinstance(value, list | tuple)), None)
         if listed is not None:
-            hint = "name each of them: {joint: 30 deg}; what a group has in a list is a pose of the robot file"
-            message = "positions go by joint, not as a list"
+            hint = "name each joint: {joint: 30 deg}; a list for a group is a pose in the robot file"
+            message = "joint positions are a mapping by joint, not a list"
             raise problem("type", message, at=(listed,) if listed else (), hint=hint)
         return to
 
     @model_validator(mode="after")
     def _one_target(self) -> MoveSpec:
         if [self.to, self.pose, self.point].count(None) != 2:
-            raise ValueError("say one of `to` (a named pose or joints), `pose` and `point` (of the tool)")
+            raise ValueError("needs exactly one of `to` (a named pose or joints), `pose` and `point` (of the tool)")
         if self.to is not None and self.path == "linear":
             raise ValueError("`path: linear` needs a tool `pose` or `point`, not `to`")
         if self.to is not None and self.frame != "world":
-            message = "a named pose and joint positions have no frame; it is that of a tool `pose` or `point`"
-            raise problem("conflict", message, at=("frame",), hint="leave it out", key=True)
+            message = "`frame` applies to a tool `pose` or `point`, not to a named pose or joint positions"
+            raise problem("conflict", message, at=("frame",), hint="remove `frame`", key=True)
         if self.pointing is not None and self.point is None:
-            message = "`pointing` needs a `point`; a `pose` says the whole orientation"
-            raise problem("conflict", message, at=("pointing",), hint="leave it out", key=True)
+            message = "`pointing` needs a `point`; a `pose` already sets the whole orientation"
+            raise problem("conflict", message, at=("pointing",), hint="remove `pointing`", key=True)
         if self.pointing is not None and not any(self.pointing):
-            raise problem("conflict", "a direction is not zero", at=("pointing",), hint="straight down: [0, 0, -1]")
+            raise problem(
+                "conflict", "the direction has length 0", at=("pointing",), hint="straight down is [0, 0, -1]"
+            )
         if self.to == {}:
-            raise ValueError("`to` names no joint")
+            raise ValueError("`to` has no joint")
         return self
 
 
 def plan(spec: MoveSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """One motion; a named pose that includes the hand moves the hand at the same time, unless it was closed."""
+    """One motion; a named pose with joints of the hand moves the hand at the same time, unless it is closed."""
     allowed = planner.may_touch(state, spec.touch) if spec.touch else NOTHING
     builder = MotionBuilder(planner, state, verb="move", allowed=allowed)
     if isinstance(spec.to, str):
@@ -141,21 +144,21 @@ def plan(spec: MoveSpec, planner: Planner, state: PlanningState) -> StepPlan:
 
 
 def _goal(spec: MoveSpec, planner: Planner, state: PlanningState) -> tuple[Transform, Open]:
-    """X_WT, and what of its orientation does not count: there it is as now, or the nearest that points as asked."""
+    """X_WT, and the open part of its orientation, which is as now, or the nearest that points as requested."""
     X_WF = planner.frame(spec.frame, state)
     if spec.pose is not None:
         return X_WF @ spec.pose.transform, "nothing"
     R = planner.tool_pose(state).R
     p = X_WF.apply(spec.point or ())
     if spec.pointing is None:
-        return Transform.of(xyz=p, R=R), "turn"
+        return Transform.of(xyz=p, R=R), "rotation"
     z = X_WF.R @ np.array(spec.pointing)
     return Transform.of(xyz=p, R=pointed(R, z / np.linalg.norm(z))), "spin"
 
 
 def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown poses, joints, frames and bodies."""
-    found = tuple(one for k, name in enumerate(spec.touch) for one in unknown_body(scene, name, ("touch", k)))
+    found = tuple(unknown for k, name in enumerate(spec.touch) for unknown in unknown_body(scene, name, ("touch", k)))
     if isinstance(spec.to, str):
         return found + unknown_pose(robot, spec.to, ("to",))
     if spec.to is not None:
@@ -164,7 +167,7 @@ def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
 
 
 def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """Joints of two controllers; a tool that nothing moves."""
+    """Joints of two controllers; a tool without a controller."""
     if isinstance(spec.to, str):
         return unmoved_joints(claims, robot.pose(spec.to).joints, ("to",))
     if spec.to is not None:

@@ -33,26 +33,26 @@ from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 
 YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
-"""Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
+"""Candidate rotations of the approach about the vertical, relative to the straight line from robot to object."""
 UPRIGHT = 0.99
-"""Cosine of the angle between two axes that count as one: what stands, what points straight down."""
+"""Cosine above which two axes count as parallel: upright objects, tools that point straight down."""
 ALIKE = 0.5
-"""Cosine of the angle between the ways in which two hands point that can be told to be turned by less or more."""
+"""Cosine above which two tool directions are similar enough to compare their rotation about them."""
 SLOPES_DEG = (0.0, 30.0, 60.0)
-"""Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
+"""Candidate slopes of the straight approach: along the hand's axis, or from above it, which folds the arm less."""
 OTHER = math.radians(40.0)
-"""Grasps whose tools are turned by less to each other count as one: where one leads nowhere, the other hardly does."""
+"""[rad] Grasps that differ by less count as the same: where one of them fails, the other is likely to fail."""
 HIGHER = (2 / 3, 5 / 6)
-"""Shares of an object's height at which the tool takes it from above, where its middle cannot be: the palm touches."""
+"""Shares of an object's height at which it is grasped from above if its middle is out of reach: the palm touches."""
 
 _OTHERWISE = (
-    "say from where and how high it is taken, or how far the hand opens: "
+    "change the approach, the height of the grasp or the opening of the hand: "
     "`approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`, `open: ...`"
 )
-_HIGHER = "take the object where the closing fingers have room, as higher: `grasp: {height: ...}`"
+_HIGHER = "grasp the object where the closing fingers have room, for example higher: `grasp: {height: ...}`"
 _AIM = (
-    "the tool's +z has to point to the object, and the arm cannot turn it so: "
-    "see `tool: {link: ..., pose: {rpy: ...}}` in the robot file"
+    "check `tool: {link: ..., pose: {rpy: ...}}` in the robot file: the tool's +z must point to the object, "
+    "and the arm cannot reach that orientation"
 )
 
 
@@ -65,59 +65,60 @@ class ApproachSpec(Model):
     from_: Direction | None = Field(
         None,
         alias="from",
-        description="`side`: horizontally, `top`: from straight above. Default: from the side where that can be, else "
-        "from the top; with `yaw`: from the side.",
+        description="`side`: horizontally, `top`: from straight above. Default: from the side if possible, else from "
+        "the top; with `yaw`: from the side.",
     )
     yaw: Turn | None = Field(
         None,
-        description="Direction of the approach about the vertical [rad]; from the top: the turn of the hand. Default: "
-        "away from the robot's base; from the top: as the object is turned, by quarter turns.",
+        description="Direction of the approach about the vertical [rad]; from the top: the yaw of the hand. Default: "
+        "away from the robot's base; from the top: the yaw of the object, plus quarter turns.",
     )
     distance: Annotated[Range, Field(description="Length of the straight approach [m].")] = (0.08, 0.14)
 
     @property
     def direction(self) -> Direction | None:
-        """From where the hand comes; None where that is open."""
+        """From where the hand comes; None if not set."""
         return "side" if self.from_ is None and self.yaw is not None else self.from_
 
 
 class PickGraspSpec(GraspSpec):
-    """The grasp of a pick: its object is the pick's own."""
+    """The grasp of a pick; the object is that of the pick."""
 
-    object: None = Field(None, description="Nothing: the pick says it.")
+    object: None = Field(None, description="Not allowed: the pick has the object.")
     height: Length | None = Field(
         None,
-        description="Of the tool above the object's bottom [m]. Default: its middle; from the top higher, where that "
-        "cannot be.",
+        description="Of the tool above the object's bottom [m]. Default: its middle; from the top higher, if that is "
+        "out of reach.",
     )
 
 
 class PickSpec(Model):
     """Open the hand, reach an object, approach it straight, and close the hand on it.
 
-    The tool's +z is the direction of approach, its y the direction in which the fingers close. Where a later step
-    cannot be planned with the object as it is held then, it is taken in another way, as far as `approach` leaves it
-    open: from the other side, with the hand turned over, from above.
+    The tool's +z is the direction of approach, its y the direction in which the fingers close. If a later step cannot
+    be planned with this grasp, other grasps are tried, as far as `approach` leaves them open: from the other side, with
+    the hand rotated by half a turn, from above.
     """
 
     renamed: ClassVar = RENAMED
 
-    object: str = Field(description="What to take.")
+    object: str = Field(description="The object to pick.")
     approach: ApproachSpec = Field(ApproachSpec(), description="From where the hand comes.")
     grasp: PickGraspSpec = Field(PickGraspSpec(), description="How the hand closes.")
     open: str = Field("open", description="The pose of the hand while approaching.")
     velocity_scaling: VelocityScaling = Field(
         1.0,
-        description="Share of the velocity, acceleration and jerk limits in reaching; the straight approach: half.",
+        description="Share of the velocity, acceleration and jerk limits while reaching; the approach uses half of it.",
     )
 
 
 def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
-    """The first of the candidate directions, rolls, distances and slopes that is reachable and free; with the tool
-    turned clearly away from those of `grasps`, R_WT (3, 3) each.
+    """The plan of the first candidate direction, roll, distance and slope that is reachable and free.
+
+    Tool orientations near those of `grasps`, R_WT (3, 3) each, are skipped.
 
     Raises:
-        NotPlannable: the hand holds something already, or no candidate is possible.
+        NotPlannable: the hand already holds something, or no candidate is feasible.
     """
     planner.free_hand(state, spec.object)
     before = _clear(spec, planner, state)
@@ -127,10 +128,10 @@ def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequenc
     body = planner.scene.body(spec.object)
     bottom = body.centre[2] - body.size[2] / 2
     height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
-    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB, planner.tool_pose(state).R)
-    goals = [(height, R_WT) for R_WT in turns]
+    rotations = _orientations(spec.approach, X_WO, planner.robot.X_WB, planner.tool_pose(state).R)
+    goals = [(height, R_WT) for R_WT in rotations]
     if spec.grasp.height is None and body.kind != "sphere" and X_WO.R[2, 2] > UPRIGHT:
-        from_above = [R_WT for R_WT in turns if R_WT[2, 2] < -UPRIGHT]
+        from_above = [R_WT for R_WT in rotations if R_WT[2, 2] < -UPRIGHT]
         goals += [(bottom + share * body.size[2], R_WT) for share in HIGHER for R_WT in from_above]
     out_of_reach: dict[int, NotPlannable | None] = {}
 
@@ -142,14 +143,14 @@ def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequenc
         k, distance, slope = candidate
         X_WG = tool_at(k)
         builder = MotionBuilder(planner, state)
-        if k not in out_of_reach:  # said once for all distances and slopes, which it does not depend on
+        if k not in out_of_reach:  # checked once: it does not depend on distance and slope
             out_of_reach[k] = builder.unreachable("approach", X_WG, hand=spec.open)
         refusal = out_of_reach[k]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
             if refusal.reason == "orientation":
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
-                hint = "; or say ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
+                hint = "; or set ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise NotPlannable(refusal.cause, hint=hint)
         builder.reach("reach", backed_off(X_WG, distance, slope), speed=spec.velocity_scaling, hand=spec.open)
         builder.straight("approach", X_WG, speed=spec.velocity_scaling / 2)
@@ -165,23 +166,25 @@ def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequenc
 
     def candidates() -> Iterator[tuple[int, float, float]]:
         for k in range(len(goals)):
-            if k == len(turns) and all(one is not None and one.reason != "touches" for one in out_of_reach.values()):
-                return  # higher up it is no nearer
+            if k == len(rotations) and all(
+                why is not None and why.reason != "touches" for why in out_of_reach.values()
+            ):
+                return  # a higher grasp is not nearer
             if any(_same(goals[k][1], R_WT) for R_WT in grasps):
                 continue
             yield from itertools.product((k,), spread(spec.approach.distance), slopes())
 
     try:
-        return first_feasible(attempt, candidates(), what=f"no way to pick '{spec.object}'")
+        return first_feasible(attempt, candidates(), what=f"cannot pick '{spec.object}'")
     except NotPlannable as refusal:
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
-        wide = too_wide(planner, state, spec.object, spec.open, [tool_at(k) for k in range(len(turns))])
+        wide = too_wide(planner, state, spec.object, spec.open, [tool_at(k) for k in range(len(rotations))])
         hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
         raise NotPlannable(refusal.cause, hint="; or ".join(hints) or None) from refusal
 
 
 def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """Away from the object, if the hand is around it or at it, after a grasp that failed; else nothing."""
+    """Withdrawal from the object if the hand is around it or near it, after a failed grasp; else no motion."""
     if planner.distance(state, spec.object) >= CLEARANCE:
         return StepPlan((), state)
 
@@ -192,34 +195,32 @@ def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
         builder.withdraw(X_WT, spec.object, speed=spec.velocity_scaling / 2, grazing=True)
         return builder.plan()
 
-    ways = itertools.product(spread(spec.approach.distance), slopes())
-    return first_feasible(attempt, ways, what=f"no way back from '{spec.object}'")
+    candidates = itertools.product(spread(spec.approach.distance), slopes())
+    return first_feasible(attempt, candidates, what=f"cannot withdraw from '{spec.object}'")
 
 
 def backed_off(X_WG: Transform, distance: float, slope: float) -> Transform:
-    """The tool `distance` [m] back along its axis, and higher by the `slope` [rad] of that way."""
+    """The tool pose moved back by `distance` [m] along its axis, and up at the `slope` [rad] of that line."""
     up = Transform.of(xyz=(0.0, 0.0, distance * math.tan(slope)))
     return up @ X_WG @ Transform.of(xyz=(0.0, 0.0, -distance))
 
 
 def slopes() -> tuple[float, ...]:
-    """The slopes [rad] that are tried, the straight one first."""
+    """The candidate slopes [rad], the straight one first."""
     return tuple(math.radians(slope) for slope in SLOPES_DEG)
 
 
 def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform, R_WT: Array) -> list[Array]:
-    """Candidate R_WT (3, 3), the preferred first; each also with the hand turned over (half a turn about z).
+    """Candidate R_WT (3, 3), the preferred first; each also rotated by half a turn about z.
 
-    Of these two that one comes first which is nearer to what the hand has now, `R_WT`: it leaves more of the wrist's
-    turn to what comes after.
+    The one nearer to the present orientation `R_WT` comes first: it leaves more range of the wrist for later steps.
     """
     found = []
     if spec.direction != "top":
         away = X_WO.p - X_WB.p
         nominal = math.atan2(away[1], away[0]) if spec.yaw is None else spec.yaw
-        turns = YAWS_DEG if spec.yaw is None else (0.0,)
-        for turn in turns:
-            yaw = nominal + math.radians(turn)
+        for offset in YAWS_DEG if spec.yaw is None else (0.0,):
+            yaw = nominal + math.radians(offset)
             z = np.array([math.cos(yaw), math.sin(yaw), 0.0])
             x = np.array([0.0, 0.0, -1.0])
             found += _nearer_first(_frame(x, z), _frame(-x, z), R_WT)
@@ -227,23 +228,23 @@ def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform, R_WT: Ar
         nominal = float(X_WO.rpy[2]) if spec.yaw is None else spec.yaw
         z = np.array([0.0, 0.0, -1.0])
         both = []
-        for turn in (0.0, 90.0) if spec.yaw is None else (0.0,):
-            yaw = nominal + math.radians(turn)
+        for offset in (0.0, 90.0) if spec.yaw is None else (0.0,):
+            yaw = nominal + math.radians(offset)
             x = np.array([math.cos(yaw), math.sin(yaw), 0.0])
             both.append(_nearer_first(_frame(x, z), _frame(-x, z), R_WT))
         found += [pair[k] for k in (0, 1) for pair in both]
     return found
 
 
-def _nearer_first(one: Array, other: Array, R: Array) -> list[Array]:
-    """Both rotations (3, 3), the other first where `R` points about the same way and is clearly nearer to that."""
-    alike = one[:, 2] @ R[:, 2] > ALIKE
-    return [other, one] if alike and np.sum(other * R) > np.sum(one * R) + 1e-3 else [one, other]
+def _nearer_first(first: Array, second: Array, R: Array) -> list[Array]:
+    """Both rotations (3, 3), the second first if `R` has about the same z axis and is clearly nearer to the second."""
+    alike = first[:, 2] @ R[:, 2] > ALIKE
+    return [second, first] if alike and np.sum(second * R) > np.sum(first * R) + 1e-3 else [first, second]
 
 
-def _same(one: Array, other: Array) -> bool:
-    """Whether two rotations (3, 3) are nearer than `OTHER`: of R the trace is 1 + 2 cos(angle)."""
-    return float(np.sum(one * other)) > 1.0 + 2.0 * math.cos(OTHER)
+def _same(R_A: Array, R_B: Array) -> bool:
+    """Whether two rotations (3, 3) differ by less than `OTHER`; the trace of R_A^T R_B is 1 + 2 cos(angle)."""
+    return float(np.sum(R_A * R_B)) > 1.0 + 2.0 * math.cos(OTHER)
 
 
 def _frame(x: Array, z: Array) -> Array:
@@ -261,7 +262,7 @@ def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
 
 
 def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """A tool or a hand that nothing moves."""
+    """A tool or a hand without a controller."""
     return (
         unmoved_tool(claims, robot, ("object",))
         + unmoved_hand(claims, robot, spec.grasp.posture, ("grasp", "posture"))
@@ -269,4 +270,4 @@ def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     )
 
 
-MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check, uncommanded=uncommanded, regrasp=plan)
+MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check, uncommanded=uncommanded, alternative=plan)

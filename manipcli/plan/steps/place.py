@@ -36,57 +36,57 @@ from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 
 UPRIGHT = np.cos(np.radians(5.0))
-"""What stands straighter than this (cosine of its tilt) can be placed on."""
+"""Cosine of the tilt: a body that is more upright than this can be placed on."""
 TILTS = tuple(np.radians([0.0, 2.0, 4.0]))
-"""How far [rad] an object may tilt when it is let go."""
+"""Candidate tilts [rad] of the object when it is released."""
 ROUND = ("cup", "cylinder", "sphere")
-"""Bodies as wide along their diagonal as along their axes."""
+"""Bodies that are as wide along their diagonal as along their axes."""
 POINTING = 0.5
-"""A tool that points less than this (cosine) along the ground points up or down."""
+"""Cosine to the ground: a tool below this points up or down."""
 _OVER = (
-    "over what is in the way: `lift: {by: ...}` it higher, and lower it from higher, `clearance: ...`; "
-    "or `move` first to a pose from which the way is free"
+    "carry it over the obstacle: `lift: {by: ...}` higher, and lower it from higher, `clearance: ...`; "
+    "or first `move` to a pose from which the path is free"
 )
 _LOWER = (
-    "where the hand is in the way, take the object higher, `grasp: {height: ...}` of its `pick`; "
-    "else put it elsewhere, `at: [x, y]`, or turn it, `yaw: ...`"
+    "if the hand collides, grasp the object higher, `grasp: {height: ...}` of its `pick`; "
+    "else place it elsewhere, `at: [x, y]`, or rotate it, `yaw: ...`"
 )
-_WITHIN = "put it where the arm reaches, `at: [x, y]`; or take it in another way: `approach: {yaw: ...}` of its `pick`"
-_ROOMIER = "put it where the opening fingers have room, turn it: `yaw: ...`, or open the hand less: `posture: ...`"
+_WITHIN = "place it within reach, `at: [x, y]`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
+_ROOMIER = "place it where the opening fingers have room, rotate it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
 class PlaceSpec(Model):
-    """Set down what is held: carry it above its place, lower it straight, let go, and withdraw, rising.
+    """Set down a held object: carry it above its place, lower it straight, let go, and withdraw upwards.
 
-    At [x, y] it stands upright, also what was picked lying. It fails where the hand does not let go.
+    At [x, y] the object is placed upright, even if it was picked lying. The step fails if the hand does not let go.
     """
 
     renamed: ClassVar = {**RENAMED, "on": "onto"}
 
-    object: str = Field(description="What is held and put down.")
+    object: str = Field(description="The held object to set down.")
     at: Literal["start"] | tuple[Length, Length] = Field(
-        "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `onto`."
+        "start", description="`start`: its pose at the start; or [x, y] in the world, on the body `onto`."
     )
     onto: str | None = Field(
         None,
-        description="The body that takes the object at [x, y]: on its top, or inside a tray; in or on a URDF or a mesh "
-        "where it is met from above.",
+        description="The supporting body at [x, y]: on its top, or inside a tray; in or on a URDF or a mesh, at the "
+        "first contact from above.",
     )
-    yaw: Turn | None = Field(None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held.")
+    yaw: Turn | None = Field(None, description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held.")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
-    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
-    posture: str = Field("open", description="The pose to which the hand opens.")
+    retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
+    posture: str = Field("open", description="The named pose to which the hand opens.")
     velocity_scaling: VelocityScaling = Field(
-        0.5, description="Share of the velocity, acceleration and jerk limits in carrying; lowering takes half of it."
+        0.5, description="Share of the velocity, acceleration and jerk limits while carrying; lowering uses half of it."
     )
 
 
 def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`.
+    """The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
 
-    Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it; the
-    latter alone where the open hand is too near to it anyhow, as around one that sits deep in it. Where the arm would
-    come too near to something, the object is put down a little tilted, the arm higher: it stands up when let go.
+    Paths on which the hand withdraws clear of the object are tried first, then those on which it may graze it; only the
+    latter if the open hand is too near to it anyway, as around an object that sits deep in the hand. If the arm comes
+    too near to something, the object is set down a little tilted, with the arm higher: it rights itself when released.
     """
     planner.held(state, spec.object)
     planner.free_start(state)
@@ -95,7 +95,7 @@ def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
     lowered: dict[tuple[float, float], MotionBuilder | NotPlannable] = {}
 
     def lower(tilt: float, clearance: float) -> MotionBuilder:
-        """Down at the place; found once for all ways to withdraw."""
+        """Carry and lower to the place; planned once for all withdrawals."""
         X_WL = _tilted(planner.scene.body(spec.object), X_WG, X_OT, tilt)
         X_WT = X_WL @ X_OT
         builder = MotionBuilder(planner, state)
@@ -125,32 +125,31 @@ def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
     near = planner.distance(MotionBuilder(planner, state).let_go(spec.posture), spec.object) < CLEARANCE
-    ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
+    withdrawals = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
     tilts = TILTS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
-    candidates = itertools.product(tilts, (True,) if near else (False, True), *ways)
-    return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
+    candidates = itertools.product(tilts, (True,) if near else (False, True), *withdrawals)
+    return first_feasible(attempt, candidates, what=f"cannot place '{spec.object}'")
 
 
 @contextmanager
 def _hinted(hint: str) -> Iterator[None]:
-    """What is in the way inside is told with this hint; a line that cannot be followed as what it is of a `place`."""
+    """Gives refusals inside this hint for a collision, and a hint on reach for an unreachable line."""
     try:
         yield
     except NotPlannable as refusal:
-        told = {"in_the_way": hint, "line": _WITHIN}.get(refusal.reason or "", refusal.hint)
-        raise NotPlannable(refusal.cause, hint=told) from refusal
+        better = {"in_the_way": hint, "line": _WITHIN}.get(refusal.reason or "", refusal.hint)
+        raise NotPlannable(refusal.cause, hint=better) from refusal
 
 
 def _horizontal(X_WT: Transform) -> Array | None:
-    """(3,) the way the tool points, along the ground; None where it points up or down."""
+    """(3,) the horizontal direction in which the tool points; None if it points up or down."""
     x, y, _ = X_WT.R[:, 2]
     length = float(np.hypot(x, y))
     return np.array([x, y, 0.0]) / length if length > POINTING else None
 
 
 def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transform:
-    """X_WO of a body that stands at X_WG, tilted on its far edge by `tilt` [rad], so that the arm behind the tool is
-    higher."""
+    """X_WO of a body at X_WG, tilted on its far edge by `tilt` [rad], so that the arm behind the tool is higher."""
     h = _horizontal(X_WG @ X_OT)
     if h is None or tilt == 0.0:
         return X_WG
@@ -158,7 +157,7 @@ def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transf
     x, y, _ = np.abs(X_WG.R.T @ h)
     width, depth, _ = body.size
     edge = max(width, depth) / 2 if body.kind in ROUND else (x * width + y * depth) / 2
-    # z x h turns h downwards; the far edge stays on the ground.
+    # A rotation about z x h tilts h downwards; the far edge stays on the ground.
     R = matrix_from_axis_angle(np.cross([0.0, 0.0, 1.0], h), tilt)
     up = np.array([0.0, 0.0, edge * np.sin(tilt)])
     about = Transform.of(xyz=foot.p + up, R=R) @ Transform.of(xyz=-foot.p)
@@ -166,7 +165,7 @@ def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transf
 
 
 def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
-    """X_WG: where the object's frame is to stand."""
+    """X_WG: the goal pose of the object's frame."""
     body = planner.scene.body(spec.object)
     if spec.at == "start":
         return body.X_WO
@@ -174,14 +173,14 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     X_WU = planner.body_pose(state, spec.onto)
     under = planner.scene.body(spec.onto)
     if X_WU.R[2, 2] < UPRIGHT:
-        raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.onto}', which is tilted", loc=("onto",))
+        raise NotPlannable(f"'{spec.onto}' is tilted; '{spec.object}' cannot be placed on it", loc=("onto",))
     floor, size = _surface(under)
     x, y, _ = X_WU.inverse().apply([*spec.at, 0.0]) - under.centre
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
         raise NotPlannable(
-            f"[{spec.at[0]:g}, {spec.at[1]:g}] m lies beside '{spec.onto}', whose middle is at "
+            f"[{spec.at[0]:g}, {spec.at[1]:g}] m is outside '{spec.onto}', whose centre is at "
             f"[{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`at` is in the world; '{spec.onto}' offers {size[0]:g} m x {size[1]:g} m about its middle",
+            hint=f"`at` is in the world frame; '{spec.onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
             loc=("at",),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
@@ -193,7 +192,7 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     deeper = landing(body, X_WG, under, X_WU)
     if deeper is None:
         raise NotPlannable(
-            f"nothing of '{spec.onto}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
+            f"no part of '{spec.onto}' is below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
             hint=f"choose `at` over a part of '{spec.onto}'",
             loc=("at",),
         )
@@ -201,7 +200,7 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
 
 
 def _surface(under: Body) -> tuple[float, tuple[float, float]]:
-    """Height [m] above its O of what a body offers to stand on, and the size (x, y) [m] of that."""
+    """Height [m] of the supporting surface of a body above its O, and its size (x, y) [m]."""
     if under.interior is None:
         return float(under.centre[2] + under.size[2] / 2), (float(under.size[0]), float(under.size[1]))
     shape, middle = under.interior.shape, float(under.interior.X_OS.p[2])
@@ -219,10 +218,12 @@ def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
     elif spec.onto is not None:
         found += unknown_body(scene, spec.onto, ("onto",))
     elif spec.at != "start":
-        found += (Problem(loc=("at",), message="[x, y] needs the body it is on", hint="add `onto: BODY`"),)
+        found += (Problem(loc=("at",), message="`at: [x, y]` needs a supporting body", hint="add `onto: BODY`"),)
     if spec.at == "start":
         found += tuple(
-            Problem(loc=(word,), message=f"`{word}` goes with `at: [x, y]`", hint="`at: start` says it all")
+            Problem(
+                loc=(word,), message=f"`{word}` needs `at: [x, y]`", hint=f"remove `{word}`: `at: start` sets the pose"
+            )
             for word, value in (("onto", spec.onto), ("yaw", spec.yaw))
             if value is not None
         )
@@ -230,7 +231,7 @@ def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
 
 
 def uncommanded(spec: PlaceSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """A tool or a hand that nothing moves."""
+    """A tool or a hand without a controller."""
     return unmoved_tool(claims, robot, ("object",)) + unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 

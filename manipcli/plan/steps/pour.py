@@ -4,13 +4,13 @@
       until: {inside: {object: ball, of: tray}}
       timeout: 15 s
 
-Said by the objects' geometry: the lip (lowest point of the rim, when tilted) stands over the middle of the container.
-With c the middle of the rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup
-tips, all from O in the world, a turn R by theta about a puts the lip at
+The lip (the lowest point of the rim when tilted) is placed above the centre of the container. With c the centre of the
+rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup tips, all from O in the
+world, a rotation R by theta about a puts the lip at
 
     p_O + R (c + r w) = p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z
 
-where the latter holds for a rim at the height h above O.
+where the second form is for a rim at the height h above O.
 """
 
 from __future__ import annotations
@@ -37,28 +37,28 @@ from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Angle, Pause
 
-TURNS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
-"""Turns of the hand about the vertical that are tried, away from how the cup is held."""
+YAWS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
+"""Candidate rotations of the hand about the vertical, relative to how the cup is held."""
 UP = np.array([0.0, 0.0, 1.0])
 
 
 class PourSpec(Model):
-    """Carry what is held over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back."""
+    """Carry a held object over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back."""
 
     renamed: ClassVar = RENAMED
 
-    object: str = Field(description="The container that is held and tilted.")
-    into: str = Field(description="The container that receives.")
+    object: str = Field(description="The held container, which is tilted.")
+    into: str = Field(description="The receiving container.")
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
-    dwell: Annotated[Pause, Field(ge=0, description="How long to stay tilted [s], to 1 h; `until` prolongs it.")] = 1.0
+    dwell: Annotated[Pause, Field(ge=0, description="Time to stay tilted [s], at most 1 h; extended by `until`.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
     velocity_scaling: VelocityScaling = Field(
-        0.5, description="Share of the velocity, acceleration and jerk limits, carrying and tilting."
+        0.5, description="Share of the velocity, acceleration and jerk limits while carrying and tilting."
     )
 
 
 def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """The first of the candidate directions, senses and clearances that is reachable and free."""
+    """The plan of the first candidate direction, sense and clearance that is reachable and free."""
     planner.held(state, spec.object)
     planner.free_start(state)
     body = planner.scene.body(spec.object)
@@ -69,8 +69,8 @@ def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
     def attempt(candidate: tuple[float, float, float]) -> StepPlan:
-        clearance, turn, sense = candidate
-        R_WT0 = matrix_from_axis_angle(UP, turn) @ R_WT
+        clearance, yaw, sense = candidate
+        R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
         a = _horizontal_axis(R_WT0)
         theta = sense * spec.tilt
         lip = mouth + clearance * UP
@@ -86,22 +86,22 @@ def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
         return builder.plan()
 
     candidates = itertools.product(
-        spread(spec.clearance), (math.radians(turn) for turn in TURNS_DEG), _senses(planner, state, mouth, R_WT)
+        spread(spec.clearance), (math.radians(yaw) for yaw in YAWS_DEG), _senses(planner, state, mouth, R_WT)
     )
-    return first_feasible(attempt, candidates, what=f"no way to pour from '{spec.object}' into '{spec.into}'")
+    return first_feasible(attempt, candidates, what=f"cannot pour from '{spec.object}' into '{spec.into}'")
 
 
 def _horizontal_axis(R_WT: Array) -> Array:
-    """The axis of the tool that is horizontal and nearest to its z: the axis of the last joint on most arms."""
+    """The first horizontal axis of the tool, z first: the axis of the last joint on most arms."""
     for axis in (R_WT[:, 2], R_WT[:, 0], R_WT[:, 1]):
         if abs(axis[2]) < math.sin(math.radians(10.0)):
             flat = np.array([axis[0], axis[1], 0.0])
             return np.asarray(flat / np.linalg.norm(flat))
-    raise NotPlannable("no axis of the tool is horizontal, so the cup cannot be tilted about one")
+    raise NotPlannable("no tool axis is horizontal, so the cup cannot be tilted about it")
 
 
 def _senses(planner: Planner, state: PlanningState, mouth: Array, R_WT: Array) -> tuple[float, float]:
-    """Tipping towards the receiver first."""
+    """Both senses of rotation; tipping towards the receiver first."""
     w = np.cross(_horizontal_axis(R_WT), UP)
     towards = mouth - planner.tool_pose(state).p
     sense = 1.0 if float(towards @ w) >= 0.0 else -1.0
@@ -116,7 +116,7 @@ def _lip(body: Body, R_WO: Array, w: Array) -> Array:
 
 
 def _righted(R_WO: Array) -> Array:
-    """The smallest turn (3, 3), in the world, that makes a tilted cup stand upright."""
+    """The smallest rotation (3, 3), in the world, that makes a tilted cup upright."""
     axis = np.cross(R_WO[:, 2], UP)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-9:
@@ -125,14 +125,14 @@ def _righted(R_WO: Array) -> Array:
 
 
 def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown bodies, or one into itself."""
+    """Unknown bodies, or a body poured into itself."""
     if spec.object == spec.into:
         return (Problem(loc=("into",), message=f"'{spec.object}' cannot be poured into itself"),)
     return unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
 
 
 def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """A tool that nothing moves."""
+    """A tool without a controller."""
     return unmoved_tool(claims, robot, ("object",))
 
 

@@ -20,7 +20,7 @@ from manipcli.spec.base import Model
 
 
 class ReleaseSpec(Model):
-    """The hand opens to a named pose and lets go; the step fails where something stops it, or it still holds."""
+    """Open the hand to a named pose and let go; the step fails if something stops the hand, or if it still holds."""
 
     posture: str = Field("open", description="The named pose that the hand opens to.")
 
@@ -38,7 +38,7 @@ def check(spec: ReleaseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, 
 
 
 def uncommanded(spec: ReleaseSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """A hand that nothing moves."""
+    """A hand without a controller."""
     return unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 

@@ -1,6 +1,6 @@
-"""`switch_controllers`: other controllers take over, between two control ticks; nothing moves.
+"""`switch_controllers`: switch controllers between two control ticks; nothing moves.
 
-- switch_controllers: soft_arm                     # it is active then, and nobody else on its joints
+- switch_controllers: soft_arm                     # active afterwards, alone on its joints
 - switch_controllers: {to: [soft_arm, hand]}
 - switch_controllers: {activate: [soft_arm], deactivate: [arm]}
 - switch_controllers: {deactivate: [hand], strictness: best_effort}
@@ -32,21 +32,22 @@ def _names(value: object) -> object:
 
 
 class SwitchControllersSpec(Model):
-    """Other controllers take over, between two control ticks; nothing moves.
+    """Switch controllers between two control ticks; nothing moves.
 
-    Either `to`: these are active afterwards, or `activate` and `deactivate`, as ROS's service has them. What is
-    activated holds what it measures. Joints that nobody commands any more are braked. With `strict` a switch is done as
-    a whole or refused; with `best_effort` names that cannot be switched are left out, also those that claim joints of
-    controllers that stay active.
+    Give either `to`, the controllers that are active afterwards, or `activate` and `deactivate`, as in ROS's service.
+    An activated controller holds the measured position. Uncommanded joints are held by a brake. With `strict` a switch
+    is done as a whole or refused; with `best_effort` names that cannot be switched are left out, also those that claim
+    joints of controllers that stay active.
     """
 
     to: Annotated[tuple[str, ...], BeforeValidator(_names, json_schema_input_type=Names)] = Field(
-        (), description="These are active afterwards, and nobody else on their joints."
+        (), description="Controllers that are active afterwards; others on their joints are deactivated."
     )
     activate: tuple[str, ...] = Field((), description="Controllers to activate.")
     deactivate: tuple[str, ...] = Field((), description="Controllers to deactivate.")
     strictness: Strictness = Field(
-        "strict", description="`strict`: all of it or nothing. `best_effort`: what can be switched. Default `strict`."
+        "strict",
+        description="`strict`: all of it or nothing. `best_effort`: all that can be switched. Default `strict`.",
     )
 
     @model_validator(mode="before")
@@ -63,12 +64,12 @@ class SwitchControllersSpec(Model):
     def _one_way(self) -> SwitchControllersSpec:
         lists = bool(self.activate or self.deactivate)
         if bool(self.to) == lists:
-            raise ValueError("say either `to`, or `activate` and `deactivate`")
+            raise ValueError("needs either `to`, or `activate` and `deactivate`")
         return self
 
 
 def request(spec: SwitchControllersSpec) -> Switch:
-    """What is to be switched."""
+    """The requested switch."""
     return Switch(to=spec.to, activate=spec.activate, deactivate=spec.deactivate, strictness=spec.strictness)
 
 
@@ -79,12 +80,12 @@ def plan(spec: SwitchControllersSpec, planner: Planner, state: PlanningState) ->
 
 
 def check(spec: SwitchControllersSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """The robot and the scene know no controllers."""
+    """Nothing: controllers are checked by `uncommanded`."""
     return ()
 
 
 def uncommanded(spec: SwitchControllersSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """Names that are not in the controllers file; whether the rest can be switched is asked with `request`."""
+    """Names that are not in the controllers file; whether the others can be switched is checked with `request`."""
     lists = (("to", spec.to), ("activate", spec.activate), ("deactivate", spec.deactivate))
     return tuple(
         problem

@@ -23,7 +23,7 @@ from manipcli.spec.quantity import Pause, Time
 class WaitSpec(Model):
     """Hold still for a time; with `until` on the step, at least that long and until the condition holds."""
 
-    duration: Annotated[Pause, Field(ge=0, description="How long [s], to 1 h.")] = 0.0
+    duration: Annotated[Pause, Field(ge=0, description="Duration [s], at most 1 h.")] = 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -37,7 +37,7 @@ class WaitSpec(Model):
 
 
 def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """One motion that commands nothing."""
+    """One motion without commands."""
     builder = MotionBuilder(planner, state)
     builder.dwell("wait", spec.duration)
     return builder.plan()

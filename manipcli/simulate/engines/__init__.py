@@ -1,4 +1,4 @@
-"""The engines that come with manipcli."""
+"""Registry of engines."""
 
 from manipcli.core.registry import Seam
 from manipcli.simulate.engine import EngineMember

@@ -1,4 +1,4 @@
-"""The ideal engine: references come true at once, objects stay where they stand, nothing touches anything."""
+"""Ideal engine: exact tracking without physics; objects do not move, and there are no contacts."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 
 
 class KinematicEngine:
-    """Perfect tracking on any interface; mimic joints follow their driver exactly. Fast, for tests of all the rest.
+    """Ideal tracking on any interface; mimic joints follow their driver exactly. Fast, for tests.
 
-    What is written comes true in the tick that it is written in. What the next one reads, before it writes, has moved
-    on at that velocity, so that a controller on its way sees an error of a T^2 / 2 and not of v T; but where velocities
-    are commanded, for what is written there is the position one tick on already.
+    A written reference applies in its own tick. The next read has moved on at the reference velocity, so that a moving
+    controller sees an error of a T^2 / 2, not of v T. With commanded velocities it has not, because their reference is
+    already the position one tick ahead.
     """
 
     ideal: Final = True
@@ -78,7 +78,7 @@ class KinematicEngine:
         return ()
 
     def close(self) -> None:
-        """Holds nothing."""
+        """No effect."""
 
 
 def _version() -> str:
@@ -92,7 +92,7 @@ def _refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
 
 
 def _prepare() -> None:
-    """Needs no library."""
+    """No effect: it needs no library."""
 
 
 MEMBER = EngineMember(

@@ -1,4 +1,4 @@
-"""Bullet through PyBullet's DIRECT mode. The only file that knows PyBullet's indices and tuples."""
+"""PyBullet engine, in DIRECT mode."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 200
-"""At most: Bullet stops where its solver has converged, to a residual of 1e-7. With 50, its default, it has not while a
-hand holds something: of a cup pressed with 34 N in all by three fingers it told 39 N that swayed by 7."""
+"""Maximum; the solver stops at a residual of 1e-7. With Bullet's default of 50 it does not converge while a hand holds
+an object: for a cup pressed with 34 N in all by three fingers, it computed 39 N, varying by 7 N."""
 
 
 class PybulletEngine:
@@ -118,7 +118,7 @@ class PybulletEngine:
         unlike = list(differences(p, client, self._robot, robot, link_names))
         if unlike:
             self.close()
-            raise ManipcliError(f"Bullet holds another robot than '{robot.name}': {'; '.join(unlike)}")
+            raise ManipcliError(f"Bullet loaded a different robot than '{robot.name}': {'; '.join(unlike)}")
 
     def _start(self, robot: RobotModel, settings: EngineSettings) -> None:
         p, client = self._p, self._client
@@ -130,7 +130,7 @@ class PybulletEngine:
 
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
-        # One list for all numbers, copied at once: a tick has no time for an array operation for each of them.
+        # One list for all numbers, copied at once: one array operation per number is too slow for a tick.
         states = p.getJointStates(self._robot, self._joints, client)
         numbers = [s[0] for s in states]
         numbers += [s[1] for s in states]
@@ -159,7 +159,7 @@ class PybulletEngine:
 
     def sense_wrench(self, joint: str) -> Array:
         hanging = self._model.descendants(self._model.joint(joint).child)
-        below = [self._numbers[one.name] for one in self._model.joints if one.child in hanging]
+        below = [self._numbers[below.name] for below in self._model.joints if below.child in hanging]
         return self._wrenches.add(self._numbers[joint], below)
 
     def advance(self) -> None:
@@ -181,7 +181,7 @@ class PybulletEngine:
         return self._merge(points)
 
     def _contact_points(self) -> tuple[ContactPoint, ...]:
-        """Asked for once a tick: a tuple of a point costs as much as looking at it."""
+        """Read once per tick: building the tuples costs as much as reading them."""
         if self._points is None:
             self._points = self._p.getContactPoints(physicsClientId=self._client)
         return self._points
@@ -234,11 +234,13 @@ def _version() -> str:
 
 
 def refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
-    """More joints than Bullet reads the state of, and moving links without mass."""
+    """Too many joints for Bullet, and moving links without mass."""
     found = []
     if len(robot.joints) > MAX_JOINTS:
-        message = f"robot '{robot.name}' has {len(robot.joints)} joints; Bullet holds {MAX_JOINTS}, fixed ones included"
-        found.append(Diagnostic("SIM120", message, hint="join links that are fixed to each other"))
+        message = (
+            f"robot '{robot.name}' has {len(robot.joints)} joints; Bullet supports {MAX_JOINTS}, including fixed ones"
+        )
+        found.append(Diagnostic("SIM120", message, hint="merge links that are fixed to each other"))
     return (*found, *massless_links(robot, "SIM121"))
 
 

@@ -1,4 +1,4 @@
-"""PyBullet's contact points as contacts: one a touching pair of parts."""
+"""Conversion of PyBullet's contact points to contacts: one per touching pair of parts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Vector = tuple[float, float, float]
 Pair = tuple[int, int, int, int]
 """Body a, body b, link of a, link of b."""
 ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float, float, Vector, float, Vector]
-"""What PyBullet says of a contact point: a flag, bodies and links a and b, places on a and b, the normal on b, the
+"""PyBullet's tuple for a contact point: a flag, bodies and links a and b, places on a and b, the normal on b, the
 distance, the normal force on a, and twice: friction on a along a direction."""
 KNOCK: Final = 1.5
-"""A contact point that carries so many times the force of the strongest one, and `KNOCK_LEAST` more, is a knock."""
+"""A contact point with more than this factor of the largest force, plus `KNOCK_LEAST`, is an impact."""
 KNOCK_LEAST: Final = 1.0
 """[N]"""
 _sides = attrgetter("a", "b")
@@ -23,7 +23,7 @@ _force = itemgetter(9)
 
 
 class ContactWatch:
-    """Whether other links touch than before, or a point of `body` is pressed much harder: a knock."""
+    """Detects changes of the touching links, and impacts on `body`."""
 
     def __init__(self, body: int) -> None:
         self._body = body
@@ -31,34 +31,34 @@ class ContactWatch:
         self._knock = KNOCK_LEAST
 
     def changed(self, points: Sequence[ContactPoint]) -> bool:
-        """Compared with what was `seen`. Asked at every tick: what is nearly always enough comes first."""
+        """Whether they changed since `seen`. Called at every tick, so the cheapest test comes first."""
         pairs = _touching(points)
         if pairs != self._pairs and set(pairs) != set(self._pairs):
             return True
         return max(map(_force, points), default=0.0) > self._knock and self._greatest(points) > self._knock
 
     def seen(self, points: Sequence[ContactPoint]) -> None:
-        """From now on compared with these."""
+        """Set the points to compare with."""
         self._pairs = _touching(points)
         self._knock = KNOCK * self._greatest(points) + KNOCK_LEAST
 
     def _greatest(self, points: Sequence[ContactPoint]) -> float:
-        """[N] of a single point of the body."""
+        """[N] Largest force at a single point of the body."""
         body = self._body
         return max([point[9] for point in points if point[1] == body or point[2] == body], default=0.0)
 
 
 def _touching(points: Sequence[ContactPoint]) -> list[Pair]:
-    """The pairs of links that touch, one a point."""
+    """The pairs of links that touch, one per point."""
     return [point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0]
 
 
 class ContactMerger:
-    """Sums up contact points.
+    """Merges contact points into contacts.
 
     Args:
         parts: the name of every (body, link); a body's base is its link -1.
-        still: those that nothing can move: that a robot stands on the floor is no contact.
+        still: immovable parts: a robot that stands on the floor has no contact with it.
     """
 
     def __init__(self, parts: Mapping[tuple[int, int], str], *, still: Collection[tuple[int, int]] = ()) -> None:
@@ -67,7 +67,7 @@ class ContactMerger:
         self._known: dict[Pair, tuple[str, str]] = {}
 
     def merged(self, points: Sequence[ContactPoint]) -> tuple[Contact, ...]:
-        """One contact a touching pair; points that are near but apart (positive distance, no force) are dropped."""
+        """One contact per touching pair; points that are apart (positive distance, no force) are dropped."""
         forces: dict[Pair, float] = {}
         depths: dict[Pair, float] = {}
         for point in points:
@@ -94,7 +94,7 @@ class ContactMerger:
         return tuple(found)
 
     def _names(self, pair: Pair) -> tuple[str, str]:
-        """The two names in their order, remembered."""
+        """The two names in alphabetical order, cached."""
         body_a, body_b, link_a, link_b = pair
         a, b = self._parts[body_a, link_a], self._parts[body_b, link_b]
         names = self._known[pair] = (a, b) if a <= b else (b, a)

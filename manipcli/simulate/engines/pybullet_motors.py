@@ -1,7 +1,7 @@
-"""Commands to Bullet's joints: torques, and the motors that stand in for servo drives.
+"""Commands to Bullet's joints: torques, and Bullet's motors as servo drives.
 
-A motor is Bullet's own constraint on a joint's speed, with the joint's effort as its limit; gravity and contact act on
-it as on everything. Where efforts are commanded there is none.
+A motor is Bullet's constraint on a joint's speed, limited by the joint's effort; gravity and contacts act against it.
+Joints with effort commands have no motor.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from manipcli.control.command import JointCommand, Mode
 from manipcli.model.robot import RobotModel
 
 UNLIMITED_EFFORT: Final = 1e6
-"""Stands for "no effort limit" where PyBullet wants a number [N m or N]."""
+"""Represents "no effort limit" for PyBullet [N m or N]."""
 POSITION_TIME: Final = 0.01
-"""A position command is approached with this time constant [s], whatever the physics step; ros_gz's default gain of
-0.1 at 1 kHz is nearly that."""
+"""[s] Time constant with which a position command is approached, for any physics step; close to ros_gz's default gain
+of 0.1 at 1 kHz."""
 
 
 class Motors:
-    """What the moving joints of one robot obey.
+    """Commands of the moving joints of one robot.
 
     Args:
         p, client, body: PyBullet, its world, the robot in it.
@@ -50,7 +50,7 @@ class Motors:
         self._release(self._joints)
 
     def write(self, command: JointCommand) -> None:
-        """What holds until the next command."""
+        """Set the command until the next one."""
         if command.version != self._version:
             self._obey(command)
         p, client = self._p, self._client
@@ -85,13 +85,13 @@ class Motors:
                 )
 
     def efforts(self, states: Sequence[tuple[float, float, tuple[float, ...], float]]) -> list[float]:
-        """(n) what acts on each joint [N m or N]: commanded, and done by its motor as Bullet's joint states say."""
+        """(n) effort on each joint [N m or N]: the commanded one, plus that of its motor in Bullet's joint states."""
         if not self._measures:
             return self._applied
         return [state[3] + applied for state, applied in zip(states, self._applied, strict=True)]
 
     def _obey(self, command: JointCommand) -> None:
-        """What each joint obeys has changed: motors on or off."""
+        """Switch motors on or off after a change of modes."""
         self._version = command.version
         modes = command.modes
         self._torques_at = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
@@ -114,7 +114,7 @@ class Motors:
         )  # fmt: skip
 
     def _release(self, joints: list[int]) -> None:
-        """No motor holds these."""
+        """Switch the motors of these joints off."""
         p = self._p
         if joints:
             none = [0.0] * len(joints)
@@ -123,7 +123,7 @@ class Motors:
             )
 
     def push(self) -> None:
-        """Torques for the next physics step: Bullet forgets them after each."""
+        """Apply torques for the next physics step: Bullet clears them after each step."""
         p = self._p
         if self._torque_joints:
             p.setJointMotorControlArray(

@@ -1,4 +1,4 @@
-"""What Bullet made of bodies and robot, compared with what these are: it drops what it does not like without a word."""
+"""Comparison of bodies and robot as loaded by Bullet with the model: Bullet drops unsupported parts silently."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body
 
 RELATIVE: Final = 1e-4
-"""Of masses, lengths and moments; these as Bullet was given them, which is inside of what can be."""
+"""Relative tolerance of masses, lengths and moments of inertia."""
 ABSOLUTE: Final = 1e-9
 REVOLUTE, PRISMATIC = 0, 1
 
 
 def differences(p: ModuleType, client: int, body: int, robot: RobotModel, links: Mapping[int, str]) -> Iterator[str]:
-    """Everything in which the loaded `body` is not `robot`; `links`: link names by Bullet's indices, -1 the root.
+    """All differences of the loaded `body` from `robot`; `links`: link names by Bullet's indices, -1 the root.
 
-    Compares of each link the mass, the centre of mass, the moments of inertia and the number of collision shapes, and
-    of each joint the type and the limits. The root is held in place and has no mass in Bullet.
+    Compares mass, centre of mass, moments of inertia and number of collision shapes of each link, and type and limits
+    of each joint. The root is fixed and has no mass in Bullet.
     """
     for k, name in links.items():
         link = robot.link(name)
@@ -41,16 +41,16 @@ def differences(p: ModuleType, client: int, body: int, robot: RobotModel, links:
 
 
 def body_differences(p: ModuleType, client: int, k: int, body: Body) -> Iterator[str]:
-    """Shapes that Bullet's body `k` lacks of those of `body`, which is of the scene, and another mass."""
+    """Shapes of the scene's `body` that Bullet's body `k` lacks, and a different mass."""
     shapes = len(p.getCollisionShapeData(k, -1, physicsClientId=client))
-    if shapes < len(body.geometries):  # the parts of a mesh count, each
+    if shapes < len(body.geometries):  # each part of a mesh counts
         yield f"it has {shapes} shapes instead of {len(body.geometries)}"
     mass, wanted = float(p.getDynamicsInfo(k, -1, physicsClientId=client)[0]), 0.0 if body.fixed else body.mass
     if not abs(mass - wanted) <= ABSOLUTE + RELATIVE * wanted:
         yield f"it has a mass of {mass:g} kg instead of {wanted:g} kg"
 
 
-# PyBullet's tuples come untyped; what stands where is said by its manual, and a wrong guess ends in an error here.
+# PyBullet's tuples are untyped; their order is that of its manual, and a mistake ends in an error here.
 
 
 def _inertial(info: tuple[object, ...]) -> Inertial:

@@ -35,9 +35,9 @@ WIDE: Final = 3.2
 
 
 def stiff_damping(robot: RobotModel, step: float) -> Array:
-    """(n) the damping [N m s/rad or N s/m] of joints where it is stiff for a physics step [s], 0 of the others.
+    """(n) the damping [N m s/rad or N s/m] of joints whose damping is stiff for a physics step [s], 0 for the others.
 
-    It is stiff where it is so in some configuration within the limits.
+    It counts as stiff if it is stiff in any checked configuration within the limits.
     """
     moving = robot.moving_joints
     damping = np.array([joint.damping for joint in moving])
@@ -60,8 +60,8 @@ def add_rotor_inertia(
     Args:
         p: PyBullet.
         client: its world.
-        robot: the robot, which `body` is in that world.
-        body: Bullet's number of it.
+        robot: the robot.
+        body: Bullet's number of the robot.
         joints: (n) Bullet's numbers of its moving joints.
         step: [s] of the physics.
     """

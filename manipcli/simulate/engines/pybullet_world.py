@@ -1,4 +1,4 @@
-"""A scene and a robot as Bullet's bodies."""
+"""Construction of Bullet's bodies for a scene and a robot."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from manipcli.simulate.engines.pybullet_readback import body_differences
 
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
-"""What a mimic coupling may carry [N m or N]."""
+"""[N m or N] Effort limit of a mimic coupling."""
 MAX_SHAPES: Final = 16
-"""Of an array of shapes: Bullet leaves out those beyond without a word."""
+"""Maximum size of an array of shapes: Bullet silently drops further ones."""
 
 
 def add_body(p: ModuleType, client: int, body: Body, folder: Path) -> int:
-    """Adds a body of the scene; its index. `folder` takes what Bullet reads meshes and descriptions from."""
+    """Add a body of the scene and return its index; `folder` is for the mesh and description files for Bullet."""
     make = _from_shapes if len(body.geometries) <= MAX_SHAPES else _from_description
     k = make(p, client, body, folder)
     p.changeDynamics(
@@ -46,7 +46,7 @@ def add_body(p: ModuleType, client: int, body: Body, folder: Path) -> int:
         p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
     unlike = "; ".join(body_differences(p, client, k, body))
     if unlike:
-        raise ManipcliError(f"Bullet holds another body than '{body.name}': {unlike}")
+        raise ManipcliError(f"Bullet loaded a different body than '{body.name}': {unlike}")
     return k
 
 
@@ -87,11 +87,11 @@ def _from_shapes(p: ModuleType, client: int, body: Body, folder: Path) -> int:
 
 
 def _from_description(p: ModuleType, client: int, body: Body, folder: Path) -> int:
-    """The same body, by the file of one link, which may have any number of shapes."""
+    """The body from a description file with one link, which may have any number of shapes."""
     X_IO = body.X_OI.inverse()
     shapes = [Geometry(X_LS=X_IO @ geometry.X_LS, shape=geometry.shape) for geometry in body.geometries]
     inertial = MASSLESS
-    if not body.fixed:  # a ball's: of another Bullet would turn the frame; `add_body` says the true one
+    if not body.fixed:  # isotropic, as Bullet would otherwise rotate the frame; `add_body` sets the true inertia
         inertial = Inertial(mass=body.mass, X_LI=Transform.identity(), inertia=np.eye(3))
     file = folder / f"body_{p.getNumBodies(physicsClientId=client)}.urdf"
     file.write_text(body_urdf(shapes, inertial, folder), encoding="utf-8")
@@ -118,15 +118,15 @@ def _geometry_kind(p: ModuleType, shape: Box | Sphere | Cylinder | Mesh) -> int:
 
 
 def centre(body: Body) -> tuple[Vector | None, tuple[float, ...] | None]:
-    """Where Bullet's frame of a body, which is that of its principal inertia, stands in the body's own: the position of
-    the one, and the rotation back; None where there is nothing to change."""
+    """Position of Bullet's frame of a body (that of its principal inertia) in the body's frame, and the inverse
+    rotation; None for no offset."""
     x, y, z = (float(v) for v in body.X_OI.p)
     turned = None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
     return (x, y, z) if x or y or z else None, turned
 
 
 def couple_mimics(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int]) -> None:
-    """Makes the mimic joints of `body` follow; `joints`: Bullet's indices of the robot's moving joints."""
+    """Couple the mimic joints of `body`; `joints`: Bullet's indices of the robot's moving joints."""
     for joint, index in zip(robot.moving_joints, joints, strict=True):
         if joint.mimic is not None:
             driver = joints[robot.joint_names.index(joint.mimic.joint)]

@@ -1,15 +1,15 @@
-"""Wrenches at joints of PyBullet's robot, from what moves and what touches.
+"""Wrenches at joints of PyBullet's robot, computed from link motion and contacts.
 
-Bullet's own reactions at joints do not hold what couples two of them (mimic joints, rotors): they count it as forces on
-the children from outside, which the parents do not feel. What is known exactly is what the links k below a joint did in
-the last physics step h, with the velocities v and w and the places c of their centres of mass. By Newton and Euler
+Bullet's joint reactions lack the couplings of two joints (mimic joints, rotors): Bullet treats these as external forces
+on the children. The motion of the links k below a joint in the last physics step h is known exactly, with velocities v
+and w and positions c of their centres of mass. By Newton and Euler
 
     f = sum_k m_k ((v_k' - v_k) / h - g)
     t = sum_k c_k x m_k ((v_k' - v_k) / h - g) + ((I_k w_k)' - I_k w_k) / h
 
-came to them, about the origin of the world; less what contacts gave, it came through the joint, and the opposite of
-that is what the child puts on its parent. A point of contact gives its normal force and the friction along the surface.
-The moment of spinning and rolling friction PyBullet does not tell: it is missing in the torque.
+is the wrench on them, about the origin of the world. Minus the contact wrenches, it is transmitted by the joint, and
+its opposite is the wrench of the child on its parent. A contact point has a normal force and friction along the
+surface. PyBullet does not report the moment of spinning and rolling friction: the torque lacks it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from manipcli.simulate.engines.pybullet_contacts import ContactPoint, Vector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sensor:
-    """`link`: the child, `links`: all that hangs on the joint, Bullet's numbers; `values` (6)."""
+    """`link`: the child, `links`: all links below the joint, Bullet's numbers; `values` (6)."""
 
     link: int
     links: frozenset[int]
@@ -35,12 +35,12 @@ class _Sensor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Motion:
-    """Of the links that any sensor looks at (k): places and momenta in the world.
+    """Poses and momenta in the world of the links of all sensors (k).
 
     Attributes:
         centres: (k, 3) centres of mass.
         origins, turned: (k, 3), (k, 4) their frames; the quaternions xyzw.
-        momenta: (k, 6) linear [N s] and of turning about the centre of mass [N m s].
+        momenta: (k, 6) linear [N s], and angular about the centre of mass [N m s].
     """
 
     centres: Array
@@ -74,32 +74,32 @@ class WrenchSensors:
         return bool(self._sensors)
 
     def add(self, link: int, below: Sequence[int]) -> Array:
-        """A sensor between `link` and its parent; `below`: the links that hang there, itself among them.
+        """A sensor between `link` and its parent; `below`: it and all links below it.
 
         Returns:
             (6) force [N] and torque [N m] of the link on its parent, in the link's frame, about its origin.
         """
         sensor = _Sensor(link, frozenset(below), np.zeros(6))
         self._sensors.append(sensor)
-        links = sorted(frozenset[int]().union(*(one.links for one in self._sensors)))
+        links = sorted(frozenset[int]().union(*(other.links for other in self._sensors)))
         self._rows = {k: row for row, k in enumerate(links)}
         infos = [self._p.getDynamicsInfo(self._body, k, physicsClientId=self._client) for k in links]
         self._mass = np.array([[info[0]] for info in infos])
         self._moments = np.array([info[2] for info in infos])
-        self._carries = np.array([[k in one.links for k in links] for one in self._sensors], dtype=float)
+        self._carries = np.array([[k in other.links for k in links] for other in self._sensors], dtype=float)
         self._now = self._before = None
         return sensor.values
 
     def moved(self) -> None:
-        """A physics step was made."""
+        """Invalidate the cached motion after a physics step."""
         self._now = None
 
     def remember(self) -> None:
-        """How things are before the last physics step of a tick."""
+        """Store the motion before the last physics step of a tick."""
         self._before = self._motion() if self._now is None else self._now
 
     def measure(self, points: Sequence[ContactPoint]) -> None:
-        """What the last physics step came to, with all `points` of contact in it."""
+        """Compute the wrenches of the last physics step, with all its contact `points`."""
         if self._now is not None or self._before is None:
             return
         now = self._now = self._motion()
@@ -130,7 +130,7 @@ class WrenchSensors:
         return _Motion(states[:, :3], states[:, 7:10], states[:, 10:14], momenta)
 
     def _pushed(self, points: Sequence[ContactPoint]) -> tuple[list[int], list[Vector], list[list[float]]]:
-        """Which rows of links contacts push, where, and with what force."""
+        """Rows of the links in contact, contact positions, and contact forces."""
         rows: list[int] = []
         places: list[Vector] = []
         pushes: list[list[float]] = []
@@ -146,5 +146,5 @@ class WrenchSensors:
             if b == self._body and link_b in self._rows:
                 rows.append(self._rows[link_b])
                 places.append(at_b)
-                pushes.append([-one for one in push])
+                pushes.append([-force for force in push])
         return rows, places, pushes

@@ -1,4 +1,4 @@
-"""The sensors that come with manipcli."""
+"""Registry of sensors."""
 
 from manipcli.core.registry import Seam
 from manipcli.simulate.sensor import SensorMember

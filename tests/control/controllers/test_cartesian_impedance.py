@@ -258,11 +258,11 @@ def spec(**more):
         ({"link": "plam"}, ["link 'plam' is not in robot 'arm7_hand3'"]),
         (
             {"constraints": {"joints": {"elbow": {"goal": 0.1}}}},
-            ["'elbow' has tolerances, but is not one of its joints"],
+            ["'elbow' has tolerances, but is not a joint of the controller"],
         ),
         (
             {"stiffness": TaskSpaceSpec(translation=0, rotation=0), "posture": PostureSpec(stiffness=0)},
-            ["no stiffness at all; it would not move"],
+            ["all stiffnesses are 0; it would not move"],
         ),
     ],
 )

@@ -57,7 +57,7 @@ FREE = [9, 9, 9, 9]
 
 @pytest.mark.parametrize("compat", [None, "ros1"])
 def test_an_integral_gain_does_not_press_harder_and_harder(compat):
-    """At 2 N asked; unfrozen, 3 s of the error of 0.05 rad that is left would add 6 N."""
+    """At 2 N requested; unfrozen, 3 s of the error of 0.05 rad that is left would add 6 N."""
     controller = make(gains={j: GainsSpec(p=3.0, i=4.0, d=0.1) for j in JOINTS}, compat=compat)
     hand = Hand([0.4, 9, 0.4, 9])
     handle = controller.send_goal(GripperGoal(target=np.ones(4), force=2.0))
@@ -137,9 +137,9 @@ def test_a_finger_that_cannot_press_as_hard_as_asked_says_what_it_felt():
     hand.run(controller, 1.5)
     assert handle.result.fingers == ("stalled", "reached")
     stalled, reached = handle.result.text.split("; ")[:2]
-    felt, asked = stalled.rpartition(", where it felt ")[2].split(" N of the ")
+    felt, asked = stalled.rpartition(", with ")[2].split(" N of the requested ")
     assert float(felt) == pytest.approx(5.0, rel=0.02)
-    assert asked == "100 N asked"
+    assert asked == "100 N"
     assert "asked" not in reached
 
 

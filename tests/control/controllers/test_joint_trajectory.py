@@ -154,8 +154,8 @@ def test_jumbled_names_give_each_joint_its_own_value():
         (lambda: trajectory(point([1, 1, 1], 1.0, [-1, -2, -3])), "joint3' at -3 rad/s, not at rest"),
         (lambda: trajectory(point([1, 9, 1], 1.0)), "joint2' is at 9 rad at point 0; its limits are -5 to 5"),
         (lambda: trajectory(point([1, 1, 1], 1.0, [0, 4, 0]), point([1, 1, 1], 2.0, [0, 0, 0])), "4 rad/s at point 0"),
-        (lambda: trajectory(point([1, 1, 1], 1.0), point([1, 1, 5], 2.0)), "4 rad/s on the way to point 1"),
-        (lambda: trajectory(point([1, 1, 1], 1.0), point([1, 1, 1], 2.0, [0, 0, 0])), "point 1 gives other things"),
+        (lambda: trajectory(point([1, 1, 1], 1.0), point([1, 1, 5], 2.0)), "4 rad/s on the path to point 1"),
+        (lambda: trajectory(point([1, 1, 1], 1.0), point([1, 1, 1], 2.0, [0, 0, 0])), "point 1 has other fields"),
     ],
 )
 def test_goals_that_cannot_be_followed_are_refused_and_the_one_before_goes_on(make_trajectory, text):
@@ -375,7 +375,9 @@ def test_one_interface_need_not_stand_in_a_list_nor_gains_be_objects():
     assert made.update(PERIOD, PERIOD, state([0.0])).commands[0] == pytest.approx([1.0])
 
 
-@pytest.mark.parametrize(("goal_time", "told"), [(0.0, "goal_time 0 s: no grace; `compat: ros2`"), (0.001, "0.001 s)")])
+@pytest.mark.parametrize(
+    ("goal_time", "told"), [(0.0, "goal_time 0 s: no grace; with `compat: ros2`"), (0.001, "0.001 s)")]
+)
 def test_who_gives_no_grace_is_told_so(goal_time, told):
     made = make(goal=0.1, goal_time=goal_time)
     made.update(0.0, PERIOD, state(START))
@@ -387,5 +389,5 @@ def test_who_gives_no_grace_is_told_so(goal_time, told):
 
 
 def test_what_is_no_trajectory_is_no_goal():
-    with pytest.raises(GoalRejected, match="a goal of list; expected a JointTrajectory"):
+    with pytest.raises(GoalRejected, match="the goal is a list; expected a JointTrajectory"):
         make().send_goal([1.0, 2.0, 3.0])

@@ -212,7 +212,7 @@ def test_41_tolerances_of_a_goal():
     ):
         handle, adopted = tolerances_of(made, **wrong)
         assert is_default(adopted)
-        assert "the controller's own tolerances hold" in handle.notes[0]
+        assert "the controller's own tolerances apply" in handle.notes[0]
 
 
 def test_42_a_frozen_joint_leaves_its_path_tolerance():
@@ -276,7 +276,7 @@ def test_46_a_goal_that_is_never_reached_times_out():
     bench = Bench(controller(goal=1e-3, goal_time=0.0, cmd_timeout=0.1, compat="ros2"))
     handle = bench.controller.send_goal(to(*points))
     assert bench.end(handle) == pytest.approx(0.85 + 2 * PERIOD)
-    assert handle.result.text.endswith("after the end (goal_time without end), cmd_timeout 0.1 s")
+    assert handle.result.text.endswith("after the end (goal_time unlimited), cmd_timeout 0.1 s")
     output = bench.run(10)
     assert output.command == pytest.approx(START + 0.3)
     assert not output.velocity.any()

@@ -204,7 +204,7 @@ def test_velocities_and_accelerations_of_a_goal_have_tolerances():
         handle = controller.send_goal(TrajectoryGoal(goal, path_tolerance=(tolerance,)))
         run(controller, 100, first=1)
         assert handle.result.code is ErrorCode.PATH_TOLERANCE_VIOLATED
-        assert f"joint 'j' left its {text}" in handle.result.text
+        assert f"joint 'j' exceeds its {text}" in handle.result.text
     # The frozen joint misses 1.5 rad/s (3 (t - t^2) 2) at most, and 6 rad/s2 at the start.
     controller = made()
     run(controller, 1)
@@ -452,11 +452,11 @@ def quick(**more):
 @pytest.mark.parametrize("velocity", [None, 0.0])
 def test_a_first_point_that_is_too_far_away_is_refused_like_any_other(velocity):
     """From 0 at rest 0.9 rad in 0.1 s are 9 rad/s, whatever the curve."""
-    with pytest.raises(GoalRejected, match=r"'j' moves at 9 rad/s on the way to point 0; its limit is 1 rad/s"):
+    with pytest.raises(GoalRejected, match=r"'j' moves at 9 rad/s on the path to point 0; its limit is 1 rad/s"):
         quick().send_goal(to(at(0.9, 0.1, velocity)))
-    with pytest.raises(GoalRejected, match=r"moves at -2 rad/s on the way to point 0"):
+    with pytest.raises(GoalRejected, match=r"moves at -2 rad/s on the path to point 0"):
         quick().send_goal(TrajectoryGoal(to(at(-1.0, 0.5), at(0.0, 2.0)), start_time=3.0))
-    with pytest.raises(GoalRejected, match=r"moves at -1.5708 rad/s on the way to point 0"):  # the shortest way
+    with pytest.raises(GoalRejected, match=r"moves at -1.5708 rad/s on the path to point 0"):  # the shortest way
         quick(types=["continuous"]).send_goal(to(at(1.5 * math.pi, 1.0), at(1.5 * math.pi + 0.1, 2.0)))
 
 
@@ -490,7 +490,7 @@ def test_a_first_point_is_reached_from_where_the_reference_will_be():
         if legal:
             assert controller.send_goal(goal).active
         else:
-            with pytest.raises(GoalRejected, match="on the way to point 0"):
+            with pytest.raises(GoalRejected, match="on the path to point 0"):
                 controller.send_goal(goal)
 
 
@@ -500,7 +500,7 @@ def test_of_a_goal_in_the_past_only_the_time_that_is_left_counts(points, replace
     """At rest at 0 at 0.5 s: nothing brings a joint of 1 rad/s to 0.9 rad by 0.52 s, whenever the goal began."""
     controller = quick(allow_trajectory_replacement=replaces)
     run(controller, 50, first=1)
-    with pytest.raises(GoalRejected, match=rf"'j' moves at 90 rad/s on the way to point {len(points) - 1}"):
+    with pytest.raises(GoalRejected, match=rf"'j' moves at 90 rad/s on the path to point {len(points) - 1}"):
         controller.send_goal(TrajectoryGoal(to(*points), start_time=1e-9))
     assert controller.send_goal(TrajectoryGoal(to(at(0.8, 0.4), at(0.9, 1.5)), start_time=1e-9)).active
 

@@ -107,8 +107,8 @@ def test_it_brings_a_mass_to_its_reference():
     [
         ({"a": PidGainsSpec()}, {}, "'a' are all zero"),
         ({}, {}, "'a' has no gains"),
-        ({"a": PidGainsSpec(p=1), "z": PidGainsSpec(p=1)}, {}, "'z' is not one of its joints"),
-        ({"a": PidGainsSpec(p=1)}, {"led": ("velocity", "position")}, "cannot be led together"),
+        ({"a": PidGainsSpec(p=1), "z": PidGainsSpec(p=1)}, {}, "'z' has gains, but is not a joint of the controller"),
+        ({"a": PidGainsSpec(p=1)}, {"led": ("velocity", "position")}, "cannot be controlled together"),
     ],
 )
 def test_what_would_not_work_is_refused(gains, more, named):
