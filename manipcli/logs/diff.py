@@ -14,7 +14,7 @@ from manipcli.record.foreign.origin import is_own
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
-from manipcli.report.log_diff import LogDiff, LogSide
+from manipcli.report.logs.log_diff import LogDiff, LogSide
 
 OUTCOME = ("verdict", JOINTS, ACTUATORS, LIMITS)
 """Metadata that says what came of a run, which is judged and measured anew."""

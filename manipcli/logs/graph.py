@@ -23,7 +23,7 @@ from manipcli.record.foreign.origin import is_own
 from manipcli.record.foreign.topics import Topic, open_topics
 from manipcli.record.read.reading import open_recording
 from manipcli.record.selection import PLOTTED, Selection, word
-from manipcli.report.graph import Edge, Graph, Node
+from manipcli.report.logs.graph import Edge, Graph, Node
 from manipcli.run.run_log import action_of, recorded
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES

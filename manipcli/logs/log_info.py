@@ -12,7 +12,7 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.namespaces import meant
 from manipcli.record.foreign.topics import open_topics
 from manipcli.record.read.reading import open_recording
-from manipcli.report.log_info import LogInfo
+from manipcli.report.logs.log_info import LogInfo
 
 COMMON = (channels.ROBOT_DESCRIPTION, channels.JOINT_STATES, channels.TF)
 """Topics that a log of any robot may hold, and that manipcli understands whoever wrote them."""

@@ -26,7 +26,7 @@ from manipcli.record.foreign.units import joint_units
 from manipcli.record.messages import WORLD
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent
-from manipcli.report.snapshot import JointMoment, Moment, PoseMoment
+from manipcli.report.logs.snapshot import JointMoment, Moment, PoseMoment
 
 
 def moment(path: Path, time: float) -> Moment:

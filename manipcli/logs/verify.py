@@ -15,7 +15,7 @@ from manipcli.record.foreign.compare import compare_logs, compared_with_itself
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
-from manipcli.report.verification import Verification
+from manipcli.report.logs.verification import Verification
 
 UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, LIMITS, "repair")
 """Metadata that a run writes at its end; one that did not come to its end lacks it, or says something else."""

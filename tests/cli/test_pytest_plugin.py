@@ -19,7 +19,7 @@ import manipcli.spec.task  # noqa: F401
 from manipcli.batch.job import Job, Settings
 from manipcli.cli.pytest_plugin import TaskFailed, _settings
 from manipcli.cli.task_session import TaskSession
-from manipcli.report.suite import Case, CaseReport, CaseWord, Trouble
+from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Trouble
 
 pytest_plugins = ["pytester"]
 

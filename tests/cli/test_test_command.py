@@ -19,7 +19,7 @@ import pytest
 from manipcli.batch.job import Job
 from manipcli.cli import task_session
 from manipcli.cli.app import main
-from manipcli.report.suite import Case, CaseReport
+from manipcli.report.suite.suite import Case, CaseReport
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\

@@ -14,7 +14,7 @@ from manipcli.cli.app import main
 from manipcli.logs.graph import PRODUCERS, log_graph, task_graph
 from manipcli.pipeline import run_task
 from manipcli.record.channels import channel_table
-from manipcli.report.graph import Graph
+from manipcli.report.logs.graph import Graph
 
 ROOT = Path(__file__).parents[2]
 TASK = (

@@ -31,7 +31,7 @@ def at(
     Any ROS 2 log will do, as far as it goes.
     """
     from manipcli.logs.snapshot import moment
-    from manipcli.report.snapshot import render_json, render_text
+    from manipcli.report.logs.snapshot import render_json, render_text
 
     found = moment(log, _when(log, time))
     console.result(render_json(found) if format_ == "json" else render_text(found))

@@ -36,7 +36,7 @@ def view(
     with Interrupts():
         given = xacro_arguments(arguments or [])
         from manipcli.description.lint.inspection import located
-        from manipcli.replay.view import View
+        from manipcli.replay.view.view import View
         from manipcli.report import text
         from manipcli.task.viewed import load_sight
 

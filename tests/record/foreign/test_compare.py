@@ -19,7 +19,7 @@ from manipcli.record.foreign import compare
 from manipcli.record.foreign.compare import compare_logs, compared_with_itself
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
-from manipcli.report.comparison import counted
+from manipcli.report.logs.comparison import counted
 
 T = 1203
 Rewrite = Callable[..., Path]

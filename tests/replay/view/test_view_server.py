@@ -18,7 +18,7 @@ from websockets.typing import Origin, Subprotocol
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.description.elements import Joint, JointLimits
-from manipcli.replay.view import View, pose_text, slider_range
+from manipcli.replay.view.view import View, pose_text, slider_range
 from manipcli.task.viewed import load_sight
 
 ROOT = Path(__file__).parents[2]

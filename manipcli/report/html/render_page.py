@@ -5,10 +5,10 @@ from __future__ import annotations
 from importlib.resources import files
 
 from manipcli.replay.player import POLICY, player_html
-from manipcli.report import html_numbers as numbers
-from manipcli.report import html_sections as sections
-from manipcli.report.html_parts import heading
-from manipcli.report.markup import Markup, document, element, joined
+from manipcli.report.html import page_numbers as numbers
+from manipcli.report.html import page_sections as sections
+from manipcli.report.html.markup import Markup, document, element, joined
+from manipcli.report.html.page_parts import heading
 from manipcli.report.run_page import RunPage
 
 
@@ -31,7 +31,7 @@ def render_page(page: RunPage) -> str:
     }
     back = element("a", "All runs", href=page.index) if page.index else None
     links = (element("a", name, href=f"#{name.lower()}") for name, section in shown.items() if section)
-    own = files("manipcli.report").joinpath("page")
+    own = files("manipcli.report.html").joinpath("page")
     style, script = (Markup(own.joinpath(name).read_text("utf-8")) for name in ("report.css", "report.js"))
     verdict = page.verdict
     title = f"{'✓' if verdict.verdict == 'passed' else '✗'} {verdict.task} {verdict.verdict}"

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Place
-from manipcli.report.suite import CaseReport, Trouble
-from manipcli.report.suite_text import once_a_file
+from manipcli.report.suite.suite import CaseReport, Trouble
+from manipcli.report.suite.suite_text import once_a_file
 
 
 def render_annotations(reports: Sequence[CaseReport], *, workspace: Path | None = None) -> str:

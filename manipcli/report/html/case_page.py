@@ -8,9 +8,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from manipcli.replay.player import POLICY
-from manipcli.report.markup import Markup, document, element, link
-from manipcli.report.suite import CaseReport
-from manipcli.report.suite_text import beforehand
+from manipcli.report.html.markup import Markup, document, element, link
+from manipcli.report.suite.suite import CaseReport
+from manipcli.report.suite.suite_text import beforehand
 
 LONGEST = 100_000
 """Bytes of the end of what it said that are shown."""
@@ -18,7 +18,7 @@ LONGEST = 100_000
 
 def render_case_page(report: CaseReport, folder: Path, *, index: str = "") -> str:
     """The page, which lies in `folder`. Picture and output are in it, the log is linked, and the `index` of pages."""
-    style = Markup(files("manipcli.report").joinpath("page", "report.css").read_text("utf-8"))
+    style = Markup(files("manipcli.report.html").joinpath("page", "report.css").read_text("utf-8"))
     head = element(
         "header",
         element(

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manipcli.replay.view import View
+from manipcli.replay.view.view import View
 from manipcli.task.viewed import load_sight
 
 ROOT = Path(__file__).parents[2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipcli.report.snapshot import JointMoment, Moment, render_text
+from manipcli.report.logs.snapshot import JointMoment, Moment, render_text
 
 
 def test_a_number_that_is_no_length_of_this_world_stays_short() -> None:

@@ -8,8 +8,8 @@ from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.judge.measures.facts import JointFacts, RunFacts, Use
 from manipcli.judge.measures.grasp_intervals import GraspFacts, Slip, Spread
-from manipcli.report.html_parts import heading, meter, number, of_limit, percent, seek, table
-from manipcli.report.markup import Markup, element, joined
+from manipcli.report.html.markup import Markup, element, joined
+from manipcli.report.html.page_parts import heading, meter, number, of_limit, percent, seek, table
 from manipcli.report.quantity import quantity
 
 AT_LIMIT = 1e-6

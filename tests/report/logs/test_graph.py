@@ -6,7 +6,7 @@ import json
 import re
 from html import unescape
 
-from manipcli.report.graph import Edge, Graph, Node, render
+from manipcli.report.logs.graph import Edge, Graph, Node, render
 
 NASTY = [
     'a"]; b',

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from manipcli.core.units import readable
-from manipcli.report.markup import Markup, element, joined
+from manipcli.report.html.markup import Markup, element, joined
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Picture, Written
 

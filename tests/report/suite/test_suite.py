@@ -12,13 +12,13 @@ import pytest
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report import suite_json
-from manipcli.report.case_page import render_case_page
-from manipcli.report.github import render_annotations
+from manipcli.report.html.case_page import render_case_page
+from manipcli.report.html.suite_page import render_page
 from manipcli.report.run_report import RunReport, Timing
-from manipcli.report.suite import Case, CaseReport, CaseWord, Suite, Trouble, doubts_of, signal_name, troubles_of
-from manipcli.report.suite_page import render_page
-from manipcli.report.suite_text import gist, render_case, render_line, render_suite, render_summary
+from manipcli.report.suite import suite_json
+from manipcli.report.suite.github import render_annotations
+from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Suite, Trouble, doubts_of, signal_name, troubles_of
+from manipcli.report.suite.suite_text import gist, render_case, render_line, render_suite, render_summary
 
 NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5, relative=0.78)
 UPRIGHT = ExpectationOutcome("upright", "passed", 0.0873, "rad", 14.4, relative=0.99)

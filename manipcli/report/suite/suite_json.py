@@ -6,7 +6,7 @@ import json
 
 from manipcli.core.errors import Place
 from manipcli.report.json import Json, dumps, finding_object, number, render_run
-from manipcli.report.suite import CaseReport, Suite
+from manipcli.report.suite.suite import CaseReport, Suite
 
 
 def render_suite(suite: Suite) -> str:

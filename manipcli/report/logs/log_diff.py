@@ -11,7 +11,8 @@ from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.record.channels import JOINT_STATES, TF
 from manipcli.record.foreign.compare import Comparison
 from manipcli.record.read.compare_entries import EntryDifference
-from manipcli.report.comparison import (
+from manipcli.report.json import Json, dumps, number, plain
+from manipcli.report.logs.comparison import (
     Names,
     counted,
     entries_lines,
@@ -19,7 +20,6 @@ from manipcli.report.comparison import (
     messages_object,
     topics_table,
 )
-from manipcli.report.json import Json, dumps, number, plain
 from manipcli.report.quantity import quantity
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS

@@ -6,10 +6,10 @@ from importlib.resources import files
 from pathlib import Path
 
 from manipcli.replay.player import POLICY
-from manipcli.report.html_parts import mark, table
-from manipcli.report.markup import Markup, document, element, link
-from manipcli.report.suite import CaseReport, Suite
-from manipcli.report.suite_text import beforehand, gist, render_summary
+from manipcli.report.html.markup import Markup, document, element, link
+from manipcli.report.html.page_parts import mark, table
+from manipcli.report.suite.suite import CaseReport, Suite
+from manipcli.report.suite.suite_text import beforehand, gist, render_summary
 
 COLUMNS = ("verdict", "task", "sample", "margin or cause", "took")
 
@@ -21,7 +21,7 @@ def render_page(suite: Suite, folder: Path) -> str:
         suite: all runs.
         folder: where the page lies, from which its links lead to the others.
     """
-    style = Markup(files("manipcli.report").joinpath("page", "report.css").read_text("utf-8"))
+    style = Markup(files("manipcli.report.html").joinpath("page", "report.css").read_text("utf-8"))
     passed = sum(report.passed for report in suite.reports)
     good = passed == suite.total > 0
     word = "passed" if good else "failed"

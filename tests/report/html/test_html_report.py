@@ -22,9 +22,9 @@ from manipcli.judge.measures.grasp_intervals import GraspFacts, Hold, Slip, Spre
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
-from manipcli.report.html import render_page
-from manipcli.report.html_parts import number, of_limit, signed
-from manipcli.report.markup import Markup, element, joined
+from manipcli.report.html.markup import Markup, element, joined
+from manipcli.report.html.page_parts import number, of_limit, signed
+from manipcli.report.html.render_page import render_page
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 
 ROOT = Path(__file__).parents[2]

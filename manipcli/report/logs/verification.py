@@ -9,7 +9,8 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of
 from manipcli.record.foreign.compare import Comparison
 from manipcli.record.read.compare_entries import EntryDifference
-from manipcli.report.comparison import (
+from manipcli.report.json import dumps, number, plain
+from manipcli.report.logs.comparison import (
     Names,
     counted,
     entries_lines,
@@ -17,7 +18,6 @@ from manipcli.report.comparison import (
     messages_object,
     topics_table,
 )
-from manipcli.report.json import dumps, number, plain
 from manipcli.report.text import FAIL, PASS
 
 _NAMES: Names = ("in the log", "again")

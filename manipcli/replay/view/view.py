@@ -15,8 +15,8 @@ from manipcli.model.configuration import configuration, with_mimics, zero_config
 from manipcli.model.robot import RobotModel
 from manipcli.replay.drawing import draw, floors_of
 from manipcli.replay.placing import Placing
-from manipcli.replay.viser_scene import Shown, ViserScene
-from manipcli.replay.viser_server import LocalServer
+from manipcli.replay.view.viser_scene import Shown, ViserScene
+from manipcli.replay.view.viser_server import LocalServer
 from manipcli.scene.scene import Scene
 
 if TYPE_CHECKING:
