@@ -1,4 +1,4 @@
-"""HTML that cannot be broken by what is put into it: text is escaped unless it is `Markup` already."""
+"""HTML elements that escape their text, except text that is already `Markup`."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from manipcli.core.text import escape
 
 Attribute = str | float | bool | None
 _EMPTY = frozenset({"br", "img", "line", "link", "meta", "rect", "polygon"})
-"""Elements that have no end."""
+"""Elements without an end tag."""
 
 
 class Markup(str):
-    """HTML. Any other text is not."""
+    """Text that is HTML and needs no escaping."""
 
     __slots__ = ()
 
 
 def document(title: str, *body: str | None, style: Markup, policy: str) -> str:
-    """A whole page that asks for nothing from elsewhere; `policy`: its Content-Security-Policy."""
+    """A whole HTML page that loads no other file; `policy` is its Content-Security-Policy."""
     whole = element(
         "html",
         element(
@@ -43,8 +43,8 @@ def element(name: str, *children: str | None, **attributes: Attribute) -> Markup
     """`<name attribute="...">children</name>`.
 
     Args:
-        name: of the element.
-        children: `Markup` as it is, other text escaped, None left out.
+        name: tag of the element.
+        children: `Markup` is kept, other text is escaped, None is left out.
         attributes: `class_` is `class`, `data_seek` is `data-seek`; None and False are left out, True has no value.
     """
     words = [name]
@@ -58,12 +58,12 @@ def element(name: str, *children: str | None, **attributes: Attribute) -> Markup
 
 
 def joined(*parts: str | None) -> Markup:
-    """Parts behind each other; what is no `Markup` is escaped."""
+    """Concatenated parts; text that is not `Markup` is escaped, None is left out."""
     return Markup("".join(part if isinstance(part, Markup) else html.escape(escape(part)) for part in parts if part))
 
 
 def link(target: Path | str, folder: Path) -> str:
-    """The address of a file as seen from a page in `folder`; of a name that is no text its bytes."""
+    """The relative URL of a file from a page in `folder`; a name that is not valid text is quoted as bytes."""
     return quote(os.path.relpath(target, folder), errors="surrogateescape")
 
 

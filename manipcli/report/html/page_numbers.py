@@ -1,4 +1,4 @@
-"""The sections of the page that measure a run: grasps, tracking and limits, energy and power."""
+"""Measured sections of the run page: grasps, tracking and limits, energy and power."""
 
 from __future__ import annotations
 
@@ -13,31 +13,34 @@ from manipcli.report.html.page_parts import heading, meter, number, of_limit, pe
 from manipcli.report.quantity import quantity
 
 AT_LIMIT = 1e-6
-"""[rad, m] A joint that is as near as this to its limit is told to be at it."""
+"""[rad, m] A joint within this distance of its limit is shown as at the limit."""
 
 
 def grasps(facts: RunFacts) -> Markup | None:
-    """What was held, how hard, and how it moved in the hand."""
+    """Contact force and slip of each grasp."""
     if not facts.holds:
         return None
     rows = []
     for hold in facts.holds:
-        one = hold.hold
-        how = one.ended if one.lifted is not None else f"never lifted, {one.ended}"
-        links = f"{_few(hold.touching)} touch: {', '.join(hold.links)}" if hold.links else "none touches"
+        interval = hold.hold
+        how = interval.ended if interval.lifted is not None else f"never lifted, {interval.ended}"
+        links = f"{_few(hold.touching)} in contact: {', '.join(hold.links)}" if hold.links else "no contact"
         rows.append(
             (
-                joined(element("b", one.body), element("small", f"{one.grasped:.2f} to {one.until:.2f} s: {how}")),
+                joined(
+                    element("b", interval.body),
+                    element("small", f"{interval.grasped:.2f} to {interval.until:.2f} s: {how}"),
+                ),
                 _forces(hold),
                 element("small", links),
                 _slip(hold.slip, "m"),
                 _slip(hold.rotation, "rad"),
-                seek(one.grasped),
+                seek(interval.grasped),
             )
         )
     about = (
-        "From the end of the closing motion until the object stands again or is not touched. Force: the sum of the "
-        "normal forces of the robot's links. Slip: how far the middle of the object moved in the tool frame since then."
+        "A grasp lasts from the end of the closing motion until the object is set down or loses contact. Force: sum of "
+        "the normal forces of the robot's links. Slip: how far the centre of the object moved in the tool frame."
     )
     return element(
         "section",
@@ -68,7 +71,7 @@ def joints(facts: RunFacts) -> Markup | None:
     """Tracking and limits of each joint."""
     if not facts.joints:
         return None
-    cut = any(joint.saturated for joint in facts.joints)
+    saturated = any(joint.saturated for joint in facts.joints)
     rows = []
     for k, joint in enumerate(facts.joints):
         row = [
@@ -80,19 +83,19 @@ def joints(facts: RunFacts) -> Markup | None:
             _use(joint.velocity, f"{joint.unit}/s"),
             _use(joint.effort, "N" if joint.unit == "m" else "N m"),
         ]
-        rows.append((*row, _ticks(joint.saturated, facts.period) if cut else None))
+        rows.append((*row, _ticks(joint.saturated, facts.period) if saturated else None))
     headers = ["joint", "largest error", "RMS", "error over time", "position", "velocity", "effort"]
-    shown = [tuple(cell or "" for cell in row[: len(headers) + cut]) for row in rows]
-    worn = ", ".join(f"{name} {_ticks(count, facts.period)}" for name, count in facts.actuators)
+    shown = [tuple(cell or "" for cell in row[: len(headers) + saturated]) for row in rows]
+    saturated_actuators = ", ".join(f"{name} {_ticks(count, facts.period)}" for name, count in facts.actuators)
     about = (
-        "Error: measured against the reference of its controller; each curve is drawn to its own height. Limits: how "
-        "much of each was used at the nearest approach; of a position, of the way from the middle to its limit."
+        "Error: distance from the reference of the controller; each curve has its own scale. Limits: the largest share "
+        "of each limit that was used; for a position, of the distance from the middle of its range to the limit."
     )
     return element(
         "section",
         heading("joints", "Tracking and limits", about),
-        table([*headers, *(["cut at limits"] if cut else [])], shown, numbers=("RMS",), stacks=True),
-        element("p", f"Actuators that had no more to give: {worn}.", class_="about") if worn else None,
+        table([*headers, *(["saturated at limits"] if saturated else [])], shown, numbers=("RMS",), stacks=True),
+        element("p", f"Saturated actuators: {saturated_actuators}.", class_="about") if saturated_actuators else None,
     )
 
 
@@ -111,28 +114,28 @@ def _position(joint: JointFacts) -> Markup:
     if use is None:
         return joined(element("small", "no limit"))
     away = abs(use.limit - use.value)
-    where = "beyond" if use.share > 1.0 else "left to"
-    told = f"{quantity(away, joint.unit)} {where}" if away > AT_LIMIT else "at"
-    return _meter(use, f"{told} {readable(use.limit, joint.unit)}".replace("-", "−"))
+    where = "beyond" if use.share > 1.0 else "from"
+    text = f"{quantity(away, joint.unit)} {where}" if away > AT_LIMIT else "at"
+    return _meter(use, f"{text} {readable(use.limit, joint.unit)}".replace("-", "−"))
 
 
 def _use(use: Use | None, unit: str) -> Markup:
     return joined(element("small", "no limit")) if use is None else _meter(use, of_limit(use.value, use.limit, unit))
 
 
-def _meter(use: Use, told: str) -> Markup:
+def _meter(use: Use, text: str) -> Markup:
     return element(
         "span",
         element("span", percent(use.share), class_="share"),
-        meter(use.share, told=f"{told} at {use.at:.2f} s", mark=False),
-        element("small", told),
+        meter(use.share, label=f"{text} at {use.at:.2f} s", mark=False),
+        element("small", text),
         class_="seeks use",
         data_seek=f"{use.at:.6f}",
     )
 
 
 def _sparkline(facts: RunFacts, errors: Array, joint: JointFacts) -> Markup:
-    """|error| over the run, filled, and where steps begin."""
+    """|error| over the run as a filled curve, with a line at the start of each step."""
     known = np.nan_to_num(errors)
     top = float(known.max())
     if joint.error is None or top <= 0.0:
@@ -142,15 +145,15 @@ def _sparkline(facts: RunFacts, errors: Array, joint: JointFacts) -> Markup:
     points = " ".join(f"{240.0 * (k + 0.5) / count:.1f},{y:.1f}" for k, y in enumerate(high.tolist()))
     length = max(facts.end - facts.start, 1e-9)
     begins = [240.0 * (step.started - facts.start) / length for step in facts.steps[1:]]
-    told = f"error of {joint.name}: at most {quantity(joint.error.value, joint.unit)}"
+    label = f"tracking error of {joint.name}: at most {quantity(joint.error.value, joint.unit)}"
     drawn = (
         *(element("line", x1=x, x2=x, y1="0", y2="24") for x in begins),
         element("polygon", points=f"0,24 {points} 240,24"),
     )
     svg = element(
-        "svg", *drawn, class_="spark", viewBox="0 0 240 24", preserveAspectRatio="none", role="img", aria_label=told
+        "svg", *drawn, class_="spark", viewBox="0 0 240 24", preserveAspectRatio="none", role="img", aria_label=label
     )
-    return element("span", svg, class_="seeks", data_seek=f"{joint.error.at:.6f}", title=told)
+    return element("span", svg, class_="seeks", data_seek=f"{joint.error.at:.6f}", title=label)
 
 
 def energy(facts: RunFacts) -> Markup | None:
@@ -170,8 +173,8 @@ def energy(facts: RunFacts) -> Markup | None:
         rows.append((element("b", joint.name), _work(joint.given, joint.taken, joint.power.value), *cells))
     headers = ("", "whole run", *columns)
     about = (
-        "Mechanical energy that the joints gave: the integral of effort times velocity where that is positive; what "
-        "they took back; and the largest power, of all joints that which they gave together."
+        "Mechanical energy that the joints delivered: the integral of effort times velocity where it is positive; the "
+        "energy that they absorbed; and the peak power, for all joints the peak of their sum."
     )
     return element(
         "section",
@@ -183,5 +186,5 @@ def energy(facts: RunFacts) -> Markup | None:
 
 def _work(given: float, taken: float, power: float) -> Markup:
     return joined(
-        number(given, "J"), element("small", f"{number(taken, 'J')} back"), element("small", number(power, "W"))
+        number(given, "J"), element("small", f"{number(taken, 'J')} absorbed"), element("small", number(power, "W"))
     )

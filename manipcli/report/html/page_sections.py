@@ -1,5 +1,4 @@
-"""The sections of the page that say what came of a run: verdict, cause, expectations, steps, files. `html.py` puts them
-in order."""
+"""Sections of the run page about its result: verdict, cause, expectations, steps, files."""
 
 from __future__ import annotations
 
@@ -26,36 +25,36 @@ from manipcli.report.quantity import quantity
 from manipcli.report.run_page import RunPage, Source, Written
 
 SHORT_HASH = 16
-"""Digits of a hash that are shown; all of them are in the page."""
+"""Shown digits of a hash; the page source holds all of them."""
 
 
 ALSO = 3
-"""Causes beside the first that are shown at once; the others are folded, and told below."""
+"""Causes shown after the first; the others are folded."""
 
 
 def head(page: RunPage) -> Markup:
-    """The task, the verdict, and the run in a few numbers."""
+    """The task, the verdict and the key figures of the run."""
     verdict = page.verdict
     good = verdict.verdict == "passed"
     word = element("span", f"{'✓' if good else '✗'} {verdict.verdict}", class_=f"verdict {verdict.verdict}")
-    told: list[tuple[str, str]] = []
+    entries: list[tuple[str, str]] = []
     if page.facts is not None:
-        told.append(("simulated", f"{verdict.simulated_time:.2f} s"))
+        entries.append(("simulated", f"{verdict.simulated_time:.2f} s"))
         done = sum(step.outcome == "done" for step in verdict.steps)
-        told.append(("steps done", f"{done} of {len(verdict.steps)}"))
+        entries.append(("steps done", f"{done} of {len(verdict.steps)}"))
     if verdict.expectations and page.facts is not None:
-        met = sum(one.outcome == "passed" for one in verdict.expectations)
-        told.append(("expectations met", f"{met} of {len(verdict.expectations)}"))
+        met = sum(expectation.outcome == "passed" for expectation in verdict.expectations)
+        entries.append(("expectations met", f"{met} of {len(verdict.expectations)}"))
     if page.facts is not None:
-        told += _figures(page.facts)
-    figures = (element("div", element("dt", name), element("dd", value)) for name, value in told)
+        entries += _figures(page.facts)
+    figures = (element("div", element("dt", name), element("dd", value)) for name, value in entries)
     if page.facts is None and not page.log:
-        told.append(("simulated", "nothing: the task was refused"))
+        entries.append(("simulated", "not run: the task was refused"))
     lost = element("p", f"The log is incomplete: {page.lost}", class_="warn") if page.lost is not None else None
     return element(
         "header",
         element("div", element("h1", verdict.task), word, class_="title"),
-        element("p", verdict.text, class_="says") if good or not page.causes else None,
+        element("p", verdict.text, class_="subtitle") if good or not page.causes else None,
         element("p", verdict.drawn.told()) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),
@@ -63,14 +62,14 @@ def head(page: RunPage) -> Markup:
 
 
 def _figures(facts: RunFacts) -> list[tuple[str, str]]:
-    told = []
+    figures = []
     slips = [hold.slip.most for hold in facts.holds if hold.slip is not None and hold.hold.lifted is not None]
     if slips:
-        told.append(("slip in the hand", quantity(max(slips), "m")))
-    told.append(("energy", number(sum(one.given for one in facts.joints), "J")))
+        figures.append(("slip in the hand", quantity(max(slips), "m")))
+    figures.append(("energy", number(sum(joint.given for joint in facts.joints), "J")))
     total = max((step.total.value for step in facts.steps), default=0.0)
-    told.append(("peak power", number(total, "W")))
-    return told
+    figures.append(("peak power", number(total, "W")))
+    return figures
 
 
 def causes(page: RunPage) -> Markup | None:
@@ -89,50 +88,52 @@ def causes(page: RunPage) -> Markup | None:
         )
         shown.append(element("div", *lines, class_="cause"))
     cut = str(page.verdict.cuts)
-    # Of an invalid file nothing else tells them; and one alone is as short as the line that it would hide behind.
+    # The page of an invalid file has no other place for its causes; a single cause is as short as its summary line.
     rest = shown[1 + ALSO :] if page.facts is not None and len(shown) > 2 + ALSO else []
     folded = element("details", element("summary", f"{len(rest)} more"), *rest) if rest else None
     others = (*shown[1 : len(shown) - len(rest)], folded)
     also = element("div", element("p", "Also:", class_="about"), *others, class_="also") if shown[1:] else None
-    told_cut = element("p", f"In this run: {cut}.", class_="about") if cut else None
-    first = [element("div", shown[0], also, told_cut)]
+    saturation = element("p", f"In this run: {cut}.", class_="about") if cut else None
+    first = [element("div", shown[0], also, saturation)]
     if page.moment is not None:
-        told = f"{page.verdict.task} at {page.moment.time:.2f} s"
+        label = f"{page.verdict.task} at {page.moment.time:.2f} s"
         caption = element("figcaption", f"at {page.moment.time:.2f} s")
-        first.append(element("figure", image(page.moment, told), caption))
+        first.append(element("figure", image(page.moment, label), caption))
     title = "Why it failed" if page.verdict.verdict == "failed" else "What went wrong"
     return element("section", heading("cause", title), element("div", *first, class_="first"), class_="why")
 
 
 def warnings(page: RunPage) -> Markup | None:
-    """What was doubted before anything moved."""
+    """Warnings from before the run."""
     if not page.warnings:
         return None
     shown = []
-    for one in page.warnings:
-        place = element("span", str(one.place), class_="place") if one.place is not None else None
-        hint = element("p", f"hint: {one.hint}", class_="about") if one.hint else None
-        shown.append(element("div", element("p", f"{one.message} ", place, element("small", f" {one.code}")), hint))
+    for warning in page.warnings:
+        place = element("span", str(warning.place), class_="place") if warning.place is not None else None
+        hint = element("p", f"hint: {warning.hint}", class_="about") if warning.hint else None
+        shown.append(
+            element("div", element("p", f"{warning.message} ", place, element("small", f" {warning.code}")), hint)
+        )
     title = number_of(len(shown), "warning")
-    return element("section", heading("warnings", title, "Told before the run began."), *shown, class_="warned")
+    return element("section", heading("warnings", title, "Reported before the run began."), *shown, class_="warned")
 
 
 def expectations(page: RunPage) -> Markup | None:
-    """Each with its signed margin, in numbers and as a bar."""
+    """Each expectation with its signed margin, as a number and as a bar."""
     if not page.verdict.expectations or page.facts is None:
         return None
     rows = []
-    for one, written, limit in page.judged:
+    for expectation, written, limit in page.judged:
         used: Markup | str = ""
-        if one.margin is not None and limit is not None and limit > 0.0:
-            told = of_limit(limit - one.margin, limit, one.unit)
-            used = joined(meter((limit - one.margin) / limit, told=f"{told} used"), element("small", told))
-        name = joined(element("b", one.name), line_link(written), element("small", one.text))
-        margin = "–" if one.margin is None else signed(one.margin, one.unit)
-        at = seek(one.at, playable=page.playback is not None)
-        rows.append((mark(one.outcome == "passed", one.outcome), name, margin, used, at))
-    headers = ("outcome", "expectation", "margin", "of its limit", "tightest at")
-    about = "The margin is what is left to the limit: + to spare, − short of it; at its tightest moment."
+        if expectation.margin is not None and limit is not None and limit > 0.0:
+            label = of_limit(limit - expectation.margin, limit, expectation.unit)
+            used = joined(meter((limit - expectation.margin) / limit, label=f"{label} used"), element("small", label))
+        name = joined(element("b", expectation.name), line_link(written), element("small", expectation.text))
+        margin = "–" if expectation.margin is None else signed(expectation.margin, expectation.unit)
+        at = seek(expectation.at, playable=page.playback is not None)
+        rows.append((mark(expectation.outcome == "passed", expectation.outcome), name, margin, used, at))
+    headers = ("outcome", "expectation", "margin", "of limit", "tightest at")
+    about = "Margin: distance to the limit at the tightest moment; + is met, − is violated."
     return element(
         "section",
         heading("expectations", "Expectations", about),
@@ -141,7 +142,7 @@ def expectations(page: RunPage) -> Markup | None:
 
 
 def steps(page: RunPage) -> Markup | None:
-    """The steps over time, planned and measured; what each took; a picture of each."""
+    """Planned and measured times of the steps, their energy, and a picture of each."""
     verdict, facts = page.verdict, page.facts
     if not verdict.steps:
         return None
@@ -151,7 +152,7 @@ def steps(page: RunPage) -> Markup | None:
         parts.append(table(("outcome", "step", ""), rows))
     else:
         end = max(facts.end, 1e-9)
-        by_id = {one.id: one for one in facts.steps}
+        by_id = {measured.id: measured for measured in facts.steps}
         timed: list[tuple[str, ...]] = []
         for step, written in page.located_steps:
             took = None if step.started is None or step.ended is None else step.ended - step.started
@@ -174,12 +175,12 @@ def steps(page: RunPage) -> Markup | None:
         headers = ("outcome", "step", f"0 to {facts.end:.2f} s", *columns, "starts at")
         parts.append(table(headers, timed, numbers=columns, stacks=True))
         parts.append(_pictures(page))
-    about = "Outlined: as planned. Filled: as measured, a line where a phase begins." if facts is not None else ""
+    about = "Outline: planned. Filled: measured. Lines: starts of phases." if facts is not None else ""
     return element("section", heading("steps", "Steps", about), *parts)
 
 
 def _outcome(step: StepOutcome) -> Markup:
-    """With the number of attempts, and whether it may fail."""
+    """Outcome of a step, with its number of attempts and whether it may fail."""
     shown = element("span", f"– {step.outcome}, may fail", class_="idle") if step.tolerated else None
     tries = element("small", f"at attempt {len(step.attempts)}") if len(step.attempts) > 1 else None
     return joined(shown or mark(step.outcome == "done", step.outcome), tries)
@@ -192,29 +193,29 @@ def _late(seconds: float) -> str:
 def _step_name(page: RunPage, step: StepOutcome, written: Written) -> Markup:
     shown = _phases(page, step)
     named = element("small", " · ".join(phase.name for phase in shown)) if len(shown) > 1 else None
-    told: Markup | None = None
+    details: Markup | None = None
     if step.text and page.facts is not None:
-        folded = element("details", element("summary", "what it told"), element("small", step.text))
-        told = folded if step.outcome == "done" else element("small", step.text)
-    again = [element("small", f"planned again: {why}") for why in step.replanned]
-    return joined(element("b", step.label), line_link(written), named, *again, told)
+        folded = element("details", element("summary", "details"), element("small", step.text))
+        details = folded if step.outcome == "done" else element("small", step.text)
+    replanned = [element("small", f"re-planned: {why}") for why in step.replanned]
+    return joined(element("b", step.label), line_link(written), named, *replanned, details)
 
 
 def _phases(page: RunPage, step: StepOutcome) -> tuple[Phase, ...]:
-    """Those of a step that is shown; none of another."""
+    """The phases of a step in the replay; empty if it is not shown."""
     shown = page.playback.steps if page.playback is not None else ()
-    return next((one.phases for one in shown if one.id == step.id), ())
+    return next((played.phases for played in shown if played.id == step.id), ())
 
 
 def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
     """One row of the Gantt chart: two bars over the time of the whole run."""
     if step.started is None or step.planned_duration is None:
-        return element("small", "not begun")
+        return element("small", "not started")
     last = end if step.ended is None else step.ended
     scale = 1000.0 / end
     starts = [phase.start for phase in _phases(page, step)[1:]]
     planned = min(step.planned_duration, end - step.started)
-    told = f"{step.id}: planned {step.planned_duration:.2f} s, measured {last - step.started:.2f} s"
+    label = f"{step.id}: planned {step.planned_duration:.2f} s, measured {last - step.started:.2f} s"
     drawn = (
         element("rect", class_="row", x="0", y="0", width="1000", height="26"),
         element("rect", class_="planned", x=step.started * scale, y="3.5", width=max(planned * scale, 2.0), height="8"),
@@ -229,9 +230,9 @@ def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
         *(element("line", x1=at * scale, x2=at * scale, y1="14", y2="23") for at in starts),
     )
     svg = element(
-        "svg", *drawn, class_="gantt", viewBox="0 0 1000 26", preserveAspectRatio="none", role="img", aria_label=told
+        "svg", *drawn, class_="gantt", viewBox="0 0 1000 26", preserveAspectRatio="none", role="img", aria_label=label
     )
-    return element("span", svg, class_="seeks", data_seek=f"{step.started:.6f}", title=told)
+    return element("span", svg, class_="seeks", data_seek=f"{step.started:.6f}", title=label)
 
 
 def _pictures(page: RunPage) -> Markup | None:
@@ -239,27 +240,29 @@ def _pictures(page: RunPage) -> Markup | None:
     for step in page.verdict.steps:
         picture = page.pictures.get(step.id)
         if picture is not None:
-            told = f"{step.id} at {picture.time:.2f} s"
+            label = f"{step.id} at {picture.time:.2f} s"
             caption = element("figcaption", element("b", step.id), f" {picture.time:.2f} s")
             shown.append(
-                element("figure", image(picture, told), caption, data_seek=f"{picture.time:.6f}", title=f"show {told}")
+                element(
+                    "figure", image(picture, label), caption, data_seek=f"{picture.time:.6f}", title=f"show {label}"
+                )
             )
     return element("div", *shown, class_="pictures") if shown else None
 
 
 def sources(page: RunPage) -> Markup | None:
-    """The resolved files, each line with a number to point at."""
+    """The resolved files with line numbers."""
     if not page.sources:
         return None
-    about = "As resolved: defaults, parameters and overrides written out, numbers in SI."
+    about = "Resolved files: defaults, parameters and overrides written out, numbers in SI units."
     shown = [_source(source, page) for source in page.sources]
     return element("section", heading("files", "Files", about if page.facts is not None else ""), *shown)
 
 
 def _source(source: Source, page: RunPage) -> Markup:
-    """Folded, but for the file of a task that was refused; the lines that causes are about are marked."""
+    """A file, folded unless the task was refused; the lines of its causes are marked."""
     lines = source.text.splitlines()
-    marked = {one.written.line for one in page.causes if one.written is not None and one.written.file == source.name}
+    marked = {cause.written.line for cause in page.causes if cause.written and cause.written.file == source.name}
     rows = (
         element("li", element("code", line or " "), id=anchor(source.name, k), class_="marked" if k in marked else None)
         for k, line in enumerate(lines, 1)
@@ -273,7 +276,7 @@ def _source(source: Source, page: RunPage) -> Markup:
 
 
 def provenance(page: RunPage) -> Markup:
-    """Where the run is from: versions, seed, engine, hashes; and what the log lacks."""
+    """Versions, seed, engine and hashes of the run, and notes on what the log lacks."""
     pairs = (element("div", element("dt", name), element("dd", value)) for name, value in page.provenance)
     hashes = [
         (element("code", name), element("code", digest[:SHORT_HASH], title=digest)) for name, digest in page.hashes

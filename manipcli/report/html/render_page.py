@@ -1,4 +1,4 @@
-"""A run as one page for a person: what came of it, why, and where to look. No other file, nothing fetched."""
+"""Self-contained HTML page of a run: verdict, cause, replay, expectations, steps, measurements."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manipcli.report.run_page import RunPage
 
 
 def render_page(page: RunPage) -> str:
-    """The file. The same value gives the same bytes."""
+    """The HTML file; equal pages give equal bytes."""
     facts = page.facts
     measured = (numbers.grasps, numbers.joints, numbers.energy)
     grasps, joints, energy = (section(facts) if facts is not None else None for section in measured)
@@ -49,6 +49,6 @@ def render_page(page: RunPage) -> str:
 def _replay(page: RunPage) -> Markup | None:
     if page.playback is None:
         return None
-    about = "Drag to turn, wheel to come nearer, double click to come back; click a curve or the timeline to go there."
+    about = "Drag to orbit, scroll to zoom, double-click to reset the view; click a curve or the timeline to seek."
     player = Markup(player_html(page.playback))
     return element("section", heading("replay", "Replay", about), joined(player))

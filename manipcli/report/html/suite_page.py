@@ -1,4 +1,4 @@
-"""The page that leads to the pages of many runs: a row each, with verdict, margin, time and cause."""
+"""HTML index of many runs: verdict, margin or cause, and duration of each, with a link to its page."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from manipcli.report.html.page_parts import mark, table
 from manipcli.report.suite.suite import CaseReport, Suite
 from manipcli.report.suite.suite_text import beforehand, gist, render_summary
 
-COLUMNS = ("verdict", "task", "sample", "margin or cause", "took")
+COLUMNS = ("verdict", "task", "sample", "margin or cause", "duration")
 
 
 def render_page(suite: Suite, folder: Path) -> str:
-    """The file `index.html` of a folder; what did not pass comes first.
+    """The file `index.html` of a folder; runs that did not pass come first.
 
     Args:
-        suite: all runs.
-        folder: where the page lies, from which its links lead to the others.
+        suite: the runs.
+        folder: folder of the page; links are relative to it.
     """
     style = Markup(files("manipcli.report.html").joinpath("page", "report.css").read_text("utf-8"))
     passed = sum(report.passed for report in suite.reports)
@@ -34,9 +34,9 @@ def render_page(suite: Suite, folder: Path) -> str:
             element("span", f"{'✓' if good else '✗'} {word}", class_=f"verdict {word}"),
             class_="title",
         ),
-        element("p", render_summary(suite), class_="says"),
+        element("p", render_summary(suite), class_="subtitle"),
     )
-    rows = table(COLUMNS, [_row(one, folder) for one in reports], numbers=("took",), stacks=True)
+    rows = table(COLUMNS, [_row(report, folder) for report in reports], numbers=("duration",), stacks=True)
     title = f"{'✓' if good else '✗'} {passed} of {suite.total} passed"
     return document(title, head, element("main", element("section", rows)), style=style, policy=POLICY)
 

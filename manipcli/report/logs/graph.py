@@ -17,23 +17,23 @@ _BRACKETS: Final[Mapping[Kind, tuple[str, str]]] = {
     "sensor": ("[/", "/]"),
     "topic": ("([", "])"),
 }
-"""Of a label in Mermaid, which give a node its shape; all other kinds are rectangles."""
+"""Brackets of a label in Mermaid, which set the shape of a node; other kinds are rectangles."""
 _SAID: Final = ("task", "controller", "engine", "robot", "scene")
-"""Kinds whose names do not say what they are."""
+"""Kinds whose name is shown with the kind."""
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One that feeds or is fed.
+    """A node of the data-flow graph.
 
     Attributes:
-        id: of its own.
-        kind: what it is.
-        name: as people call it.
-        type: of the messages of a topic.
+        id: unique id.
+        kind: kind of the node.
+        name: shown name.
+        type: message type of a topic.
         details: short facts.
-        items: lines that belong to it: the steps of a task.
-        idle: it does nothing at the start.
+        items: further lines, such as the steps of a task.
+        idle: whether it is inactive at the start.
     """
 
     id: str
@@ -46,7 +46,7 @@ class Node:
 
     @property
     def title(self) -> str:
-        """Its name, and what it is where that says nothing of it."""
+        """Its name, with its kind if the name alone is unclear."""
         return f"{self.kind} {self.name}" if self.kind in _SAID else self.name
 
     @property
@@ -57,7 +57,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """`source` feeds `target` with `label`; `idle`: not at the start; `back`: against the flow, as what is measured."""
+    """Data `label` from `source` to `target`; `idle`: not at the start; `back`: feedback, such as measurements."""
 
     source: str
     target: str
@@ -68,7 +68,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """Nodes in the order of the flow; every edge joins two of them."""
+    """Nodes in the order of the data flow, and edges between them."""
 
     name: str
     nodes: tuple[Node, ...]
@@ -82,7 +82,7 @@ def render(graph: Graph, kind: GraphFormat) -> str:
 
 
 def render_text(graph: Graph) -> str:
-    """A tree: each node stands where it is fed first, and where else it is fed `->` and its name."""
+    """A tree: each node is below its first source; below further sources it is `->` and its name."""
     nodes = {node.id: node for node in graph.nodes}
     feeder: dict[str, Edge] = {}
     for edge in graph.edges:
@@ -97,28 +97,28 @@ def render_text(graph: Graph) -> str:
         shown.add(node.id)
         about = f"  ({', '.join(node.facts)})" if node.facts else ""
         yield f"{first}{node.title}{about}{by}"
-        out = [one for one in graph.edges if one.source == node.id]
+        out = [feed for feed in graph.edges if feed.source == node.id]
         for item in node.items:
             yield f"{rest}{'│ ' if out else '  '}{item}"
-        for k, one in enumerate(out):
+        for k, feed in enumerate(out):
             branch, more = ("└─ ", "   ") if k == len(out) - 1 else ("├─ ", "│  ")
-            if one.target in shown and feeder[one.target] is one:
-                yield f"{rest}{branch}-> {nodes[one.target].title}"  # the circle is closed
+            if feed.target in shown and feeder[feed.target] is feed:
+                yield f"{rest}{branch}-> {nodes[feed.target].title}"  # closes a cycle
             else:
-                yield from below(nodes[one.target], one, rest + branch, rest + more)
+                yield from below(nodes[feed.target], feed, rest + branch, rest + more)
 
     lines = [f"note: {note}" for note in graph.notes]
     for node in graph.nodes:
         if node.id not in feeder:
             lines += below(node, None, "", "")
     for node in graph.nodes:
-        if node.id not in shown:  # of a circle that nothing feeds
+        if node.id not in shown:  # in a cycle without a source
             lines += below(node, None, "", "")
     return "\n".join(lines)
 
 
 def render_mermaid(graph: Graph) -> str:
-    """For Mermaid, as in Markdown of code hosts."""
+    """A Mermaid flowchart, which code hosts render in Markdown."""
     numbers = {node.id: f"n{k}" for k, node in enumerate(graph.nodes)}
     lines = ["flowchart LR"]
     for node in graph.nodes:
@@ -136,8 +136,11 @@ def render_mermaid(graph: Graph) -> str:
 
 
 def _mermaid(text: str) -> str:
-    """Everything that it could read as markup as an entity, by its number."""
-    return "".join(one if one.isalnum() or one in " _-./,:()=…→+" else f"#{ord(one)};" for one in escape(text))
+    """Text with numeric entities for all characters that Mermaid can read as markup."""
+    return "".join(
+        character if character.isalnum() or character in " _-./,:()=…→+" else f"#{ord(character)};"
+        for character in escape(text)
+    )
 
 
 def _label(node: Node) -> tuple[str, ...]:
@@ -145,10 +148,10 @@ def _label(node: Node) -> tuple[str, ...]:
 
 
 def render_json(graph: Graph) -> str:
-    """Nodes and edges as they are."""
+    """Nodes and edges as one JSON object."""
     nodes: list[Json] = [asdict(node) | {"type": node.type or None} for node in graph.nodes]
     edges: list[Json] = [
-        {"source": one.source, "target": one.target, "label": one.label, "idle": one.idle, "feedback": one.back}
-        for one in graph.edges
+        {"source": edge.source, "target": edge.target, "label": edge.label, "idle": edge.idle, "feedback": edge.back}
+        for edge in graph.edges
     ]
     return dumps({"name": graph.name, "nodes": nodes, "edges": edges, "notes": list(graph.notes)})

@@ -1,4 +1,4 @@
-"""Two logs beside each other: what they were made from, how the steps went, what was expected, where they part."""
+"""Differences of two logs: inputs, steps, expectations, and the first differing message."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from manipcli.report.text import FAIL, PASS
 
 _NAMES: Names = ("in a", "in b")
 _UNITS = {"duration": "s", "turned": "rad", "slid": "m", "tool": "m", "force": "N", "work": "J"}
-"""Numbers of a step, and their units."""
+"""Measures of a step and their units."""
 _HEADERS = {
     "duration": "duration",
-    "turned": "joints turned",
-    "slid": "joints slid",
+    "turned": "revolute travel",
+    "slid": "prismatic travel",
     "tool": "tool path",
     "force": "peak force",
     "work": "work",
@@ -53,15 +53,15 @@ class LogSide:
 
 @dataclass(frozen=True, slots=True)
 class LogDiff:
-    """Two logs.
+    """Two compared logs.
 
     Attributes:
-        a, b: their paths.
-        sides: None where one was not written by manipcli.
-        entries: metadata and attachments that differ: what they were made from.
-        messages: of all topics.
-        notes: what cannot be compared, and why.
-        tolerance: of numbers in messages.
+        a, b: paths of the logs.
+        sides: both logs as runs; None if one was not written by manipcli.
+        entries: metadata and attachments that differ, the inputs of the runs.
+        messages: comparison of the messages of all topics.
+        notes: what is not compared, and why.
+        tolerance: tolerance of numbers in messages.
     """
 
     a: str
@@ -74,7 +74,7 @@ class LogDiff:
 
     @property
     def same(self) -> bool:
-        """Whether the same happened: in every message, and by the verdict on it."""
+        """Whether all messages and the verdicts are the same."""
         return self.messages.same and bool(self.messages.topics) and self._judged_alike
 
     @property
@@ -84,90 +84,92 @@ class LogDiff:
         a, b = (side.verdict for side in self.sides)
         if (a.task, a.verdict) != (b.task, b.verdict):
             return False
-        steps = [[(step.id, step.outcome) for step in one.steps] for one in (a, b)]
-        expected = [[(each.name, each.outcome) for each in one.expectations] for one in (a, b)]
+        steps = [[(step.id, step.outcome) for step in verdict.steps] for verdict in (a, b)]
+        expected = [
+            [(expectation.name, expectation.outcome) for expectation in verdict.expectations] for verdict in (a, b)
+        ]
         return steps[0] == steps[1] and expected[0] == expected[1]
 
 
-def render_text(made: LogDiff) -> str:
-    """What they were made from, the steps, the expectations, where they begin to differ, and the answer."""
-    lines = [f"a: {made.a}{_about(made, 0)}", f"b: {made.b}{_about(made, 1)}", ""]
-    lines += [f"note: {note}" for note in made.notes]
-    lines += [f"made from: {line}" for line in entries_lines(made.entries, _NAMES)]
+def render_text(diff: LogDiff) -> str:
+    """Different inputs, steps, expectations, the first difference, and the result."""
+    lines = [f"a: {diff.a}{_about(diff, 0)}", f"b: {diff.b}{_about(diff, 1)}", ""]
+    lines += [f"note: {note}" for note in diff.notes]
+    lines += [f"input: {line}" for line in entries_lines(diff.entries, _NAMES)]
     lines += [""] if lines[-1] else []
-    if made.sides is not None:
-        for each in (_steps(*made.sides), _expectations(*made.sides)):
-            lines += [each, ""] if each else []
-    unlike = [topic for topic in made.messages.topics if not topic.same]
+    if diff.sides is not None:
+        for part in (_steps(*diff.sides), _expectations(*diff.sides)):
+            lines += [part, ""] if part else []
+    unlike = [topic for topic in diff.messages.topics if not topic.same]
     if unlike:
         shown = topics_table(unlike[:MOST_TOPICS], _NAMES)
         lines += [shown, ""]
-    first = made.messages.first
+    first = diff.messages.first
     if first is not None:
         lines.append(f"{FAIL} first difference: {first_text(first, _NAMES)}")
     for topic in unlike:
         if topic.name in (JOINT_STATES, TF) and topic.first is not None and topic.first != first:
             lines.append(f"{FAIL} {topic.name} differs first: {first_text(topic.first, _NAMES)}")
-    lines.append(_answer(made))
+    lines.append(_answer(diff))
     return "\n".join(lines)
 
 
-def _answer(made: LogDiff) -> str:
-    if not made.messages.topics:
+def _answer(diff: LogDiff) -> str:
+    if not diff.messages.topics:
         return f"{FAIL} different"
-    if not made.messages.same:
-        more = f", numbers by more than {made.tolerance:g}" if made.tolerance else ""
-        return f"{FAIL} different{more}: {counted(made.messages)}"
-    within = f" within {made.tolerance:g}" if made.tolerance else ""
-    if made.same:
-        judged = ", and the verdict on them" if made.sides else ""
-        return f"{PASS} no difference{within}: {number_of(made.messages.messages, 'message')}{judged}"
-    return f"{FAIL} different: the messages are the same{within}, the verdict on them is not"
+    if not diff.messages.same:
+        more = f", numbers by more than {diff.tolerance:g}" if diff.tolerance else ""
+        return f"{FAIL} different{more}: {counted(diff.messages)}"
+    within = f" within {diff.tolerance:g}" if diff.tolerance else ""
+    if diff.same:
+        judged = ", same verdict" if diff.sides else ""
+        return f"{PASS} no difference{within}: {number_of(diff.messages.messages, 'message')}{judged}"
+    return f"{FAIL} different: same messages{within}, different verdict"
 
 
-def render_json(made: LogDiff) -> str:
-    """The same as one object; numbers are SI."""
+def render_json(diff: LogDiff) -> str:
+    """The comparison as one JSON object; numbers are SI."""
     return dumps(
         {
-            "a": made.a,
-            "b": made.b,
-            "same": made.same,
-            "tolerance": made.tolerance,
-            "notes": list(made.notes),
-            "made_from": plain(made.entries),
-            "runs": None if made.sides is None else [_side_object(side) for side in made.sides],
-            "steps": [] if made.sides is None else [_pair_object(a, b) for a, b in _paired(*made.sides)],
-            **messages_object(made.messages),
+            "a": diff.a,
+            "b": diff.b,
+            "same": diff.same,
+            "tolerance": diff.tolerance,
+            "notes": list(diff.notes),
+            "made_from": plain(diff.entries),
+            "runs": None if diff.sides is None else [_side_object(side) for side in diff.sides],
+            "steps": [] if diff.sides is None else [_pair_object(a, b) for a, b in _paired(*diff.sides)],
+            **messages_object(diff.messages),
         }
     )
 
 
-def _about(made: LogDiff, k: int) -> str:
-    if made.sides is None:
+def _about(diff: LogDiff, k: int) -> str:
+    if diff.sides is None:
         return ""
-    side = made.sides[k]
+    side = diff.sides[k]
     versions = ", ".join(f"{name} {version}" for name, version in side.versions.items())
     return f"  ({side.task} {side.verdict.verdict}, robot {side.robot}, seed {side.verdict.seed}, {versions})"
 
 
 def _paired(a: LogSide, b: LogSide) -> list[tuple[StepMeasures | None, StepMeasures | None]]:
-    """Steps of one id, in the order of the first log; then those of the second alone."""
+    """Steps with the same id, in the order of the first log; then steps of the second log alone."""
     of_b = {step.id: step for step in b.steps}
-    pairs: list[tuple[StepMeasures | None, StepMeasures | None]] = [(one, of_b.get(one.id)) for one in a.steps]
-    known = {one.id for one in a.steps}
-    return pairs + [(None, one) for one in b.steps if one.id not in known]
+    pairs: list[tuple[StepMeasures | None, StepMeasures | None]] = [(step, of_b.get(step.id)) for step in a.steps]
+    known = {step.id for step in a.steps}
+    return pairs + [(None, step) for step in b.steps if step.id not in known]
 
 
 def _steps(a: LogSide, b: LogSide) -> str:
     rows = []
-    for one, other in _paired(a, b):
-        step = one or other
+    for first, second in _paired(a, b):
+        step = first or second
         assert step is not None
-        if one is None or other is None:
-            rows.append([step.id, f"{step.outcome} in {'a' if other is None else 'b'} alone", *[""] * len(_UNITS)])
+        if first is None or second is None:
+            rows.append([step.id, f"{step.outcome} only in {'a' if second is None else 'b'}", *[""] * len(_UNITS)])
             continue
-        outcome = one.outcome if one.outcome == other.outcome else f"{one.outcome}, then {other.outcome}"
-        cells = [_change(getattr(one, key), getattr(other, key), unit) for key, unit in _UNITS.items()]
+        outcome = first.outcome if first.outcome == second.outcome else f"{first.outcome}, then {second.outcome}"
+        cells = [_change(getattr(first, key), getattr(second, key), unit) for key, unit in _UNITS.items()]
         rows.append([step.id, outcome.replace("_", " "), *cells])
     if not rows:
         return ""
@@ -177,10 +179,10 @@ def _steps(a: LogSide, b: LogSide) -> str:
 
 
 def _change(a: float | None, b: float | None, unit: str) -> str:
-    """`3.21 s`, where it differs with how much is added: `3.21 s +0.04`."""
+    """`3.21 s`; with the difference, if there is one: `3.21 s +0.04`."""
     if a is None or b is None:
         return "" if a is b else f"{_plain(a, unit)}, {_plain(b, unit)}"
-    # Sums of thousands of numbers differ in their last digits with the chunks of the files.
+    # The last digits of a sum over thousands of messages depend on the chunks of the file.
     return _plain(a, unit) if abs(b - a) <= ROUNDING * abs(a) else f"{_plain(a, unit)} {b - a:+.2g}"
 
 
@@ -189,22 +191,23 @@ def _plain(value: float | None, unit: str) -> str:
 
 
 def _expectations(a: LogSide, b: LogSide) -> str:
-    """The first of a name beside the first of that name, and so on."""
+    """Table of the expectations of both logs; equal names are paired in their order."""
     found: dict[tuple[str, int], list[str]] = {}
     for k, side in enumerate((a, b)):
         seen: dict[str, int] = {}
-        for one in side.verdict.expectations:
-            seen[one.name] = seen.get(one.name, 0) + 1
-            found.setdefault((one.name, seen[one.name]), ["", ""])[k] = _met(one)
+        for expectation in side.verdict.expectations:
+            seen[expectation.name] = seen.get(expectation.name, 0) + 1
+            found.setdefault((expectation.name, seen[expectation.name]), ["", ""])[k] = _met(expectation)
     rows = [[name, *both] for (name, _), both in found.items()]
     return table(["expectation", "in a", "in b"], rows) if rows else ""
 
 
-def _met(one: ExpectationOutcome) -> str:
-    word = one.outcome.replace("_", " ")
-    if not one.distance:
+def _met(expectation: ExpectationOutcome) -> str:
+    word = expectation.outcome.replace("_", " ")
+    if not expectation.distance:
         return word
-    return f"{word}, {quantity(one.distance, one.unit)} {'to spare' if one.outcome == 'passed' else 'beyond'}"
+    size = quantity(expectation.distance, expectation.unit)
+    return f"{word}, {size} {'to spare' if expectation.outcome == 'passed' else 'beyond'}"
 
 
 def _side_object(side: LogSide) -> Json:
@@ -216,8 +219,13 @@ def _side_object(side: LogSide) -> Json:
         "versions": dict(side.versions),
         "simulated_time": number(side.verdict.simulated_time),
         "expectations": [
-            {"name": one.name, "outcome": one.outcome, "margin": number(one.margin), "unit": one.unit}
-            for one in side.verdict.expectations
+            {
+                "name": expectation.name,
+                "outcome": expectation.outcome,
+                "margin": number(expectation.margin),
+                "unit": expectation.unit,
+            }
+            for expectation in side.verdict.expectations
         ],
     }
 

@@ -1,4 +1,4 @@
-"""What a log holds, for people and for programs: verdict, steps, topics, attachments, and what is missing."""
+"""Content of a log as text and JSON: verdict, steps, topics, attachments, and missing parts."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from manipcli.report.text import FAIL, PASS, steps_table
 
 @dataclass(frozen=True, slots=True)
 class LogInfo:
-    """What can be told of a log without judging it.
+    """Content of a log, without judging it.
 
     Attributes:
-        found: the file as an MCAP file.
+        found: topics, metadata and attachments of the MCAP file.
         ours: whether manipcli wrote it.
-        steps: how they went; empty where the file does not say.
-        missing: what a log of a finished run has and this one lacks, or what is damaged; a sentence each.
+        steps: outcomes of the steps; empty if the log has none.
+        missing: parts that are missing compared to the log of a finished run, or damaged; one sentence each.
     """
 
     found: Topics
@@ -37,17 +37,17 @@ class LogInfo:
 
     @property
     def verdict(self) -> Mapping[str, str]:
-        """The verdict that the run stored; empty where there is none."""
+        """Stored verdict of the run; empty without one."""
         return self.found.metadata.get("verdict", {})
 
     @property
     def versions(self) -> Mapping[str, str]:
-        """Of manipcli and of the engine."""
+        """Versions of manipcli and of the engine."""
         return self.found.metadata.get("versions", {})
 
     @property
     def cuts(self) -> Saturations:
-        """What was asked for more than it can give."""
+        """Saturated joints and actuators."""
         try:
             period = float(self.run.get("period", ""))
         except ValueError:
@@ -56,14 +56,14 @@ class LogInfo:
 
     @property
     def size_per_minute(self) -> float | None:
-        """[byte] a minute of the log; None where it has no length."""
+        """Size per minute of recorded time [byte]; None for a duration of zero."""
         return 60.0 * self.found.size / self.found.duration if self.found.duration > 0.0 else None
 
 
 def render_text(info: LogInfo) -> str:
-    """The verdict first, then the steps, then what there is."""
+    """Missing parts, steps, topics, attachments, and the stored verdict."""
     found = info.found
-    lines = [f"missing: {one}" for one in info.missing]
+    lines = [f"missing: {text}" for text in info.missing]
     if lines:
         lines.append("")
     if info.steps:
@@ -80,14 +80,14 @@ def render_text(info: LogInfo) -> str:
         ]
     meshes, embedded = len(found.metadata.get("meshes", {})), len(found.metadata.get(EMBEDDED, {}))
     if meshes:
-        held = "all of them in the log" if embedded >= meshes else f"{embedded} of them in the log"
-        lines += ["", f"{meshes} meshes, {'none of them in the log' if not embedded else held}"]
+        held = "all embedded in the log" if embedded >= meshes else f"{embedded} embedded in the log"
+        lines += ["", f"{meshes} meshes, {'not embedded in the log' if not embedded else held}"]
     lines += ["", _headline(info), *([str(info.cuts)] if str(info.cuts) else []), _length(info)]
     return "\n".join([*lines, f"log: {found.path}"])
 
 
 def render_json(info: LogInfo) -> str:
-    """The same as one object; numbers are SI, sizes bytes."""
+    """The content as one JSON object; numbers are SI, sizes in bytes."""
     found = info.found
     return dumps(
         {
@@ -118,7 +118,8 @@ def render_json(info: LogInfo) -> str:
                 for topic in _by_name(found)
             ],
             "attachments": [
-                {"name": one.name, "media_type": one.media_type, "size": one.size} for one in found.attachments
+                {"name": attachment.name, "media_type": attachment.media_type, "size": attachment.size}
+                for attachment in found.attachments
             ],
             "meshes": _meshes(found),
             "missing": list(info.missing),
@@ -136,22 +137,22 @@ def _meshes(found: Topics) -> Json:
 
 def _headline(info: LogInfo) -> str:
     if not info.ours:
-        return f"a log of {info.found.library or 'an unknown writer'}, profile '{info.found.profile}'"
+        return f"log written by {info.found.library or 'an unknown writer'}, profile '{info.found.profile}'"
     task = info.run.get("task", "")
     if not info.verdict:
-        return f"{FAIL} {task}: no verdict is stored"
+        return f"{FAIL} {task}: no stored verdict"
     word, why = info.verdict.get("verdict", ""), info.verdict.get("text", "")
     stored = f"{task} {word}: {why}"
     if info.missing:
-        return f"{FAIL} the verdict stored is that of the whole log: {stored}"
-    return f"{PASS if word == 'passed' else FAIL} {stored} (as stored; `manipcli judge` judges it again)"
+        return f"{FAIL} stored verdict of the complete log: {stored}"
+    return f"{PASS if word == 'passed' else FAIL} {stored} (stored; `manipcli judge` recomputes it)"
 
 
 def _length(info: LogInfo) -> str:
     found = info.found
     parts = [f"{found.duration:.2f} s", data_size(found.size)]
     if info.size_per_minute is not None:
-        parts.append(f"{data_size(round(info.size_per_minute))} a minute")
+        parts.append(f"{data_size(round(info.size_per_minute))} per minute")
     text = ", ".join(parts)
     if info.ours:
         run, versions = info.run, info.versions
@@ -180,10 +181,9 @@ def _by_name(found: Topics) -> list[Topic]:
 
 
 def _seconds(ns: int, of: Topic | Topics) -> Json:
-    """None where there is no message."""
     return number(ns / 1e9) if of.count else None
 
 
 def _until(topic: Topic, found: Topics) -> str:
-    """From the beginning of the log: other programs count from 1970."""
+    """Time of the last message from the beginning of the log, since other programs count from 1970."""
     return f"{(topic.last - found.start) / 1e9:.2f} s" if topic.count else ""

@@ -1,4 +1,4 @@
-"""What became of a log that was repaired."""
+"""Result of repairing a log, as text and JSON."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from manipcli.report.json import dumps
 
 
 def render_text(done: Repaired) -> str:
-    """What is lost, then what is kept."""
+    """Losses, then what is kept."""
     lines = [f"lost {loss}" for loss in done.losses]
     if done.messages_lost:
-        lines.append(f"lost in all: {done.messages_lost} of {done.messages + done.messages_lost} messages")
+        lines.append(f"lost in total: {done.messages_lost} of {done.messages + done.messages_lost} messages")
     span = "" if done.start is None or done.end is None else f", t = {done.start:.3f} s to {done.end:.3f} s"
     lines.append(f"kept: {done.messages} messages{span}; {len(done.attachments)} attachments")
-    lines.append("nothing was lost" if not done.losses else "the repaired log says of itself what it lacks")
+    lines.append("nothing was lost" if not done.losses else "the repaired log records these losses in its metadata")
     return "\n".join([*lines, f"log: {done.output}"])
 
 
 def render_json(done: Repaired) -> str:
-    """The same as one object; times in s."""
+    """The result as one JSON object; times in s."""
     return dumps(
         {
             "log": str(done.path),

@@ -1,4 +1,4 @@
-"""A log at one moment, for people and for programs."""
+"""State in a log at one time, as text and JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _EFFORT = {"rad": "N m", "m": "N"}
 
 @dataclass(frozen=True, slots=True)
 class JointMoment:
-    """A joint: SI, in `unit` (rad or m; empty where nobody says what it is); None for what is not recorded."""
+    """State of a joint in SI units, with `unit` rad or m ("" if unknown); None for values that are not recorded."""
 
     name: str
     unit: str
@@ -35,7 +35,7 @@ class JointMoment:
 
 @dataclass(frozen=True, slots=True)
 class PoseMoment:
-    """A body or frame: its pose in `parent`, and its speed [m/s] where that is known."""
+    """A body or frame: its pose in `parent`, and its speed [m/s] or None."""
 
     name: str
     parent: str
@@ -45,18 +45,18 @@ class PoseMoment:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What a log says of one time.
+    """State in a log at one time.
 
     Attributes:
-        log: path, as text.
-        asked: [s] from the beginning of the log.
-        time: [s] of the state that is told, the last one not behind `asked`.
-        end: [s] of the log.
-        step, verb, phase: what was on; empty where nothing was.
-        contacts: None where the log does not tell of contacts.
-        missing: what cannot be told, a sentence each.
+        log: path of the log.
+        asked: requested time [s] from the beginning of the log.
+        time: time [s] of the state, the last one not after `asked`.
+        end: end of the log [s].
+        step, verb, phase: active step and phase; empty without one.
+        contacts: contacts; None if the log does not record them.
+        missing: parts that are not known, one sentence each.
         ours: whether manipcli wrote the log.
-        tool: of the robot; None where the log does not say what it is.
+        tool: pose of the tool frame; None if the log does not define it.
     """
 
     log: str
@@ -75,12 +75,12 @@ class Moment:
 
 
 def render_text(moment: Moment) -> str:
-    """When, in which step, and then joints, bodies and contacts; customary units, radians in brackets."""
-    lines = [f"missing: {one}" for one in moment.missing]
+    """Time and step, then joints, bodies and contacts; in customary units, with radians in parentheses."""
+    lines = [f"missing: {text}" for text in moment.missing]
     if lines:
         lines.append("")
     when = f"t = {moment.time:.3f} s of {moment.end:.3f} s"
-    idle = ": no step is on" if moment.ours else ""
+    idle = ": no active step" if moment.ours else ""
     on = f": step '{moment.step}' ({moment.verb})" if moment.step else idle
     phase = f", phase '{moment.phase}'" if moment.phase else ""
     lines.append(when + on + phase)
@@ -91,12 +91,12 @@ def render_text(moment: Moment) -> str:
     if moment.poses:
         lines += ["", _poses(moment.poses, "body")]
     if moment.contacts is not None:
-        lines += ["", _contacts(moment.contacts) if moment.contacts else "nothing touches"]
+        lines += ["", _contacts(moment.contacts) if moment.contacts else "no contacts"]
     return "\n".join(lines)
 
 
 def render_json(moment: Moment) -> str:
-    """The same as one object; numbers are SI."""
+    """The state as one JSON object; numbers are SI."""
     contacts: Json = None
     if moment.contacts is not None:
         contacts = [
@@ -124,20 +124,20 @@ def render_json(moment: Moment) -> str:
                 for joint in moment.joints
             ],
             "tool": None if moment.tool is None else _pose_json(moment.tool),
-            "poses": [_pose_json(each) for each in moment.poses],
+            "poses": [_pose_json(pose) for pose in moment.poses],
             "contacts": contacts,
             "missing": list(moment.missing),
         }
     )
 
 
-def _pose_json(each: PoseMoment) -> Json:
+def _pose_json(pose: PoseMoment) -> Json:
     return {
-        "name": each.name,
-        "parent": each.parent,
-        "xyz": [number(value) for value in each.pose.p],
-        "quat_xyzw": [number(value) for value in each.pose.quat_xyzw],
-        "speed": number(each.speed),
+        "name": pose.name,
+        "parent": pose.parent,
+        "xyz": [number(value) for value in pose.pose.p],
+        "quat_xyzw": [number(value) for value in pose.pose.quat_xyzw],
+        "speed": number(pose.speed),
     }
 
 
@@ -163,10 +163,10 @@ def _joints(joints: tuple[JointMoment, ...]) -> str:
 
 def _poses(poses: tuple[PoseMoment, ...], what: str) -> str:
     rows = []
-    for each in poses:
-        xyz = ", ".join(_fixed(1000.0 * value, 2) for value in each.pose.p)
-        rpy = ", ".join(_fixed(math.degrees(value), 2) for value in each.pose.rpy)
-        rows.append([each.name, each.parent, f"{xyz} mm", f"{rpy} deg", _shown(each.speed, "m/s")])
+    for pose in poses:
+        xyz = ", ".join(_fixed(1000.0 * value, 2) for value in pose.pose.p)
+        rpy = ", ".join(_fixed(math.degrees(value), 2) for value in pose.pose.rpy)
+        rows.append([pose.name, pose.parent, f"{xyz} mm", f"{rpy} deg", _shown(pose.speed, "m/s")])
     header = [what, "in", "x, y, z", "roll, pitch, yaw", "speed"]
     used = [k for k in range(len(header)) if k == 0 or any(row[k] for row in rows)]
     return table([header[k] for k in used], [[row[k] for k in used] for row in rows], right=["speed"])
@@ -178,7 +178,7 @@ def _contacts(contacts: tuple[Contact, ...]) -> str:
 
 
 def _shown(value: float | None, unit: str) -> str:
-    """In the customary unit, with as many digits as its column: what is nearly nothing reads as zero."""
+    """A value in its customary unit with fixed decimals; a value near zero is shown as zero."""
     if value is None:
         return ""
     name, scale = CUSTOMARY.get(unit, (unit, 1.0))
@@ -186,7 +186,7 @@ def _shown(value: float | None, unit: str) -> str:
 
 
 def _fixed(value: float, digits: int) -> str:
-    """Without the sign of what is rounded to zero; of what is no length or angle of this world, the power of ten."""
+    """Fixed decimals without a negative zero; exponent notation for values that are not plausible."""
     if abs(value) >= _HUGE:
         return f"{value:.4g}"
     return f"{round(value, digits) + 0.0:.{digits}f}"

@@ -1,4 +1,4 @@
-"""A log that was simulated again: what came of it, for people and for programs."""
+"""Result of re-simulating a log (`replay --verify`), as text and JSON."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from manipcli.report.logs.comparison import (
 )
 from manipcli.report.text import FAIL, PASS
 
-_NAMES: Names = ("in the log", "again")
+_NAMES: Names = ("in the log", "in the re-run")
 
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """What came of simulating a log again.
+    """Comparison of a log with its re-simulation.
 
     Attributes:
-        log: its path.
-        versions: of what simulated it again.
-        messages: of all topics of the log and of the second one; `a` is the log.
+        log: path of the log.
+        versions: versions that re-simulated it.
+        messages: comparison of all topics; `a` is the log, `b` the re-run.
         entries: metadata and attachments that differ.
-        unlike: versions and meshes that are not those of the run.
-        cut: why the log does not go to the end of its run; until then it is compared. "" where it does.
-        wall_time: [s].
+        unlike: versions and meshes that differ from those of the run.
+        cut: why the log is incomplete; it is compared up to its end. "" for a complete log.
+        wall_time: wall time of the verification [s].
     """
 
     log: str
@@ -47,46 +47,48 @@ class Verification:
 
     @property
     def identical(self) -> bool:
-        """Whether everything in the log came out again."""
+        """Whether the re-run is identical to the log."""
         return self.messages.same and not self.entries
 
 
-def render_text(made: Verification) -> str:
-    """What differs first, then where, then the verdict."""
+def render_text(result: Verification) -> str:
+    """First difference, differing topics and entries, and the result."""
     lines = []
-    first = made.messages.first
+    first = result.messages.first
     if first is not None:
         lines += [f"{FAIL} first difference: {first_text(first, _NAMES)}", ""]
-    if not made.messages.same:
-        lines.append(topics_table(made.messages.topics, _NAMES))
-    lines += [f"{FAIL} {line}" for line in entries_lines(made.entries, _NAMES)]
+    if not result.messages.same:
+        lines.append(topics_table(result.messages.topics, _NAMES))
+    lines += [f"{FAIL} {line}" for line in entries_lines(result.entries, _NAMES)]
     lines += [""] if lines else []
-    lines += [f"not as it was in the run: {finding.message}" for finding in made.unlike]
-    if made.cut:
-        lines.append(f"the log does not go to the end of its run, and is compared as far as it goes: {made.cut}")
-    topics = sum(1 for topic in made.messages.topics if topic.messages[0])
-    held = f"{number_of(made.messages.messages, 'message')} of {number_of(topics, 'topic')}, {made.messages.end:.2f} s"
-    if made.identical:
-        lines.append(f"{PASS} identical: {held}{'' if made.cut else ', and all metadata and attachments'}")
+    lines += [f"differs from the run: {finding.message}" for finding in result.unlike]
+    if result.cut:
+        lines.append(f"the log is incomplete and compared up to its end: {result.cut}")
+    topics = sum(1 for topic in result.messages.topics if topic.messages[0])
+    held = (
+        f"{number_of(result.messages.messages, 'message')} of {number_of(topics, 'topic')}, {result.messages.end:.2f} s"
+    )
+    if result.identical:
+        lines.append(f"{PASS} identical: {held}{'' if result.cut else ', and all metadata and attachments'}")
     else:
-        lines.append(f"{FAIL} different: {counted(made.messages)}; the log has {held}")
-    by = ", ".join(f"{name} {version}" for name, version in made.versions.items())
-    lines.append(f"simulated again by {by}, in {made.wall_time:.2f} s")
-    return "\n".join([*lines, f"log: {made.log}"])
+        lines.append(f"{FAIL} different: {counted(result.messages)}; the log has {held}")
+    by = ", ".join(f"{name} {version}" for name, version in result.versions.items())
+    lines.append(f"re-simulated with {by} in {result.wall_time:.2f} s")
+    return "\n".join([*lines, f"log: {result.log}"])
 
 
-def render_json(made: Verification) -> str:
-    """The same as one object."""
+def render_json(result: Verification) -> str:
+    """The result as one JSON object."""
     return dumps(
         {
-            "log": made.log,
-            "identical": made.identical,
-            "complete": not made.cut,
-            "cut": made.cut or None,
-            "versions": dict(made.versions),
-            "unlike": plain(made.unlike),
-            **messages_object(made.messages),
-            "entries": plain(made.entries),
-            "wall_time": number(made.wall_time),
+            "log": result.log,
+            "identical": result.identical,
+            "complete": not result.cut,
+            "cut": result.cut or None,
+            "versions": dict(result.versions),
+            "unlike": plain(result.unlike),
+            **messages_object(result.messages),
+            "entries": plain(result.entries),
+            "wall_time": number(result.wall_time),
         }
     )

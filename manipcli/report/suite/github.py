@@ -1,4 +1,4 @@
-"""Workflow commands of GitHub Actions, which show a failure beside the line that it is about."""
+"""Failures as workflow commands of GitHub Actions, which annotate the lines of the files."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from manipcli.report.suite.suite_text import once_a_file
 
 
 def render_annotations(reports: Sequence[CaseReport], *, workspace: Path | None = None) -> str:
-    """`::error file=...,line=...,col=...,title=...::message`, a line each trouble.
+    """`::error file=...,line=...,col=...,title=...::message`, one line per trouble.
 
     Args:
-        reports: those that passed give nothing.
-        workspace: the checkout that GitHub shows, to which the names of files are made relative.
+        reports: the runs; a passed one has no annotation.
+        workspace: root of the checkout; file names are made relative to it.
     """
     return "\n".join(
         _command(report, trouble, workspace)
@@ -27,12 +27,12 @@ def render_annotations(reports: Sequence[CaseReport], *, workspace: Path | None 
 
 
 def _command(report: CaseReport, trouble: Trouble, workspace: Path | None) -> str:
-    """At the line of the trouble; what has none, as a word of the command line, is told with the task."""
+    """Annotation at the line of the trouble; without a line, at the line of the task."""
     place, message = trouble.place, trouble.message
     if place is None or place.line == 0:
         message = message if place is None else f"{place}: {message}"
         place = Place(report.case.file, 1, 1)
-    # A file outside of the checkout keeps a name that nothing there has.
+    # A file outside the checkout keeps its absolute name.
     file = place.file if workspace is None else os.path.relpath(place.file, workspace)
     words = {
         "file": file,

@@ -1,4 +1,4 @@
-"""What many runs give: a case each, what came of it, and where to look if it did not pass."""
+"""Results of many runs: the case, outcome, causes and kept files of each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manipcli.judge.verdict import ExpectationOutcome
 from manipcli.report.run_report import RunReport
 
 CaseWord = Literal["passed", "failed", "error", "invalid", "crashed", "hung"]
-"""`error`: there is no verdict, and neither the file nor a crash is why; `invalid`: nothing was run."""
+"""`error`: no verdict, for a reason other than the file or a crash; `invalid`: the file is invalid, nothing was run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,13 +21,13 @@ class Case:
     """One run of one task.
 
     Attributes:
-        file: the task file, as it is shown.
-        task: its name; of a file that cannot be read, that of the file.
-        sample: of its `vary:`; None for the task as it is written.
-        tags: of the task, and `engine_<name>`.
+        file: path of the task file, as shown.
+        task: name of the task; the name of the file if it cannot be read.
+        sample: number of the sample of its `vary:`; None for the task as written.
+        tags: tags of the task, and `engine_<name>`.
         varied: whether the task has a `vary:`.
-        findings: why the file cannot be read.
-        line: of the key `task`, from 1.
+        findings: errors of the file.
+        line: line of the key `task`, from 1.
     """
 
     file: str
@@ -51,7 +51,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """One reason why a case did not pass. `at` [s] of the run; None where it has no time."""
+    """One reason why a case did not pass. `at` is in s of the run; None if it has no time."""
 
     message: str
     place: Place | None = None
@@ -60,18 +60,18 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True)
 class CaseReport:
-    """What came of a case.
+    """Result of a case.
 
     Attributes:
-        text: why it did not pass, in a line, where no step or expectation says it.
-        run: None where there is no verdict.
-        findings: why nothing was run.
+        text: why the case did not pass, in one line, if no step or expectation is the cause.
+        run: the run; None without a verdict.
+        findings: errors because of which nothing was run.
         troubles: what went wrong, the first cause first.
-        warnings: what was doubted before the run began.
-        duration: wall time [s], without what it took to draw and write about the run.
-        log, picture, page, output: files that were kept; `output` is what a process said that did not come to its end.
-        command: what does the same again.
-        notes: what could not be made of it.
+        warnings: warnings from before the run.
+        duration: wall time [s], without the pictures and reports.
+        log, picture, page, output: kept files; `output` is the output of a process that crashed or hung.
+        command: shell command that reproduces the case.
+        notes: files that could not be written.
     """
 
     case: Case
@@ -95,28 +95,33 @@ class CaseReport:
 
     @property
     def drawn(self) -> Drawn | None:
-        """Of a sample, its values."""
+        """Drawn values of a sample; None for the task as written."""
         return self.run.verdict.drawn if self.run is not None else None
 
     @property
     def tightest(self) -> ExpectationOutcome | None:
-        """The expectation with the smallest margin over its tolerance; None where there is none.
+        """The expectation with the smallest margin relative to its tolerance; None without a margin.
 
-        What is met without a margin to speak of, as what never touched, counts only where there is nothing else.
+        An expectation that is met with a zero margin is taken only if there is no other.
         """
         judged = self.run.verdict.expectations if self.run is not None else ()
-        known = [one for one in judged if one.relative is not None]
-        return min(known, key=lambda one: (one.outcome == "passed", not one.distance, one.relative), default=None)
+        known = [expectation for expectation in judged if expectation.relative is not None]
+        return min(
+            known,
+            key=lambda expectation: (expectation.outcome == "passed", not expectation.distance, expectation.relative),
+            default=None,
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """All of it.
+    """Results of all cases.
 
     Attributes:
-        total: how many there were to run.
-        stopped: why some were not; `undone`: which.
-        notes: what else to know.
+        total: number of cases to run.
+        stopped: why cases were not run.
+        undone: the cases that were not run.
+        notes: further remarks.
     """
 
     reports: tuple[CaseReport, ...]
@@ -129,7 +134,7 @@ class Suite:
 
     @property
     def exit_code(self) -> ExitCode:
-        """As documented: of several, the first of interrupted, invalid, failed."""
+        """Exit code: interrupted before invalid before failed."""
         words = {report.outcome for report in self.reports}
         if self.stopped == "interrupted":
             return ExitCode.INTERRUPTED
@@ -149,14 +154,18 @@ def signal_name(number: int) -> str:
 
 
 def troubles_of(findings: Sequence[Diagnostic]) -> tuple[Trouble, ...]:
-    """Why a file cannot be used, as troubles: its errors."""
+    """The errors among the findings, as troubles."""
     return tuple(
-        Trouble(f"{one.severity}[{one.code}]: {one.message}{f' (hint: {one.hint})' if one.hint else ''}", one.place)
-        for one in findings
-        if one.severity == "error"
+        Trouble(
+            f"{finding.severity}[{finding.code}]: {finding.message}"
+            + (f" (hint: {finding.hint})" if finding.hint else ""),
+            finding.place,
+        )
+        for finding in findings
+        if finding.severity == "error"
     )
 
 
 def doubts_of(findings: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """What there is to say of a file that keeps nobody from using it."""
-    return tuple(one for one in findings if one.severity != "error")
+    """The findings that are not errors."""
+    return tuple(finding for finding in findings if finding.severity != "error")

@@ -1,4 +1,4 @@
-"""Many runs, for programs: one object; the `run` of each case is as `manipcli run --format json` gives it."""
+"""JSON output of many runs; the `run` of each case is the object of `manipcli run --format json`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manipcli.report.suite.suite import CaseReport, Suite
 
 
 def render_suite(suite: Suite) -> str:
-    """The object. `verdict`: `passed`, `failed` or, where something was not run, `error`."""
+    """The JSON object; `verdict` is `passed`, `failed`, or `error` if a case was not run."""
     good = all(report.passed for report in suite.reports)
     whole = len(suite.reports) == suite.total and suite.total > 0
     return dumps(
@@ -42,8 +42,11 @@ def _case(report: CaseReport) -> Json:
         "tightest": None
         if tightest is None
         else {"name": tightest.name, "margin": number(tightest.margin), "unit": tightest.unit},
-        "troubles": [{"message": one.message, "at": number(one.at), **_place(one.place)} for one in report.troubles],
-        "warnings": [finding_object(one) for one in report.warnings],
+        "troubles": [
+            {"message": trouble.message, "at": number(trouble.at), **_place(trouble.place)}
+            for trouble in report.troubles
+        ],
+        "warnings": [finding_object(warning) for warning in report.warnings],
         "run": json.loads(render_run(report.run)) if report.run is not None else None,
         "log": report.log,
         "picture": report.picture,
