@@ -21,7 +21,7 @@ from manipcli.plan.outline import PLAN_FILE, PlanOutline
 from manipcli.record.attachments import CONTROLLERS, ROBOT, TASK
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
-from manipcli.replay.frames import Frames, telling
+from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import RATE, Playback
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
@@ -68,7 +68,7 @@ def log_page(
     page = _page(recording, path, verdict, end=playback.end)
     worst = page.causes[0].at if page.causes else None
     with Frames(playback, size=PICTURE, captions=False) as frames:
-        pictures = {step.id: _picture(frames, telling(playback, step)) for step in playback.steps}
+        pictures = {step.id: _picture(frames, clearest_time(playback, step)) for step in playback.steps}
         moment = _picture(frames, worst) if worst is not None else None
     return replace(
         page,

@@ -124,7 +124,7 @@ def test_at_tells_joints_bodies_and_the_step(log: Path, capsys: pytest.CaptureFi
     assert found["step"] is None
     assert found["contacts"] == []
     assert main(["at", str(log), "1000"]) == 4
-    assert "there is nothing at 1000 s" in capsys.readouterr().err
+    assert "1000 s is outside the log wave.mcap" in capsys.readouterr().err
     for word in ("soon", "3 mm", "nan"):
         assert main(["at", str(log), word]) == 4
 
@@ -184,7 +184,7 @@ def test_somebody_else_s_log_is_told_as_far_as_it_goes(tmp_path: Path, capsys: p
     assert "lift   200.000 mm" in capsys.readouterr().out
     assert main(["info", str(path)]) == 0
     text = capsys.readouterr().out
-    assert "missing: manipcli did not write it" in text
+    assert "missing: not written by manipcli" in text
     assert "/joint_states" in text
 
 

@@ -102,7 +102,7 @@ def test_the_axes_of_a_vector_share_a_panel_and_words_with_commas_too(log: Path)
 @pytest.mark.slow
 def test_a_word_without_a_value_is_told(log: Path) -> None:
     chart = open_chart([log], ["joint_states.position[joint_1]", "contacts.force"])
-    assert chart.notes == ("there is no value of contacts.force in that time",)
+    assert chart.notes == ("no value of contacts.force in this time range",)
     assert len(chart.panels) == 1
 
 
@@ -127,11 +127,11 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["joint_states.positions"], "PLOT002", "did you mean 'position'?"),
         (["joint_states.position[jiont_1]"], "PLOT002", "did you mean 'joint_1'?"),
         (["task/events.kind"], "PLOT002", "none of its fields is a number"),
-        (["--from", "move_9"], "PLOT003", "neither a time nor a step"),
-        (["--from", "2 m"], "PLOT003", "neither a time nor a step"),
-        (["--from", "0.3", "--to", "0.2"], "PLOT003", "nothing lies between"),
-        (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in that time"),
-        (["--from", "500"], "PLOT004", "no value in that time"),
+        (["--from", "move_9"], "PLOT003", "is not a time or step"),
+        (["--from", "2 m"], "PLOT003", "is not a time or step"),
+        (["--from", "0.3", "--to", "0.2"], "PLOT003", "empty time range: --from 0.3 is not before --to 0.2"),
+        (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in this time range"),
+        (["--from", "500"], "PLOT004", "no value in this time range"),
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
         (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': there is no folder 'absent'"),
         (["gone.mcap"], "LOG300", "No such file"),

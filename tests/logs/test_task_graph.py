@@ -134,4 +134,4 @@ def test_of_a_foreign_log_the_topics_alone_are_told(
     graph = log_graph(rewrite_log(log, tmp_path / "foreign.mcap", metadata=lambda name, _: None))
     assert {node.kind for node in graph.nodes} == {"topic"}
     assert graph.edges == ()
-    assert "tells of no task" in graph.notes[0]
+    assert "not written by manipcli" in graph.notes[0]

@@ -1,4 +1,4 @@
-"""The page of `manipcli view`: a robot, or a task's scene at its start, joint sliders, named poses and layers."""
+"""Interactive page of `manipcli view`: a robot or the start scene of a task, joint sliders, named poses, layers."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ if TYPE_CHECKING:
     import viser
 
 STEPS = 400
-"""A slider has about so many positions."""
+"""Approximate number of positions of a slider."""
 ZERO = "zero"
 WIDE = {"continuous": math.pi, "revolute": math.pi, "prismatic": 1.0}
-"""Range of a slider [rad or m] where a joint states no limit."""
+"""Range of the slider of a joint without limits [rad or m]."""
 
 
 class View(LocalServer):
-    """A page with a robot and its scene, and the panel that moves it. Stops with the `with` block.
+    """A served page with a robot, its scene and a joint panel. A context manager that stops the server.
 
     Args:
         robot: the robot.
-        scene: what is around it, at its start.
-        q: (n,) initial joint positions; None: `home`, or else zero.
+        scene: the scene at its start.
+        q: (n,) initial joint positions; None: `home`, or zero without a `home`.
         port: see `LocalServer`.
 
     Attributes:
-        joints: the panel.
-        missing: what could not be drawn, one line each.
+        joints: the joint panel.
+        missing: parts that cannot be drawn, one line each.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class View(LocalServer):
 
 
 def slider_range(joint: Joint) -> tuple[float, float]:
-    """From where to where the slider of a joint goes [rad or m]."""
+    """Lower and upper end of the slider of a joint [rad or m]."""
     lower, upper, reach = joint.limits.lower, joint.limits.upper, WIDE[joint.type]
     if lower is None and upper is not None:
         return min(-reach, upper - reach), upper
@@ -71,7 +71,7 @@ def slider_range(joint: Joint) -> tuple[float, float]:
 
 
 def pose_text(robot: RobotModel, q: Array) -> str:
-    """A posture as `poses:` of a robot file has it: a list for each group; by joint name where there are no groups."""
+    """A configuration as YAML for `poses:` of a robot file: a list per group, or by joint name without groups."""
     value = {name: f"{number:.4g}" for name, number in zip(robot.joint_names, q, strict=True)}
     if robot.groups:
         parts = [f"{group.name}: [{', '.join(value[name] for name in group.joints)}]" for group in robot.groups]
@@ -81,7 +81,7 @@ def pose_text(robot: RobotModel, q: Array) -> str:
 
 
 def _add_layers(server: viser.ViserServer, scene: ViserScene) -> None:
-    """A checkbox for each thing that can be shown."""
+    """Add a checkbox for each layer."""
 
     def add(label: str, layer: Shown, hint: str | None = None) -> None:
         box = server.gui.add_checkbox(label, layer == "visual", hint=hint)
@@ -89,28 +89,28 @@ def _add_layers(server: viser.ViserServer, scene: ViserScene) -> None:
 
     with server.gui.add_folder("Show"):
         add("visual meshes", "visual")
-        clear = server.gui.add_checkbox("see-through", False, hint="Frames and centres of mass are inside.")
+        clear = server.gui.add_checkbox("transparent", False, hint="Show frames and centres of mass inside the links.")
         clear.on_update(lambda _: scene.see_through(clear.value))
-        add("collision shapes", "collision", "A mesh as its convex hull, as in planner and physics.")
-        add("inertia boxes", "inertia", "For each link, the uniform box that has its mass and inertia.")
+        add("collision shapes", "collision", "Convex hulls of the meshes, as in planner and physics.")
+        add("inertia boxes", "inertia", "Uniform box with the mass and inertia of each link.")
         add("frames", "frames", "x red, y green, z blue.")
         add("names", "names")
 
 
 class JointPanel:
-    """Sliders for the independent joints, buttons for the named poses; the scene follows.
+    """Sliders of the independent joints and buttons of the named poses, which move the scene.
 
     Args:
-        server: where.
-        robot: whose joints.
-        scene: shows it.
-        placing: joints to frames.
-        q: (n,) where it is at first.
+        server: the viser server.
+        robot: the robot.
+        scene: the shown scene.
+        placing: computes the frames.
+        q: (n,) initial joint positions.
 
     Attributes:
-        sliders: by the index of the joint in joint vectors.
+        sliders: sliders by the index of the joint in joint vectors.
 
-    The page calls back in threads of the server; one lock makes one movement out of each.
+    The page calls back in threads of the server; a lock serialises the movements.
     """
 
     def __init__(
@@ -128,7 +128,10 @@ class JointPanel:
                 if joint.independent:
                     self.sliders[k] = self._slider(server, joint, k)
         self._text = server.gui.add_text(
-            "as YAML", pose_text(robot, q), multiline=True, hint="For `poses:` of the robot file, or a step `move`."
+            "as YAML",
+            pose_text(robot, q),
+            multiline=True,
+            hint="For `poses:` of the robot file or a `move` step.",
         )
 
     def _slider(self, server: viser.ViserServer, joint: Joint, k: int) -> viser.GuiSliderHandle[float]:
@@ -141,27 +144,27 @@ class JointPanel:
 
     @property
     def position(self) -> Array:
-        """(n,) where the joints are shown."""
+        """(n,) shown joint positions."""
         return self._q
 
     def _clicked(self, name: str, _: object) -> None:
         self.go(self.named(name))
 
     def named(self, name: str) -> Array:
-        """(n,) the posture behind a button: joints that the pose does not speak of stay where they are."""
+        """(n,) joint positions of a named pose; joints that it does not name keep their position."""
         known = any(pose.name == name for pose in self._robot.poses)
         return configuration(self._robot, name, rest=self._q) if known else zero_configuration(self._robot)
 
     def go(self, q: Array) -> None:
-        """Show a posture, and put the sliders there."""
+        """Show a configuration and set the sliders to it."""
         with self._lock:
             self._place(q)
-        # Each assignment calls `_slid`, which finds the joint there already.
+        # Each assignment calls `_slid`, which finds the joint at this value already.
         for k, slider in self.sliders.items():
             slider.value = float(q[k])  # type: ignore[misc]  # viser's setter hides from mypy
 
     def _slid(self, k: int, value: float) -> None:
-        """One slider was moved; the others' values are not asked for: they may be on their way elsewhere."""
+        """Move one joint to its slider; the other sliders are not read, since they can still be moving."""
         with self._lock:
             q = np.array(self._q)
             if not math.isfinite(value) or value == q[k]:

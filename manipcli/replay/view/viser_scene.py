@@ -1,4 +1,4 @@
-"""A drawing in the browser with viser: its frames as nodes that move, its surfaces as meshes below them."""
+"""A drawing in the browser with viser: frames as moving nodes, surfaces as meshes below them."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     import viser
 
 AXES = 0.04
-"""Length of the axes of a frame, as a part of the distance from the camera at first to what it looks at."""
+"""Length of the axes of a frame relative to the initial distance of the camera."""
 CLEAR = 0.35
-"""Opacity of visual meshes that one sees through."""
+"""Opacity of transparent visual meshes."""
 GRID = 0.1
-"""Width of a cell of the grid on the ground [m]."""
+"""Cell size of the ground grid [m]."""
 BRIGHTNESS = 0.7
-"""Of the surroundings that light the scene; at 1 colours look washed out."""
+"""Intensity of the environment light; 1 looks washed out."""
 
 
 Shown = Literal["visual", "collision", "inertia", "frames", "names"]
-"""What can be shown or hidden."""
+"""Layers that can be shown or hidden."""
 
 
 class _Node(Protocol):
@@ -38,10 +38,10 @@ class ViserScene:
     """Shows one drawing on one server.
 
     Args:
-        server: where.
-        drawing: what.
-        poses: where its frames are at first; also what the camera looks at.
-        floors: frames of bodies that are floors: the grid is drawn in their place, for its shadows.
+        server: the viser server.
+        drawing: the drawing.
+        poses: initial poses of its frames; they set the camera.
+        floors: frames of the floors, which are drawn as a grid with shadows.
     """
 
     def __init__(self, server: viser.ViserServer, drawing: Drawing, poses: Poses, *, floors: frozenset[str]) -> None:
@@ -51,7 +51,7 @@ class ViserScene:
         self._solid: list[tuple[viser.MeshHandle, float]] = []
         camera = framing(drawing, poses, leave_out=floors).further(1.2)
         self._length = AXES * float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
-        # The presets of lighting come with viser: nothing is fetched.
+        # viser includes its lighting presets: no download.
         server.scene.configure_environment_map("warehouse", environment_intensity=BRIGHTNESS)
         server.scene.set_background_image(np.repeat(sky(64), 64, axis=1))
         paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
@@ -82,7 +82,7 @@ class ViserScene:
         start.fov = float(np.radians(camera.field))
 
     def _frame(self, path: str, label: str, X: Transform | None = None) -> None:
-        """Axes with a name beside them (not below: one is shown without the other), both hidden at first."""
+        """Axes and a name in separate nodes, since each is shown without the other; both start hidden."""
         X = X or Transform.identity()
         axes = self._server.scene.add_frame(
             path,
@@ -110,14 +110,14 @@ class ViserScene:
             side="double",
             visible=drawable.layer == "visual",
             cast_shadow=clear >= 1.0,
-            receive_shadow=False,  # only the ground does: on thin walls a shadow map flickers
+            receive_shadow=False,  # only on the ground: shadow maps flicker on thin walls
         )
         self._layers[drawable.layer].append(mesh)
         if drawable.layer == "visual":
             self._solid.append((mesh, clear))
 
     def place(self, poses: Poses) -> None:
-        """Move every frame to where it is at one instant; the browser shows them all at once."""
+        """Move all frames to the poses of one state; the browser shows them in one update."""
         with self._server.atomic():
             for k, node in enumerate(self._nodes):
                 node.position = poses.position[k]
@@ -129,13 +129,13 @@ class ViserScene:
             node.visible = shown
 
     def see_through(self, clear: bool) -> None:
-        """Let the visual meshes show what lies inside of them, or not."""
+        """Make the visual meshes transparent or opaque."""
         for mesh, opacity in self._solid:
             mesh.opacity = CLEAR * opacity if clear else (opacity if opacity < 1.0 else None)
 
 
 def _path(frame: str, k: int) -> str:
-    """viser reads a path where a name has slashes, so each frame gets a path of two parts, unlike all others."""
+    """A unique path of two parts for a frame, because viser splits names at slashes."""
     name = frame.removeprefix("robot/").replace("/", "|")
     return "/world" if frame == WORLD else f"/{'robot' if frame.startswith('robot/') else 'scene'}/{k}_{name}"
 

@@ -1,9 +1,8 @@
-"""A page in the browser that only this machine sees.
+"""A viser server that is reachable only from this machine.
 
-viser serves page and data on one port. As it comes it listens on every interface, answers whoever asks, and lets any
-page that is open in the browser join in, or ask for a tunnel that makes the scene public. Here it listens on 127.0.0.1,
-refuses requests that were not meant for it (`Host`, against names that are bound to 127.0.0.1 later) or that come from
-another page (`Origin`), and has no tunnel. What remains: programs of this machine, other users' too, can look.
+By default viser listens on every interface, answers every client, and lets any open page of the browser connect or
+request a public tunnel. This server listens on 127.0.0.1, refuses requests with another host name (`Host`, against DNS
+rebinding) or from another page (`Origin`), and has no tunnel. Programs of all users of this machine can still connect.
 """
 
 from __future__ import annotations
@@ -28,21 +27,21 @@ Answer = Callable[["ServerConnection", "Request"], "Response | None"]
 
 
 class Unguarded(ManipcliError):
-    """The installed viser starts its server in another way, so that the checks of requests would not be made."""
+    """The installed viser starts its server differently, so that its requests cannot be checked."""
 
     code = "VIEW101"
 
 
 class LocalServer:
-    """A viser server on 127.0.0.1. A context manager: it stops at the end.
+    """A viser server on 127.0.0.1. A context manager that stops it at the end.
 
     Args:
-        title: at the top of the panel.
-        port: to listen on; None takes 8080 or the next free one, 0 any free one.
+        title: title of the panel.
+        port: port to listen on; None: 8080 or the next free port; 0: any free port.
 
     Raises:
-        InvalidInput: VIEW001 the port is taken.
-        Unguarded: this viser does not let its requests be checked.
+        InvalidInput: VIEW001 the port is in use.
+        Unguarded: the installed viser does not allow checking its requests.
     """
 
     def __init__(self, title: str, *, port: int | None = None) -> None:
@@ -58,7 +57,7 @@ class LocalServer:
         self._stopped = False
         if not made:
             self.stop()
-            raise Unguarded("the installed viser cannot be kept to its own page; install viser 1.1")
+            raise Unguarded("the installed viser cannot check its requests; install viser 1.1")
         if port and server.get_port() != port:
             self.stop()
             raise unusable_port(port)
@@ -73,16 +72,16 @@ class LocalServer:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """Port of the server."""
         return self.viser.get_port()
 
     @property
     def url(self) -> str:
-        """What to open in a browser."""
+        """URL to open in a browser."""
         return f"http://{HOST}:{self.port}"
 
     def stop(self) -> None:
-        """Close the port and every connection; again does nothing."""
+        """Close the port and all connections; can be called repeatedly."""
         if not self._stopped:
             self._stopped = True
             with _silent():
@@ -91,16 +90,16 @@ class LocalServer:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """viser prints banners to stdout, where only results belong."""
+    """Suppress the banners that viser prints to stdout, which is for results only."""
     with redirect_stdout(io.StringIO()):
         yield
 
 
 @contextmanager
 def _checked_requests() -> Iterator[list[object]]:
-    """Put our check before viser's answers: its server has no option for it, but the library beneath has.
+    """Check requests before viser answers them: viser has no option for it, but its websocket library has.
 
-    Yields a list that holds something once a server was started under the check.
+    Yields a list that is not empty once a server was started with the check.
     """
     from websockets.asyncio import server as library
 
@@ -113,13 +112,13 @@ def _checked_requests() -> Iterator[list[object]]:
                 port = connection.local_address[1]
                 if is_meant_for(request.headers.get("Host"), request.headers.get("Origin"), port):
                     return process_request(connection, request)
-                return connection.respond(http.HTTPStatus.FORBIDDEN, "Only for the browser of this machine.\n")
+                return connection.respond(http.HTTPStatus.FORBIDDEN, "Only browsers on this machine have access.\n")
 
-            # What viser passes on is the library's business: handed through unread.
+            # viser's options are passed on unchanged.
             super().__init__(*arguments, process_request=answer, **options)  # type: ignore[arg-type]
             made.append(self)
 
-    # A class stands in for the library's class of this name, for as long as viser starts.
+    # Replace the class of the library while viser starts.
     library.serve = Checked  # type: ignore[misc, assignment]
     try:
         yield made

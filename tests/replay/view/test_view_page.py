@@ -15,7 +15,7 @@ from PIL import Image
 from manipcli.replay.view.view import View
 from manipcli.task.viewed import load_sight
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CLICK = """(label => {
   const found = [...document.querySelectorAll("label, button")].find(e => e.textContent.trim() === label);
   if (found) found.click();

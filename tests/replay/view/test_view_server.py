@@ -21,7 +21,7 @@ from manipcli.description.elements import Joint, JointLimits
 from manipcli.replay.view.view import View, pose_text, slider_range
 from manipcli.task.viewed import load_sight
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ROBOT = """<robot name="two">
   <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry></visual></link>
   <link name="finger"/><link name="a/b"/>

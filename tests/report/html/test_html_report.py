@@ -27,7 +27,7 @@ from manipcli.report.html.page_parts import number, of_limit, signed
 from manipcli.report.html.render_page import render_page
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)> & 'x' \"y\" \x1b[31m {{7*7}}"
 VOID = {"br", "img", "input", "line", "link", "meta", "rect", "polygon"}
 
@@ -198,7 +198,7 @@ def test_numbers_are_those_of_the_facts() -> None:
         (0.04 + 4.6e-8, "at 40 mm"),
         (0.04 - 4.6e-8, "at 40 mm"),
         (0.041, "1.0 mm beyond 40 mm"),
-        (0.03, "10.0 mm left to"),
+        (0.03, "10.0 mm from"),
     ],
 )
 def test_a_joint_that_rests_on_its_limit_is_at_it(value: float, told: str) -> None:
@@ -263,7 +263,7 @@ def test_a_task_that_was_refused_has_a_page_and_junit(run_here: Callable[..., Ra
     shown = _Page(page.read_text("utf-8"))
     step = spec.steps[0].id
     assert f"✗ step '{step}' failed" in shown.words and "cannot be planned" in shown.words
-    assert "nothing: the task was refused" in shown.words
+    assert "not run: the task was refused" in shown.words
     assert any("marked" in (a.get("class") or "") for _, a in shown.found)
     assert "cannot be planned" in junit.read_text("utf-8")
 
@@ -380,7 +380,7 @@ def test_attempts_and_what_may_fail_are_told() -> None:
     second = replace(page.verdict.steps[1], tolerated=True)
     verdict = replace(page.verdict, steps=(first, second, page.verdict.steps[2]))
     words = _Page(render_page(replace(page, verdict=verdict))).words
-    assert "at attempt 2" in words and "planned again: the cup had moved" in words and "– failed, may fail" in words
+    assert "at attempt 2" in words and "re-planned: the cup had moved" in words and "– failed, may fail" in words
 
 
 def test_an_error_of_a_run_is_told_like_any_cause() -> None:

@@ -70,7 +70,7 @@ def test_a_line_says_verdict_margin_and_time() -> None:
     assert render_line(PASSED) == "✓ passed   tasks/pour.yaml::pour    3.50 s  near: 15.6 mm to spare"
     assert render_line(FAILED) == "✗ failed   tasks/pour.yaml::pour    3.50 s  inside: fails by 3.0 mm"
     assert render_line(CRASHED).endswith("crashed by signal 11 (SIGSEGV)")
-    assert gist(report("passed")) == "nothing expected"
+    assert gist(report("passed")) == "no expectations"
     long = report("crashed", troubles=(Trouble("x" * 500),))
     assert len(render_line(long)) < 170
     assert "x" * 500 in render_case(long)
@@ -81,7 +81,7 @@ def test_a_failure_says_where_what_held_and_how_to_see_it_again() -> None:
     assert lines[0] == "✗ tasks/pour.yaml::pour failed"
     assert lines[1].startswith("  tasks/pour.yaml:21:5: inside: fails by 3.0 mm")
     assert "  ✓ near: 15.6 mm to spare" in lines
-    assert lines[-2:] == ["  log: runs/test/tasks/pour.mcap", "  again: manipcli run tasks/pour.yaml"]
+    assert lines[-2:] == ["  log: runs/test/tasks/pour.mcap", "  reproduce: manipcli run tasks/pour.yaml"]
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_summary_counts_all() -> None:
     assert render_summary(suite) == (
         "✗ 1 failed, 1 crashed, 1 passed, 2 not run in 12.3 s, 2 processes; stopped at the first failure"
     )
-    assert render_suite(suite).count("again: ") == 2
+    assert render_suite(suite).count("reproduce: ") == 2
 
 
 def test_annotations_are_what_github_reads(tmp_path: Path) -> None:

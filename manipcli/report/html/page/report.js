@@ -1,4 +1,4 @@
-// Buttons that show a moment of the replay, and links to lines of files that are folded.
+// Buttons that seek the replay, and links to lines of folded files.
 "use strict";
 const view = () => document.querySelector(".mc-player");
 
@@ -14,7 +14,7 @@ document.addEventListener("click", (event) => {
   view().scrollIntoView({ behavior: "smooth", block: "nearest" });
 });
 
-// On paper there is room for everything.
+// Unfold everything for printing.
 window.addEventListener("beforeprint", () => {
-  for (const one of document.querySelectorAll("details")) one.open = true;
+  for (const details of document.querySelectorAll("details")) details.open = true;
 });
