@@ -220,7 +220,7 @@ def _hull(surfaces: tuple[Surface, ...]) -> Surface:
 
 
 def inertia_box(inertial: Inertial) -> tuple[Box, Transform]:
-    """The uniform box with the mass and inertia of a body, and X_LB, where it stands in the body's frame.
+    """The uniform box with the mass and inertia of a body, and its pose X_LB in the frame of the body.
 
     With principal moments I1, I2, I3 its edges are a_i = sqrt(6 (I_j + I_k - I_i) / m), from I_i = m (a_j^2 + a_k^2)
     / 12; a negative radicand (no body has such moments) gives an edge of length 0.

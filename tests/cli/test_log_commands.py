@@ -69,7 +69,7 @@ def test_a_cut_log_is_told_repaired_and_never_passes(
     cut = tmp_path / "run.mcap.partial"
     cut.write_bytes(data[: len(data) * 3 // 4])
     assert main(["info", str(cut)]) == 0
-    assert "missing: it was not finished" in capsys.readouterr().out
+    assert "missing: the file is not finished" in capsys.readouterr().out
     assert main(["repair", str(cut)]) == 0
     assert "lost after t = " in capsys.readouterr().out
     clean = tmp_path / "run.repaired.mcap"

@@ -77,7 +77,7 @@ def test_a_log_whose_ticks_are_thinned_alike_is_not_judged(log: Path, rewrite_lo
 def test_a_topic_without_any_message_is_told(log: Path, rewrite_log: Any, tmp_path: Path, topic: str) -> None:
     emptied = tmp_path / "emptied.mcap"
     rewrite_log(log, emptied, message=lambda name, one: None if name == topic else one.data)
-    told = f"the log holds no message of {topic}"
+    told = f"the log has no message of {topic}"
     assert told in moment(emptied, 0.1).missing
     assert told in log_info(emptied).missing
     assert told in open_playback(emptied).notes

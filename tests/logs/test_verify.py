@@ -167,7 +167,7 @@ def test_a_log_that_ends_early_is_compared_as_far_as_it_goes(
     cut.write_bytes(data[: len(data) * 3 // 4])
     made = verify_log(cut)
     assert made.identical
-    assert "it was not finished" in made.cut
+    assert "the file is not finished" in made.cut
     changed = rewrite_log(log, tmp_path / "changed.mcap", message=_change_a_velocity).read_bytes()
     cut.write_bytes(changed[: len(changed) * 95 // 100])
     made = verify_log(cut)

@@ -64,5 +64,5 @@ def test_a_log_without_bodies_is_shown_and_told_as_far_as_it_goes(
     assert main(["at", str(log), "0.05", "--format", "json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["poses"], found["contacts"]) == ([], None)
-    assert found["missing"] == ["the run did not record /tf", "the run did not record /contacts"]
+    assert found["missing"] == ["/tf not recorded", "/contacts not recorded"]
     assert found["step"] == "wait_1"

@@ -139,7 +139,7 @@ class Scan:
                     continue
             following = self._following(file, offset, record) if self.damaged else None
             if following is None and record is None and not finished:
-                self.lost = f"not finished, truncated in the record at byte {offset}"
+                self.lost = f"the file is not finished, truncated in the record at byte {offset}"
                 return
             following = self.size if following is None else following
             what = self.fault or f"{following - offset} bytes without a record"
@@ -150,7 +150,7 @@ class Scan:
             if not self.damaged:
                 raise BadRecording(self.path, "the end of its data is missing")
         elif not self.being_written:
-            self.lost = "not finished"
+            self.lost = "the file is not finished"
 
     def _damage(self, start: int, end: int, what: str) -> Damage:
         if not self.damaged:

@@ -14,10 +14,10 @@ FORCE_SHARE, FORCE_LEAST = 0.1, 0.05
 """A force change is recorded if it exceeds a tenth of the recorded force and 0.05 N."""
 
 STEADY_PERIOD = 0.1
-"""Time after which smaller changes are recorded [s]:"""
+"""Time after which smaller changes are recorded, too [s]."""
 
 STEADY_SHARE, STEADY_LEAST = 0.01, 0.005
-"""changes above a hundredth of the recorded force and 0.005 N."""
+"""A small change exceeds a hundredth of the recorded force and 0.005 N."""
 
 KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
 """An impact: the larger of the recorded and the current force exceeds the smaller one by more than half of it plus 1 N.

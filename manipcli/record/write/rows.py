@@ -2,7 +2,8 @@
 
 Names are constant during a run, so every message of a channel has the same length and each number has a fixed offset.
 All such messages of one tick, with their MCAP message records, form one row. A block of T rows is an array
-(T, row size) of bytes with the constant parts already filled in; a numpy structured view writes one field of all T rows at once.
+(T, row size) of bytes with the constant parts already filled in; a numpy structured view writes one field of all T
+rows at once.
 
     message record:  opcode u8 | length u64 | channel u16 | sequence u32 | log time u64 | publish time u64 | CDR bytes
 """

@@ -18,7 +18,7 @@ CaseWord = Literal["passed", "failed", "error", "invalid", "crashed", "hung"]
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run of one task.
+    """A run of a task.
 
     Attributes:
         file: path of the task file, as shown.

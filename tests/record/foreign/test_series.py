@@ -315,7 +315,7 @@ def test_a_message_with_any_bytes_changed_is_read_or_refused(log: Path) -> None:
         ("joint_states.position.x", "no field 'x'", "fields"),
         ("tf.z", "several fields", "translation.z"),
         ("task/events", "no number", "fields"),
-        ("joint_states.header.stamp[a]", "'stamp' is no array", None),
+        ("joint_states.header.stamp[a]", "'stamp' is not an array", None),
         ("", "is no field", "TOPIC.FIELD"),
         ("tf[", "is no field", "TOPIC.FIELD"),
         ("tf[].x", "is no field", "TOPIC.FIELD"),

@@ -169,7 +169,7 @@ def test_a_flushed_recording_is_read_while_it_is_written(tmp_path: Path, make_ru
     flushed = read_recording(recorder.partial_path, being_written=True)
     assert flushed.lost is None
     assert flushed.metadata["run"] == {"task": "test", "seed": "7", "status": "complete"}
-    assert read_recording(recorder.partial_path).lost == "it was not finished; recorded until t = 0.619 s"
+    assert read_recording(recorder.partial_path).lost == "the file is not finished; recorded until t = 0.619 s"
     recorder.finish({})
     assert not recorder.partial_path.exists()
     assert_same(read_recording(tmp_path / "run.mcap"), flushed)
@@ -184,7 +184,7 @@ def test_a_killed_run_loses_at_most_its_last_two_blocks(tmp_path: Path, make_run
     recording = read_recording(recorder.partial_path)
     ticks = len(recording.states.time)
     assert ticks in (500, 1000)
-    assert recording.lost == f"it was not finished; recorded until t = {(ticks - 1) / 1000:.3f} s"
+    assert recording.lost == f"the file is not finished; recorded until t = {(ticks - 1) / 1000:.3f} s"
     recorder.close_partial()
     whole = read_recording(recorder.partial_path)
     assert len(whole.states.time) == 1203
@@ -388,7 +388,7 @@ class TestBounds:
         assert peak < 20 << 20
 
     def test_record_length(self, small: tuple[Any, Path]) -> None:
-        with pytest.raises(BadRecording, match=r"is said to be 4611686018427387904 bytes long"):
+        with pytest.raises(BadRecording, match=r"declares 4611686018427387904 bytes, the limit is"):
             read_recording(with_records(small[1], struct.pack("<BQ", 6, 1 << 62)))
 
     def test_number_of_channels(self, small: tuple[Any, Path]) -> None:
@@ -442,12 +442,12 @@ class TestWhoseFile:
             channel = writer.register_channel("/a", "json", schema)
             writer.add_message(channel, 0, json.dumps({"a": 1}).encode(), 0)
             writer.finish()
-        with pytest.raises(BadRecording, match=r"is not a recording of manipcli"):
+        with pytest.raises(BadRecording, match=r"not a recording of manipcli"):
             read_recording(tmp_path / "x.mcap")
 
     def test_missing_topics_are_named(self, small: tuple[Any, Path]) -> None:
         path = with_records(small[1], keep=lambda opcode: opcode != 0x04)
-        with pytest.raises(BadRecording, match=r"lacks /joint_states \(sensor_msgs/msg/JointState\), /tf"):
+        with pytest.raises(BadRecording, match=r"missing /joint_states \(sensor_msgs/msg/JointState\), /tf"):
             read_recording(path)
 
     def test_later_format(self, small: tuple[Any, Path]) -> None:
@@ -538,7 +538,7 @@ def test_a_run_killed_before_its_first_tick_has_no_states(tmp_path: Path, make_r
     assert isinstance(recording.states, WorldState)
     assert recording.states.position.shape == (0, 4)
     assert recording.states.body_quat_xyzw.shape == (0, 2, 4)
-    assert recording.lost == "it was not finished"
+    assert recording.lost == "the file is not finished"
     recorder.close_partial()
 
 

@@ -325,7 +325,7 @@ class TestRefusedBeforeAnythingIsWritten:
     def test_directory_and_missing_directory(self, tmp_path: Path, make_run: MakeRun) -> None:
         with pytest.raises(RecordingRefused, match=r"directory"):
             make_run(1).recorder(tmp_path)
-        with pytest.raises(RecordingRefused, match=r"there is no directory"):
+        with pytest.raises(RecordingRefused, match=r"does not exist"):
             make_run(1).recorder(tmp_path / "no" / "run.mcap")
         assert list(tmp_path.iterdir()) == []
 
@@ -405,7 +405,7 @@ def test_failing_disk_leaves_what_was_flushed(
                 break
         assert not path.exists()
         partial = path.with_name(path.name + ".partial")
-        assert f"No space left on device; what was recorded until then is in {partial.name}" in str(failed)
+        assert f"No space left on device; data until then is in {partial.name}" in str(failed)
         if count >= 7:  # everything before the first chunk was written
             recording = read_recording(partial)
             assert recording.lost is not None
