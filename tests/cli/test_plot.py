@@ -126,7 +126,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["joint_state.position"], "PLOT002", "did you mean 'joint_states'?"),
         (["joint_states.positions"], "PLOT002", "did you mean 'position'?"),
         (["joint_states.position[jiont_1]"], "PLOT002", "did you mean 'joint_1'?"),
-        (["task/events.kind"], "PLOT002", "the message has no numbers"),
+        (["task/events.kind"], "PLOT002", "no numeric fields in this message"),
         (["--from", "move_9"], "PLOT003", "is not a time or step"),
         (["--from", "2 m"], "PLOT003", "is not a time or step"),
         (["--from", "0.3", "--to", "0.2"], "PLOT003", "empty time range: --from 0.3 is not before --to 0.2"),

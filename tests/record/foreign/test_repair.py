@@ -265,7 +265,7 @@ def test_nothing_is_overwritten_unasked(small: Path, tmp_path: Path) -> None:
             repair(small, small, overwrite=force)
     link = tmp_path / "link.mcap"
     link.hardlink_to(small)
-    with pytest.raises(RecordingRefused, match="it is the file"):
+    with pytest.raises(RecordingRefused, match="output and input are the same file"):
         repair(small, link, overwrite=True)
     other = tmp_path / "other.mcap"
     other.write_text("mine")
@@ -314,7 +314,7 @@ def test_a_full_disk_leaves_no_half_file(small: Path, tmp_path: Path, monkeypatc
             try:
                 repair(small, tmp_path / "good.mcap")
             except CopyFailed as failure:
-                told = f"cannot write {tmp_path}/good.mcap: No space left on device; nothing of the copy is left"
+                told = f"cannot write {tmp_path}/good.mcap: No space left on device; the incomplete copy is removed"
                 assert told in str(failure)
                 assert [path.name for path in tmp_path.iterdir()] == ["small.mcap"]
             else:
