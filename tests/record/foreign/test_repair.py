@@ -359,7 +359,7 @@ def test_the_name_of_a_run_that_was_killed_leads_to_what_it_left(small: Path) ->
     small.rename(small.with_name("killed.mcap.partial"))
     with pytest.raises(BadRecording) as caught:
         read_recording(small.with_name("killed.mcap"))
-    assert "killed.mcap.partial is there" in str(caught.value.findings[0].hint)
+    assert "an unfinished run left killed.mcap.partial" in str(caught.value.findings[0].hint)
     with pytest.raises(BadRecording) as caught:
         read_recording(small.with_name("never.mcap"))
     assert caught.value.findings[0].hint is None

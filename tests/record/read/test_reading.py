@@ -252,10 +252,10 @@ def _narrow(message: Any) -> None:
 @pytest.mark.parametrize(
     ("topic", "change", "told"),
     [
-        ("/joint_states", _other_name, "names other joints"),
-        ("/joint_states", _narrow, "another number of values than of names"),
-        ("/arm/controller_state", _other_name, "names other joints"),
-        ("/arm/controller_state", _narrow, "another number of values than of names"),
+        ("/joint_states", _other_name, "has other joints or bodies than the metadata"),
+        ("/joint_states", _narrow, "has different numbers of values and names"),
+        ("/arm/controller_state", _other_name, "has other joints or bodies than the metadata"),
+        ("/arm/controller_state", _narrow, "has different numbers of values and names"),
     ],
 )
 def test_a_message_of_other_joints_or_widths_is_refused_with_its_topic(
