@@ -87,7 +87,7 @@ def test_what_is_no_log_is_refused(command: str, tmp_path: Path, capsys: pytest.
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     (tmp_path / "text").write_text("hello")
-    for name, why in (("pipe", "not a regular file"), ("text", "no MCAP file"), ("absent", "No such file")):
+    for name, why in (("pipe", "not a regular file"), ("text", "not an MCAP file"), ("absent", "No such file")):
         assert main([command, str(tmp_path / name)]) == 4
         assert why in capsys.readouterr().err
 
