@@ -74,7 +74,7 @@ def test_a_cut_log_is_told_repaired_and_never_passes(
     assert "lost after t = " in capsys.readouterr().out
     clean = tmp_path / "run.repaired.mcap"
     assert main(["judge", str(clean)]) == 3
-    assert "it was repaired" in capsys.readouterr().out
+    assert "repaired with losses" in capsys.readouterr().out
     assert main(["repair", str(cut)]) == 4, "what exists stays"
     assert "the file exists" in capsys.readouterr().err
     assert main(["repair", str(log), "-o", str(clean), "--force", "--format", "json"]) == 0
