@@ -139,7 +139,7 @@ def ways(message: Message, name: FieldName) -> tuple[Way, ...]:
             raise UnknownField(f"{name.text}: {name.topic} has no field '{part.name}'", hint)
         if len(found) > 1:
             choices = [".".join(field.name for field in path) for _, path in found[:4]]
-            raise UnknownField(f"{name.text}: '{part.name}' is ambiguous, it is in several fields", f"write {any_of(choices)}")
+            raise UnknownField(f"{name.text}: '{part.name}' is in several fields", f"write {any_of(choices)}")
         ((holder, fields),) = found
         steps += [(Part(field.name), field.type) for field in fields]
         if part.key is not None:

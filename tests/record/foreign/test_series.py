@@ -313,7 +313,7 @@ def test_a_message_with_any_bytes_changed_is_read_or_refused(log: Path) -> None:
     [
         ("joint_states.positon", "no field 'positon'", "did you mean 'position'?"),
         ("joint_states.position.x", "no field 'x'", "fields"),
-        ("tf.z", "is ambiguous, it is in several fields", "translation.z"),
+        ("tf.z", "is in several fields", "translation.z"),
         ("task/events", "no number", "fields"),
         ("joint_states.header.stamp[a]", "'stamp' is not an array", None),
         ("", "is not a field", "TOPIC.FIELD"),
