@@ -22,8 +22,8 @@ from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.read.reading import open_recording
+from manipcli.report.logs.verification import Verification
 from manipcli.report.run_report import RunReport, Timing
-from manipcli.report.verification import Verification
 from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress

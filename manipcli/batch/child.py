@@ -14,7 +14,7 @@ from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core import collector
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, ManipcliError
 from manipcli.judge.verdict import StepOutcome
-from manipcli.report.suite import Trouble, troubles_of
+from manipcli.report.suite.suite import Trouble, troubles_of
 
 if TYPE_CHECKING:
     from manipcli.task.plan_task import PlannedStep

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from manipcli.batch.first_look import SUFFIXES, first_look
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
-from manipcli.report.suite import Case
+from manipcli.report.suite.suite import Case
 
 
 def read_case(path: Path, *, shown: str | None = None) -> Case:

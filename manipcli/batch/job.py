@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, Place
-from manipcli.report.markup import link
+from manipcli.report.html.markup import link
 from manipcli.report.run_report import RunReport
-from manipcli.report.suite import Case, Trouble
+from manipcli.report.suite.suite import Case, Trouble
 
 FOLDER = Path("runs") / "test"
 """Folder for the logs of tests, below the working directory."""

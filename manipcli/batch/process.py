@@ -23,7 +23,7 @@ from manipcli.core.errors import ExitCode
 from manipcli.core.lock import Taken, lock
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
-from manipcli.report.suite import CaseReport, CaseWord, Trouble, doubts_of, signal_name, troubles_of
+from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, doubts_of, signal_name, troubles_of
 
 CHILD = """
 import json, sys
@@ -250,7 +250,7 @@ class Process:
         page, index = self.job.page, self.job.index
         if page is None:
             return report
-        from manipcli.report.case_page import render_case_page
+        from manipcli.report.html.case_page import render_case_page
 
         try:
             page.parent.mkdir(parents=True, exist_ok=True)

@@ -17,10 +17,10 @@ from manipcli.logs.report import log_page, refused_page
 from manipcli.pipeline import load_task
 from manipcli.replay.frames import Frames
 from manipcli.replay.renderer import png_bytes
-from manipcli.report.html import render_page
+from manipcli.report.html.render_page import render_page
 from manipcli.report.run_page import Cause, RunPage, Written
 from manipcli.report.run_report import RunReport
-from manipcli.report.suite import Trouble
+from manipcli.report.suite.suite import Trouble
 from manipcli.report.text import describe_expectation, describe_step
 from manipcli.spec import load
 from manipcli.spec.located import Located

@@ -108,7 +108,7 @@ class Outputs:
         """
         from manipcli.logs.report import file_places, log_page, log_places
         from manipcli.record.read.reading import open_recording
-        from manipcli.report.html import render_page
+        from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
 
         self._forget()
@@ -126,7 +126,7 @@ class Outputs:
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Diagnostic]) -> None:
         """Writes the requested files about a task with a step that cannot be planned."""
         from manipcli.logs.report import refused_page, task_places
-        from manipcli.report.html import render_page
+        from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
 
         self._forget()
@@ -142,7 +142,7 @@ class Outputs:
         if file is None or not self.wanted:
             return
         from manipcli.logs.invalid import invalid_page, invalid_verdict
-        from manipcli.report.html import render_page
+        from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
 
         self._forget()

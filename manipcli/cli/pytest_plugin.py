@@ -20,7 +20,7 @@ import pytest
 if TYPE_CHECKING:
     from manipcli.batch.job import Beat, Job, Settings
     from manipcli.report.run_report import JudgedRun
-    from manipcli.report.suite import Case, CaseReport
+    from manipcli.report.suite.suite import Case, CaseReport
 
 SUFFIXES = (".yaml", ".yml")
 """The same as in `batch/first_look.py`, which is not imported for any other file."""
@@ -191,7 +191,7 @@ class TaskItem(pytest.Item):
             TaskFailed: the task did not pass.
         """
         from manipcli.batch.process import run_job
-        from manipcli.report.suite_text import judged_lines
+        from manipcli.report.suite.suite_text import judged_lines
 
         folder = self.config.getoption("manipcli_session")
         progress = None if folder is None else _progress(folder)
@@ -223,7 +223,7 @@ class TaskItem(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None) -> str:
         """The text of `manipcli test` about the failure, instead of a traceback."""
         if isinstance(excinfo.value, TaskFailed):
-            from manipcli.report.suite_text import case_lines, gist
+            from manipcli.report.suite.suite_text import case_lines, gist
 
             report = excinfo.value.report
             why = gist(report)
@@ -274,7 +274,7 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
         from manipcli.batch.process import run_job
         from manipcli.core.errors import InvalidInput
         from manipcli.report.run_report import JudgedRun
-        from manipcli.report.suite_text import render_case
+        from manipcli.report.suite.suite_text import render_case
 
         beside, below = request.path.parent / path, request.config.rootpath / path
         found = beside if beside.exists() or not below.exists() else below

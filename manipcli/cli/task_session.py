@@ -27,7 +27,7 @@ from manipcli.batch.job import Settings
 from manipcli.cli import console, pytest_plugin
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import number_of
-from manipcli.report.suite import CaseReport, Suite, Trouble
+from manipcli.report.suite.suite import CaseReport, Suite, Trouble
 
 BLOCKED = (
     "terminal", "python", "doctest", "unittest", "faulthandler", "logging", "warnings", "stepwise", "pastebin",

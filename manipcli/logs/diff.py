@@ -1,4 +1,4 @@
-"""Two logs to what is different about them: what they were made from, what came of it, and from when on."""
+"""Comparison of two logs: inputs, verdicts, step measures and messages."""
 
 from __future__ import annotations
 
@@ -14,32 +14,31 @@ from manipcli.record.foreign.origin import is_own
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
-from manipcli.report.log_diff import LogDiff, LogSide
+from manipcli.report.logs.log_diff import LogDiff, LogSide
 
 OUTCOME = ("verdict", JOINTS, ACTUATORS, LIMITS)
-"""Metadata that says what came of a run, which is judged and measured anew."""
+"""Metadata of the result of a run, which is judged and measured again from the messages."""
 PLACES = {EVENTS: ("place",), ROSOUT: ("file", "line")}
-"""Where a step was written is nothing that happened: a comment in the task moves it."""
+"""Fields that are not compared: a comment in the task file changes the line of a step."""
 
 
 def diff_logs(a: Path, b: Path, *, tolerance: float) -> LogDiff:
     """Compare two logs.
 
     Args:
-        a, b: logs of runs; of other ROS 2 logs the messages are compared.
-        tolerance: numbers in messages that differ by no more count as the same, whatever their unit.
+        a, b: logs of runs; for other ROS 2 logs only the messages are compared.
+        tolerance: largest difference of numbers in messages that counts as equal, in any unit.
 
     Raises:
-        InvalidInput: one is no log, is damaged, or cannot be judged.
+        InvalidInput: a file is not a log, is damaged, or cannot be judged.
     """
     if not (is_own(a) and is_own(b)):
         foreign = [path.name for path in (a, b) if not is_own(path)]
-        verb = "tells" if len(foreign) == 1 else "tell"
-        why = f"{' and '.join(foreign)} {verb} of no task: messages alone are compared"
+        why = f"{' and '.join(foreign)} not written by manipcli: only messages are compared"
         return LogDiff(str(a), str(b), None, (), compare_logs(a, b, tolerance=tolerance), (why,), tolerance)
     recordings = open_recording(a), open_recording(b)
     sides = _side(recordings[0], a), _side(recordings[1], b)
-    entries = tuple(one for one in compare_entries(*recordings) if one.name not in OUTCOME)
+    entries = tuple(entry for entry in compare_entries(*recordings) if entry.name not in OUTCOME)
     apart, notes = _apart(*recordings), []
     if apart:
         notes.append(f"messages are not compared: {apart}")
@@ -47,8 +46,8 @@ def diff_logs(a: Path, b: Path, *, tolerance: float) -> LogDiff:
     else:
         messages = compare_logs(a, b, tolerance=tolerance, besides=PLACES)
     if sides[0].task != sides[1].task:
-        notes.append(f"the tasks are others, '{sides[0].task}' and '{sides[1].task}': steps of one id are compared")
-    notes += [f"{path.name}: {one.lost}" for path, one in ((a, recordings[0]), (b, recordings[1])) if one.lost]
+        notes.append(f"the tasks differ, '{sides[0].task}' and '{sides[1].task}': steps with the same id are compared")
+    notes += [f"{path.name}: {log.lost}" for path, log in ((a, recordings[0]), (b, recordings[1])) if log.lost]
     return LogDiff(str(a), str(b), sides, entries, messages, tuple(notes), tolerance)
 
 
@@ -65,12 +64,12 @@ def _side(recording: Recording, path: Path) -> LogSide:
 
 
 def _apart(a: Recording, b: Recording) -> str:
-    """Why no message of one says anything about the other's; "" where they do."""
+    """Why the messages of two logs cannot be compared; "" if they can."""
     for what, mine, other in (("joints", a.joint_names, b.joint_names), ("bodies", a.body_names, b.body_names)):
         if mine != other:
             only = [name for name in (*mine, *other) if name not in mine or name not in other]
             named = ", ".join(only[:4]) + (", ..." if len(only) > 4 else "")
-            return f"the {what} are others ({named})" if only else f"the {what} stand in another order"
+            return f"the {what} differ ({named})" if only else f"the order of the {what} differs"
     if a.period != b.period:
-        return f"the control periods are {a.period:g} s and {b.period:g} s"
+        return f"the control periods differ: {a.period:g} s and {b.period:g} s"
     return ""

@@ -1,7 +1,7 @@
 """Data-flow graph of a task or its log: planner, controllers, limits, drives, engine, sensors, topics.
 
-Everything is asked of what a run is made of: the controllers as they are built, the drivetrain, the engine's member,
-the table of channels. Of a log the topics are those that are in it.
+The graph is built from the parts of a run: its controllers, drivetrain, engine and table of channels. The graph of a
+log shows the topics in the log.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from manipcli.record.foreign.origin import is_own
 from manipcli.record.foreign.topics import Topic, open_topics
 from manipcli.record.read.reading import open_recording
 from manipcli.record.selection import PLOTTED, Selection, word
-from manipcli.report.graph import Edge, Graph, Node
+from manipcli.report.logs.graph import Edge, Graph, Node
 from manipcli.run.run_log import action_of, recorded
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
@@ -43,13 +43,13 @@ PRODUCERS: Final[Mapping[str, str]] = {
     channels.ROSOUT: "task",
     channels.ACTUATOR_STATES: "drives",
 }
-"""Which node publishes a topic that is no controller's."""
+"""Publishing node of the topics that no controller publishes."""
 BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, *SENSORS.names)
 MOST_NAMES: Final = 4
 
 
 def task_graph(path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False) -> Graph:
-    """Of a task file.
+    """The graph of a task file.
 
     Raises:
         InvalidInput: a file of the task cannot be used.
@@ -59,15 +59,15 @@ def task_graph(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
 
 
 def log_graph(path: Path) -> Graph:
-    """Of a log, with how much it holds of each topic; of a foreign one its topics alone.
+    """The graph of a log, with the number of messages per topic; only topics for logs of other programs.
 
     Raises:
-        InvalidInput: it is no log, is damaged, or lacks its files.
+        InvalidInput: the file is not a log, is damaged, or lacks its attachments.
     """
     topics = open_topics(path).all
     if not is_own(path):
         nodes = tuple(_topic_node(name, topic.type, _held(topic)) for name, topic in topics.items())
-        note = f"{path.name} tells of no task: what its topics are fed by is not known"
+        note = f"{path.name} not written by manipcli: the sources of its topics are unknown"
         return Graph(path.name, nodes, (), (note,))
     recording = open_recording(path)
     spec = recorded_task_file(recording, path).spec
@@ -142,21 +142,21 @@ class _Builder:
             self._join(controller.name, "limits", what, idle=not own.active)
 
     def _limits_and_drives(self) -> None:
-        """Joint limits, then transmissions and actuators, where those change anything."""
+        """Joint limits, then transmissions and actuators if they are not ideal."""
         robot = self._robot
         limits = [joint.limits for joint in robot.moving_joints]
         there = {
-            "position": any(one.lower is not None or one.upper is not None for one in limits),
-            "velocity": any(one.velocity is not None for one in limits),
-            "effort": any(one.effort is not None for one in limits),
-            "soft": any(one.soft is not None for one in limits),
+            "position": any(limit.lower is not None or limit.upper is not None for limit in limits),
+            "velocity": any(limit.velocity is not None for limit in limits),
+            "effort": any(limit.effort is not None for limit in limits),
+            "soft": any(limit.soft is not None for limit in limits),
         }
         held = [kind for kind, has in there.items() if has]
         self._add(Node("limits", "limits", "joint limits", details=(number_of(len(limits), "joint"), *held)))
         actuation = Actuation(robot, self._period)
         acts = bool(actuation.names) and not actuation.ideal and self._member.physics == "full"
         by_effort = any("effort" in controller.interfaces for controller in self._controllers)
-        others = sorted({one for c in self._controllers for one in c.interfaces if one != "effort"})
+        others = sorted({limit for c in self._controllers for limit in c.interfaces if limit != "effort"})
         if actuation.names:
             self._add(self._drives(actuation, acts=acts))
         if acts and by_effort:
@@ -177,7 +177,7 @@ class _Builder:
         details = (
             f"transmissions: {', '.join(counts)}",
             number_of(len(names), "actuator") + (f": {', '.join(names)}" if len(names) <= MOST_NAMES else ""),
-            "their limits, friction and latency act" if acts else "ideal: they change nothing",
+            "with limits, friction and latency" if acts else "ideal: no effect",
         )
         return Node("drives", "drive", "transmissions and actuators", details=details)
 
@@ -197,7 +197,7 @@ class _Builder:
         self._join("scene", "engine", "bodies")
 
     def _feedback(self) -> None:
-        """What is measured, and who reads it."""
+        """Measurements and their consumers."""
         self._add(Node("joints", "sensor", "measured joints"))
         self._add(Node("contacts", "sensor", "contacts"))
         self._join("engine", "joints")
@@ -215,7 +215,7 @@ class _Builder:
                 self._join("contacts", controller.name, "forces", idle=idle, back=True)
 
     def _publish(self) -> None:
-        """Topics, each by who publishes it."""
+        """Topics and their publishers."""
         spec = self._spec
         selection = Selection(spec.record.strides(self._period), spec.record.left_out)
         common = {channel.topic for channel in channel_table([])}
@@ -256,5 +256,5 @@ def _held(topic: Topic) -> str:
 
 
 def _named(names: Sequence[str]) -> str:
-    """The first few, and the last."""
+    """The first few names, and the last."""
     return ", ".join(names) if len(names) <= MOST_NAMES else f"{names[0]}, {names[1]} … {names[-1]}"

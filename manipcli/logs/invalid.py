@@ -1,4 +1,4 @@
-"""A task or a log that cannot be used, to what a run would have been told by: a verdict, and the page about it."""
+"""Verdict and page for a task or log that is invalid."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from manipcli.judge.verdict import Verdict
 from manipcli.report.run_page import Cause, RunPage, Source, Written
 
 LARGEST = 1_000_000
-"""Bytes of a file that is shown."""
+"""Largest file that the page shows [byte]."""
 SHOWN = 8
-"""Files that are shown."""
+"""Most files that the page shows."""
 
 
 def invalid_verdict(file: Path, findings: Sequence[Diagnostic]) -> Verdict:
-    """What there is to say without a run. The engine is "": nothing is known of it."""
-    errors = tuple(one for one in findings if one.severity == "error")
+    """The verdict `error` of a file that cannot be run or judged; its engine is "", since it is unknown."""
+    errors = tuple(finding for finding in findings if finding.severity == "error")
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     return Verdict(
         task=file.name,
@@ -34,24 +34,25 @@ def invalid_verdict(file: Path, findings: Sequence[Diagnostic]) -> Verdict:
 
 
 def invalid_page(verdict: Verdict, findings: Sequence[Diagnostic], *, log: str = "") -> RunPage:
-    """The page: each error with its place, and the files that these are in, as written. `log`: the name of a log."""
-    sources = tuple(_sources(one.place for one in verdict.errors))
+    """The page with each error, its place and the files as written; `log` is the name of a log or ""."""
+    sources = tuple(_sources(error.place for error in verdict.errors))
     lines = {source.name: len(source.text.splitlines()) for source in sources}
     return RunPage(
         verdict=verdict,
         causes=tuple(
-            Cause(one.message, "", written=_written(one.place, lines), hint=one.hint or "") for one in verdict.errors
+            Cause(error.message, "", written=_written(error.place, lines), hint=error.hint or "")
+            for error in verdict.errors
         ),
         log=log,
         sources=sources,
         provenance=(("manipcli", __version__), ("log", log) if log else ("run", "nothing was run")),
-        warnings=tuple(one for one in findings if one.severity == "warning"),
-        notes=tuple(str(one) for one in findings if one.severity == "note"),
+        warnings=tuple(finding for finding in findings if finding.severity == "warning"),
+        notes=tuple(str(finding) for finding in findings if finding.severity == "note"),
     )
 
 
 def _written(place: Place | None, lines: Mapping[str, int]) -> Written | None:
-    """A link where that line is shown: a YAML error may be behind the last."""
+    """A link to the line if it is shown; a YAML error can be after the last line."""
     if place is None:
         return None
     return Written(str(place), place.file, place.line if place.line <= lines.get(place.file, 0) else 0)
@@ -65,4 +66,4 @@ def _sources(places: Iterable[Place | None]) -> Iterable[Source]:
             if path.is_file() and path.stat().st_size <= LARGEST:
                 yield Source(name, path.read_text("utf-8", "replace"))
         except OSError:
-            continue  # the error tells what is wrong with it
+            continue  # the error already reports why

@@ -1,4 +1,4 @@
-"""The verdict on a log, from the log alone."""
+"""Judging a log from the log alone."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from manipcli.record.recording import Recording, Span
 
 
 def judge_log(path: Path, *, being_written: bool = False, doing: Callable[[str], None] = lambda _: None) -> Verdict:
-    """The verdict on a log, from the log alone; a verdict stored in it is not looked at.
+    """The verdict on a log, from the log alone; a stored verdict is ignored.
 
     Args:
-        path: the log, or what a killed run left.
-        being_written: the run that writes it is still on and has just flushed: that it has no end is no loss.
-        doing: told of each span that is judged.
+        path: the log, or the partial log of a killed run.
+        being_written: the run that writes the log has just flushed it, so its missing end is not a loss.
+        doing: called with `"judging"` for each span.
 
     Raises:
-        InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
+        InvalidInput: the file is not a log of manipcli, is damaged, or lacks attachments.
     """
     recording = open_recording(path, being_written=being_written)
     return judge_recording(replace(recording, spans=_Watched(recording.spans, doing)), path)
@@ -30,7 +30,7 @@ def judge_log(path: Path, *, being_written: bool = False, doing: Callable[[str],
 
 @dataclass(frozen=True, slots=True)
 class _Watched:
-    """Spans; somebody is told of each that is read."""
+    """Spans with a callback for each one read."""
 
     spans: Iterable[Span]
     doing: Callable[[str], None]
@@ -42,7 +42,7 @@ class _Watched:
 
 
 def judge_recording(recording: Recording, path: Path) -> Verdict:
-    """The verdict on a log that is open already; see `judge_log`."""
+    """The verdict on an open log; see `judge_log`."""
     expect = recorded_task_file(recording, path).spec.judged
     scene = recorded_scene(recording, path)
     return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)

@@ -1,4 +1,4 @@
-"""A log to what can be told of it without judging it; also of logs that somebody else wrote, or that are damaged."""
+"""Content of a log without judging it, also of damaged logs and logs of other programs."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.namespaces import meant
 from manipcli.record.foreign.topics import open_topics
 from manipcli.record.read.reading import open_recording
-from manipcli.report.log_info import LogInfo
+from manipcli.report.logs.log_info import LogInfo
 
 COMMON = (channels.ROBOT_DESCRIPTION, channels.JOINT_STATES, channels.TF)
-"""Topics that a log of any robot may hold, and that manipcli understands whoever wrote them."""
+"""Topics that manipcli reads from the log of any program."""
 
 
 def log_info(path: Path) -> LogInfo:
-    """
+    """Topics, steps, metadata and missing parts of a log.
+
     Raises:
-        BadRecording: the file is no MCAP file, or cannot be read.
+        BadRecording: the file is not an MCAP file, or cannot be read.
     """
     found = open_topics(path, damaged=True)
     ours = RECORD in found.metadata
@@ -42,10 +43,10 @@ def log_info(path: Path) -> LogInfo:
             if channels.CONTACTS in recording.silent:
                 missing.append(recording.unknown(channels.CONTACTS))
             if not status:
-                missing.append("the run did not come to its end: the log has no status and no verdict")
+                missing.append("the run did not finish: the log has no status and no verdict")
     else:
-        missing.append("manipcli did not write it: it tells of no task, no steps and no verdict")
+        missing.append("not written by manipcli: no task, no steps and no verdict")
         known = meant({name: topic.type for name, topic in found.all.items()})
         there = {known[name].usual for name, topic in found.all.items() if topic.count and name in known}
-        missing += [f"there is no {topic}" for topic in COMMON if topic not in there]
+        missing += [f"the log has no {topic}" for topic in COMMON if topic not in there]
     return LogInfo(found=found, ours=ours, steps=steps, missing=tuple(missing))

@@ -1,4 +1,4 @@
-"""The mesh files of a log, found again on the machine that shows it."""
+"""Search for the mesh files of a log on this machine."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from manipcli.shapes.primitives import Geometry, Mesh
 
 
 class MeshSearch:
-    """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
+    """Sets the file paths of the meshes of a robot or a scene, which a log holds as URIs.
 
-    What the log carries itself, and files that are known, are taken. Packages are looked for as for a description
-    beside the log, in the folders of a project that holds the log in `runs/`, and in the working directory and its
-    folders. What is not found keeps its URI as its path: whoever draws it draws something else.
+    Known files and files embedded in the log come first. Packages are searched next to the log, in the folders of a
+    project that holds the log in `runs/`, and in the working directory and its folders. A mesh that is not found keeps
+    its URI as its path, and is drawn as a placeholder.
 
     Args:
-        log: where the log is.
-        hashes: SHA-256 of the files in the run, by URI, where they are known.
-        embedded: files that the log carries, by URI.
-        known: files that the run had, by URI, where whoever asks has just run it.
+        log: path of the log.
+        hashes: SHA-256 of the files in the run, by URI, if known.
+        embedded: files embedded in the log, by URI.
+        known: files of the run by URI, if it was just run.
         package_path, allow_outside: see `Packages`.
 
     Attributes:
-        folder: of the files that the log carried; it is removed when nobody holds this any longer.
+        folder: temporary folder of the embedded files, removed together with this object.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class MeshSearch:
     ) -> None:
         here = Path.cwd()
         beside = log.resolve().parent
-        # Of any other folder the one above may hold everything: /, or where all homes are.
+        # The parent of any other folder can be / or /home, which is too large to search.
         project = _folders(beside.parent) if beside.name == RUNS.name else []
         places = [*package_path, *project, *_folders(beside), here, *_folders(here)]
         self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
@@ -57,7 +57,7 @@ class MeshSearch:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was not found, or is another file than in the run; a sentence each."""
+        """Meshes that are not found or differ from the run; one sentence each."""
         return tuple(self._notes)
 
     def robot(self, robot: RobotModel) -> RobotModel:
@@ -76,10 +76,10 @@ class MeshSearch:
 
     def _all(self, geometries: tuple[Geometry, ...]) -> tuple[Geometry, ...]:
         return tuple(
-            replace(one, shape=replace(one.shape, path=self._path(one.shape.uri)))
-            if isinstance(one.shape, Mesh)
-            else one
-            for one in geometries
+            replace(geometry, shape=replace(geometry.shape, path=self._path(geometry.shape.uri)))
+            if isinstance(geometry.shape, Mesh)
+            else geometry
+            for geometry in geometries
         )
 
     def _path(self, uri: str) -> Path:
@@ -94,19 +94,19 @@ class MeshSearch:
             scheme, _, rest = uri.partition("://")
             if scheme == "package":
                 name = rest.partition("/")[0]
-                note = f"package '{name}' is not found, or lacks a mesh: give its place with --package-path DIR"
+                note = f"package '{name}' not found, or it lacks a mesh: set its location with --package-path DIR"
             else:
                 note = error.message
             self._notes.setdefault(note)
             return Path(uri)
         digest = self._hashes.get(uri)
         if digest is not None and hashlib.sha256(path.read_bytes()).hexdigest() != digest:
-            self._notes.setdefault(f"mesh '{uri}' is not the file that it was in the run")
+            self._notes.setdefault(f"mesh '{uri}' differs from the file of the run")
         return path
 
 
 def _unpacked(embedded: Mapping[str, bytes], folder: Path) -> dict[str, Path]:
-    """Files by their URIs; those of one folder stay together, as a mesh and its materials, and none leaves `folder`."""
+    """Files by URI, written below `folder`; files of one folder stay together, such as a mesh and its materials."""
     found = {}
     for uri, data in embedded.items():
         place, _, name = uri.rpartition("/")
@@ -118,8 +118,8 @@ def _unpacked(embedded: Mapping[str, bytes], folder: Path) -> dict[str, Path]:
 
 
 def _folders(folder: Path) -> list[Path]:
-    """The folders in a folder that are not hidden, by name."""
+    """The visible subfolders of a folder, sorted by name."""
     try:
-        return sorted(one for one in folder.iterdir() if one.is_dir() and not one.name.startswith("."))
+        return sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
     except OSError:
         return []

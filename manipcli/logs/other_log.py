@@ -1,6 +1,6 @@
-"""A ROS 2 log that manipcli did not write, as far as it can be shown: `/robot_description`, `/joint_states`, `/tf`.
+"""Playback of a ROS 2 log of another program, from `/robot_description`, `/joint_states` and `/tf`.
 
-What is missing is said and done without: joints that no `/joint_states` names are taken from `/tf`, else shown at zero.
+Missing data is listed in the notes: joints that are not in `/joint_states` are taken from `/tf`, else shown at zero.
 """
 
 from __future__ import annotations
@@ -33,26 +33,26 @@ from manipcli.replay.playback import Playback
 from manipcli.scene.scene import Body, Scene
 
 LEAST_STEADY = 1e-6
-"""[m], and of a quaternion's parts: a frame that moves by less stands still."""
+"""[m], or quaternion component: a frame that moves less is fixed."""
 MAX_TIMES = 200_000
-"""Of what is shown: more than an hour at the usual rate."""
+"""Most states of a playback, more than an hour at the usual rate."""
 
 
 @dataclass(slots=True)
 class _Samples:
-    """One thing over time: times [s] and rows of numbers, as they came."""
+    """A signal over time: times [s] and rows of numbers."""
 
     times: list[float]
     rows: list[Sequence[float]]
 
     def at(self, times: Array) -> Array:
-        """(T, c) between the samples in a straight line, beyond them as the nearest."""
+        """(T, c) interpolated linearly; constant before the first and after the last sample."""
         known, rows = np.array(self.times), np.array(self.rows, dtype=np.float64)
         order = np.argsort(known, kind="stable")
         return np.stack([np.interp(times, known[order], column[order]) for column in rows.T], axis=1)
 
-    def told(self, times: Array) -> Array:
-        """The same with NaN before the first sample."""
+    def observed(self, times: Array) -> Array:
+        """As `at`, with NaN before the first sample."""
         found = self.at(times)
         found[times < min(self.times)] = np.nan
         return found
@@ -60,7 +60,7 @@ class _Samples:
 
 @dataclass(frozen=True, slots=True)
 class _Poses:
-    """A frame over time: `p` (T, 3), `q` (T, 4) xyzw."""
+    """Poses of a frame over time: `p` (T, 3) [m], `q` (T, 4) xyzw."""
 
     p: Array
     q: Array
@@ -74,13 +74,13 @@ class _Poses:
 
     @property
     def steady(self) -> bool:
-        """Whether it does not move."""
+        """Whether the frame is fixed."""
         turned = np.minimum(np.abs(self.q - self.q[:1]), np.abs(self.q + self.q[:1]))
         return bool(np.ptp(self.p, axis=0).max() < LEAST_STEADY and turned.max() < LEAST_STEADY)
 
 
 class _Log:
-    """What was read of the log; of the robots in several namespaces, of that in `space` and of what they share."""
+    """The data of a log; of several robots only that in namespace `space`, and shared topics."""
 
     def __init__(self, topics: Topics, space: str | None) -> None:
         self.urdf = ""
@@ -91,11 +91,11 @@ class _Log:
         self.spaces = namespaces(known.values())
         if space is not None and space not in self.spaces:
             raise InvalidInput([_no_robot(topics.path, space, self.spaces)])
-        # Of several robots none is meant; of one alone, in whatever namespace, it is.
+        # A single robot is shown whatever its namespace; among several, one must be chosen.
         shown = {"", space, *(self.spaces if len(self.spaces) == 1 else ())}
-        wanted = {name: one.usual for name, one in known.items() if one.namespace in shown}
+        wanted = {name: meaning.usual for name, meaning in known.items() if meaning.namespace in shown}
         self.unshown = [name for name in known if name not in wanted]
-        there = {one.usual for name, one in known.items() if space is None or name in wanted}
+        there = {meaning.usual for name, meaning in known.items() if space is None or name in wanted}
         self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
         begin = self._first(topics, wanted)
         for topic, data, places in topics.messages(wanted):
@@ -106,9 +106,9 @@ class _Log:
                 raise BadRecording(topics.path, f"{topic} cannot be read: {error}") from error
 
     def _first(self, topics: Topics, wanted: Mapping[str, str]) -> int:
-        """[ns] when what moves begins: a description may be from long before."""
+        """Time of the first moving data [ns]; a description can be much older."""
         moving = [topics.all[name] for name, usual in wanted.items() if usual in (channels.JOINT_STATES, channels.TF)]
-        return min((one.first for one in moving if one.count), default=topics.start)
+        return min((topic.first for topic in moving if topic.count), default=topics.start)
 
     def _take(self, topic: str, time: float, reader: CdrReader) -> None:
         if topic == channels.ROBOT_DESCRIPTION:
@@ -136,14 +136,14 @@ class _Log:
         for parent, child, row in transforms(reader):
             samples = self.frames.setdefault((parent, child), _Samples([], []))
             if samples.rows and sum(a * b for a, b in zip(row[3:], samples.rows[-1][3:], strict=True)) < 0.0:
-                row[3:] = [-value for value in row[3:]]  # the same rotation, on the side of the one before it
+                row[3:] = [-value for value in row[3:]]  # same rotation, in the hemisphere of the previous quaternion
             samples.times.append(time)
             samples.rows.append(row)
 
 
-NOWHERE: Final = "shown at zero, as nothing says where they are"
-AT_TIMES: Final = "shown as they were before, or will be, while nothing says where they are"
-FOREIGN: Final = "manipcli did not write this log"
+NOWHERE: Final = "shown at zero, position unknown"
+AT_TIMES: Final = "held at the nearest known position while unknown"
+FOREIGN: Final = "not written by manipcli"
 
 
 def open_other(
@@ -155,25 +155,25 @@ def open_other(
     package_path: Sequence[Path],
     allow_outside: bool,
 ) -> Playback:
-    """A log of another program, as it is shown; see `open_playback`. `why` it has to be taken for one.
+    """Playback of a log of another program; see `open_playback`. `why`: why it is treated as one.
 
     Raises:
-        InvalidInput: it is no MCAP file, damaged, or holds neither joints nor frames that move.
+        InvalidInput: the file is not an MCAP file, is damaged, or has neither moving joints nor frames.
     """
     topics = open_topics(path)
     log = _Log(topics, space)
-    notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
-    subject = "it" if space is None else f"'{space}'"
+    notes = [f"{why}: no steps, no contacts, no references and no verdict"]
+    subject = "the log" if space is None else f"'{space}'"
     notes += [f"{subject} has no {name} ({TYPES[name]})" for name in log.lacks]
-    several = f"it tells of several robots, in {listed(log.spaces)}" if len(log.spaces) > 1 else ""
-    notes += [f"{several}: what {listed(log.unshown)} say is not shown"] if several else []
+    several = f"{len(log.spaces)} robots in the log: {listed(log.spaces)}" if len(log.spaces) > 1 else ""
+    notes += [f"{several}; {listed(log.unshown)} not shown"] if several else []
     if not np.isfinite(log.start):
         unchosen = several if space is None else ""
         what = unchosen or f"{subject} has neither {channels.JOINT_STATES} nor {channels.TF}"
         message = f"{path.name}: nothing to show: {what}"
-        hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
+        hint = f"topics: {listed(sorted(topics.all)) or 'none'}; plot their numbers with `manipcli plot`"
         if unchosen:
-            hint = f"show one of them with --robot, as in --robot {log.spaces[0]}"
+            hint = f"select a robot with --robot, such as --robot {log.spaces[0]}"
         raise InvalidInput([Diagnostic("REPLAY002", message, hint=hint)])
     count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))
     times = np.linspace(log.start, log.end, count + 1) if log.end > log.start else np.array([log.start])
@@ -186,7 +186,7 @@ def open_other(
     names = robot.joint_names if robot is not None else tuple(log.joints)
     unknown: dict[str, list[str]] = {}
     columns = [_joint(name, log, robot, tree, times, unknown) for name in names]
-    notes += [f"{what}: {listed(each)}" for what, each in unknown.items()]
+    notes += [f"{what}: {listed(joints)}" for what, joints in unknown.items()]
     position, velocity, effort = np.moveaxis(np.array(columns).reshape(-1, len(times), 3), (2, 1), (0, 1))
     scene, p, q = _scene(robot, tree, len(times))
     return Playback(
@@ -208,7 +208,7 @@ def open_other(
 
 
 def _no_robot(path: Path, space: str, spaces: Sequence[str]) -> Diagnostic:
-    hint = did_you_mean(space, spaces, kind="namespaces") or "it tells of one robot at most: leave --robot out"
+    hint = did_you_mean(space, spaces, kind="namespaces") or "the log has at most one robot: omit --robot"
     return Diagnostic("REPLAY003", f"{path.name}: no robot in '{space}'", hint=hint)
 
 
@@ -220,22 +220,22 @@ def _poses(samples: _Samples, times: Array) -> _Poses:
 
 
 def _robot(urdf: str, notes: list[str]) -> RobotModel | None:
-    """The robot of a description without its file; where it cannot be used the first error is noted."""
+    """The robot of a URDF text; None if it is invalid, with its first error added to `notes`."""
     if not urdf:
         return None
     try:
         parts = read_parts(unread_description(urdf.encode(), "robot_description"))
     except InvalidInput as error:
-        notes.append(f"the robot is not shown: {error.findings[0].message}")
+        notes.append(f"robot not shown: {error.findings[0].message}")
         return None
     if parts.errors:
-        notes.append(f"the robot is not shown: {parts.errors[0].message}")
+        notes.append(f"robot not shown: {parts.errors[0].message}")
         return None
     return bare_robot(parts)
 
 
 def _chain(frame: str, tree: Mapping[str, tuple[str, _Poses]]) -> tuple[str, _Poses | None]:
-    """The frame at the top above a frame, and the pose of the frame in it; None where it is the top itself."""
+    """The root frame above a frame, and the pose of the frame in it; None if the frame is the root."""
     pose: _Poses | None = None
     seen = {frame}
     while frame in tree:
@@ -248,13 +248,13 @@ def _chain(frame: str, tree: Mapping[str, tuple[str, _Poses]]) -> tuple[str, _Po
 
 
 def _placed(robot: RobotModel, tree: Mapping[str, tuple[str, _Poses]], notes: list[str]) -> RobotModel:
-    """The robot where its base stands; one that drives about is shown at the origin, and what is around it moves."""
+    """The robot at its base pose; a mobile robot is shown at the origin, and its surroundings move."""
     top, pose = _chain(robot.root, tree)
     if pose is None:
         return robot
     if pose.steady:
         return replace(robot, X_WB=Transform.of(xyz=pose.p[0], quat_xyzw=pose.q[0]))
-    notes.append(f"the robot's base moves in '{top}': everything is shown as seen from '{robot.root}'")
+    notes.append(f"the robot base moves in '{top}': poses are shown relative to '{robot.root}'")
     return robot
 
 
@@ -266,9 +266,9 @@ def _joint(
     times: Array,
     unknown: dict[str, list[str]],
 ) -> Array:
-    """(T, 3) position, velocity, effort of a joint; NaN for what is not known. `unknown`: what to say, of which."""
+    """(T, 3) position, velocity, effort of a joint; NaN for unknown values, whose note is added to `unknown`."""
     if name in log.joints:
-        found = log.joints[name].told(times)
+        found = log.joints[name].observed(times)
         lacks = np.isnan(found[:, 0])
         if lacks.all():
             unknown.setdefault(NOWHERE, []).append(name)
@@ -279,9 +279,9 @@ def _joint(
     joint = robot.joint(name) if robot is not None else None
     if joint is not None and joint.child in tree and tree[joint.child][0] == joint.parent:
         found[:, 0] = _angle(joint, tree[joint.child][1])
-        unknown.setdefault(f"taken from {channels.TF}, as no {channels.JOINT_STATES} names them", []).append(name)
+        unknown.setdefault(f"taken from {channels.TF}, missing in {channels.JOINT_STATES}", []).append(name)
     elif joint is not None and joint.mimic is not None and joint.mimic.joint in log.joints:
-        leader = log.joints[joint.mimic.joint].told(times)[:, 0]
+        leader = log.joints[joint.mimic.joint].observed(times)[:, 0]
         found[:, 0] = joint.mimic.multiplier * leader + joint.mimic.offset
     else:
         unknown.setdefault(NOWHERE, []).append(name)
@@ -289,7 +289,7 @@ def _joint(
 
 
 def _angle(joint: Joint, pose: _Poses) -> Array:
-    """(T,) the position of a joint whose child link stands so in its parent: X_PC = X_PJ X_JC(position)."""
+    """(T,) positions of a joint from the pose of its child link in its parent: X_PC = X_PJ X_JC(position)."""
     inside = _Poses(joint.X_PJ.p[None], joint.X_PJ.quat_xyzw[None]).inverse() @ pose
     if joint.type == "prismatic":
         return np.asarray(inside.p @ joint.axis)
@@ -297,7 +297,7 @@ def _angle(joint: Joint, pose: _Poses) -> Array:
 
 
 def _scene(robot: RobotModel | None, tree: Mapping[str, tuple[str, _Poses]], count: int) -> tuple[Scene, Array, Array]:
-    """Frames that are no links of the robot, as bodies without a shape, and their poses (T, m, 3) and (T, m, 4)."""
+    """Frames other than robot links as bodies without a shape, and their poses (T, m, 3) and (T, m, 4) xyzw."""
     links = {link.name for link in robot.links} if robot is not None else set()
     base = _chain(robot.root, tree)[1] if robot is not None else None
     back = base.inverse() if base is not None and not base.steady else None
@@ -307,7 +307,7 @@ def _scene(robot: RobotModel | None, tree: Mapping[str, tuple[str, _Poses]], cou
         if frame in links or pose is None:
             continue
         shown = pose if back is None else back @ pose
-        # The names of the world and of links are taken in a drawing.
+        # A drawing already uses the names of the world and of the links.
         bodies.append(_shapeless(f"/{frame}" if frame == WORLD or frame.startswith("robot/") else frame))
         p.append(shown.p[:, None])
         q.append(shown.q[:, None])

@@ -1,4 +1,4 @@
-"""The files, the robot and the scene of a log, from the log alone; no mesh is looked for."""
+"""Files, robot and scene of a log, from the log alone, without searching for meshes."""
 
 from __future__ import annotations
 
@@ -36,28 +36,28 @@ def recorded_controllers_file(recording: Recording, path: Path) -> Located[Contr
 
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:
-    """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
+    """The robot of a log: from its expanded URDF and resolved robot file, without mesh files."""
     return rebuild_robot(recorded_robot_file(recording, path).spec, attached(recording, path, URDF))
 
 
 def recorded_scene(recording: Recording, path: Path) -> Scene:
-    """The scene of a log at its start; no mesh is looked for."""
+    """The scene of a log at its start, without mesh files."""
     try:
         return scene_from_json(attached(recording, path, SCENE))
     except ValueError as error:
-        message = f"{path.name}/{SCENE}: this is not the scene of a log"
+        message = f"{path.name}/{SCENE}: invalid scene"
         raise InvalidInput([Diagnostic("LOG103", message)]) from error
 
 
 def attached(recording: Recording, path: Path, name: str) -> bytes:
-    """An attachment.
+    """The bytes of an attachment.
 
     Raises:
         InvalidInput: the log has no such attachment.
     """
     if name not in recording.attachments:
-        message = f"{path.name}: the log holds no '{name}', without which it cannot be judged"
+        message = f"{path.name}: attachment '{name}' is missing, the log cannot be judged"
         raise InvalidInput(
-            [Diagnostic("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")]
+            [Diagnostic("LOG102", message, hint="use the log as manipcli wrote it, not a filtered copy")]
         )
     return recording.attachments[name]

@@ -1,4 +1,4 @@
-"""A log to the task that it is the run of, ready to be run again: from its attachments and the files of its meshes."""
+"""The task of a log, ready to re-run, from its attachments and the files of its meshes."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class RecordedTask:
     """The task of a log.
 
     Attributes:
-        task: as it was.
-        embedded: whether the log carries its meshes.
-        unlike: what is not as it was in the run (versions, meshes), a sentence each.
-        keep: holds the folder of the files that were in the log.
+        task: task of the run.
+        embedded: whether the log embeds its meshes.
+        unlike: versions and meshes that differ from the run, one finding each.
+        keep: owner of the temporary folder of the embedded files.
     """
 
     task: Task
@@ -60,11 +60,11 @@ def recorded_task(
 
     Args:
         recording: the log.
-        path: where it is.
-        package_path, allow_outside: where meshes are looked for that it does not carry, see `MeshSearch`.
+        path: path of the log.
+        package_path, allow_outside: where meshes are searched that the log does not embed, see `MeshSearch`.
 
     Raises:
-        InvalidInput: it lacks a file, one of them cannot be used, or a mesh is not found.
+        InvalidInput: an attachment is missing or invalid, or a mesh is not found.
     """
     task = recorded_task_file(recording, path)
     robot_file = recorded_robot_file(recording, path)
@@ -77,14 +77,16 @@ def recorded_task(
         allow_outside=allow_outside,
     )
     robot = meshes.robot(recorded_robot(recording, path))
-    # What the scene was built from may be files that no log carries; otherwise the task itself says it.
+    # Scene bodies can come from files that the log does not hold; then the recorded scene is used.
     from_files = any(body.mesh is not None or body.urdf is not None for body in task.spec.scene.values())
     found_scene = meshes.scene(recorded_scene(recording, path)) if from_files else None
 
     def scene_of(file: Located[TaskSpec]) -> Scene:
         if found_scene is None:
             return build_scene(file.spec)
-        return replace(found_scene, gravity=frozen(file.spec.simulation.gravity))  # recorded is what was drawn
+        return replace(
+            found_scene, gravity=frozen(file.spec.simulation.gravity)
+        )  # the recorded gravity is the sampled one
 
     scene = scene_of(task)
     found = disagreements(task, controllers, robot, scene)
@@ -115,18 +117,18 @@ def recorded_task(
 
 
 def _drawn(recording: Recording, path: Path) -> Drawn | None:
-    """Which sample the run was of, if it was of one."""
+    """The sampled values of the run; None for a task as written."""
     if SAMPLE not in recording.metadata:
         return None
     try:
         return Drawn.from_metadata(recording.metadata[SAMPLE])
     except ValueError:
-        message = f"{path.name}: what was drawn for its sample cannot be read"
+        message = f"{path.name}: invalid values of its sample"
         raise InvalidInput([Diagnostic("LOG103", message)]) from None
 
 
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
-    """Where steps and what is judged were written, as the plan in the log says; {} where it does not."""
+    """Where steps and expectations are written, from the plan in the log; {} without a plan."""
     plan = PlanOutline.read(attached(recording, path, PLAN_FILE))
     places = [*(step.place for step in plan.steps), *plan.judged]
     keys = [*(("steps", k) for k in range(len(spec.steps))), *spec.judged_at]
@@ -137,8 +139,8 @@ def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> N
     absent = [uri for uri, file in files.items() if not file.is_file()]
     if absent:
         more = f" (and {len(absent) - 1} more)" if len(absent) > 1 else ""
-        message = f"mesh '{absent[0]}' is not found{more}: nothing can be simulated again without it"
-        hint = "; ".join(meshes.notes) or "give the place of its package with --package-path DIR"
+        message = f"mesh '{absent[0]}' not found{more}: the log cannot be re-simulated"
+        hint = "; ".join(meshes.notes) or "set the location of its package with --package-path DIR"
         raise InvalidInput([Diagnostic("LOG400", message, Place(str(path), 0, 0), hint=hint)])
 
 
@@ -148,7 +150,7 @@ def _versions(recording: Recording, path: Path, task: Task) -> Iterator[Diagnost
     then = recording.metadata.get("versions", {})
     for name in dict.fromkeys((*then, *now)):
         if then.get(name) != now.get(name):
-            message = f"the run was made with {name} {then.get(name, '(unknown)')}; this is {now.get(name, 'without')}"
+            message = f"{name} differs: {then.get(name, '(unknown)')} in the run, {now.get(name, 'not used')} now"
             yield Diagnostic("LOG401", message, Place(str(path), 0, 0), severity="warning")
 
 
@@ -156,5 +158,5 @@ def _meshes(recording: Recording, path: Path, files: Mapping[str, Path]) -> Iter
     then = recording.metadata.get("meshes", {})
     for uri, file in files.items():
         if hashlib.sha256(file.read_bytes()).hexdigest() != then.get(uri):
-            message = f"mesh '{uri}' is not the file that it was in the run"
+            message = f"mesh '{uri}' differs from the file of the run"
             yield Diagnostic("LOG402", message, Place(str(path), 0, 0), severity="warning")

@@ -1,4 +1,4 @@
-"""A log to what is shown of it, from nothing but the log and the files of its meshes."""
+"""Playback of a log, from the log and the files of its meshes."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ def open_playback(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> Playback:
-    """A log as it is shown.
+    """Playback of a log.
 
     Args:
-        path: the log of a run, what a killed run left of it, or a ROS 2 log of another program.
-        rate: [Hz] of what is shown.
-        space: the namespace of the robot that is shown, of several that another program recorded, as `/r1`.
-        meshes: files that the run had, by URI, where they are known.
-        package_path: folders to look for packages of meshes in, before those near the log and the working directory.
-        allow_outside: lets a mesh lie anywhere.
+        path: the log of a run, the partial log of a killed run, or a ROS 2 log of another program.
+        rate: sampling rate of the playback [Hz].
+        space: namespace of the shown robot, such as `/r1`, in a log of another program with several robots.
+        meshes: mesh files of the run by URI, if known.
+        package_path: folders with packages of meshes, searched before those near the log and the working directory.
+        allow_outside: allow mesh files in any folder.
 
     Raises:
-        InvalidInput: the file is no log, is damaged, or has nothing to show.
+        InvalidInput: the file is not a log, is damaged, or has nothing to show.
     """
     if space is None and is_own(path):
         try:
@@ -61,7 +61,7 @@ def _open_own(
     recording = open_recording(path)
     samples = sampled(recording, rate=rate)
     if samples is None:
-        raise InvalidInput([Diagnostic("REPLAY001", f"{path.name}: nothing was recorded: there is no tick to show")])
+        raise InvalidInput([Diagnostic("REPLAY001", f"{path.name}: no recorded state to show")])
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
     verdict = judge_recording(recording, path)
     meshes = MeshSearch(
@@ -81,7 +81,7 @@ def _open_own(
         start = [scene.body(name).X_WO for name in recording.body_names]
         body_position = frozen(np.broadcast_to([X_WO.p for X_WO in start], body_position.shape))
         body_quat_xyzw = frozen(np.broadcast_to([X_WO.quat_xyzw for X_WO in start], body_quat_xyzw.shape))
-        notes = (*notes, f"the run did not record {TF}: every body is drawn where it was at the start")
+        notes = (*notes, f"{TF} not recorded: bodies are drawn at their start poses")
     notes = (*notes, *(recording.unknown(topic) for topic in recording.silent))
     return Playback(
         name=verdict.task or path.name,
@@ -105,14 +105,14 @@ def _open_own(
 
 
 def playback_steps(verdict: Verdict, events: Sequence[TaskEvent], *, end: float) -> tuple[PlaybackStep, ...]:
-    """The steps that were begun; what did not end, ends at `end` [s]."""
+    """The started steps; a step that did not end gets the end `end` [s]."""
     begun = [step for step in verdict.steps if step.started is not None]
     return tuple(_step(step, events, end) for step in sorted(begun, key=lambda step: step.started or 0.0))
 
 
 def _step(step: StepOutcome, events: Sequence[TaskEvent], end: float) -> PlaybackStep:
     start, last = step.started or 0.0, end if step.ended is None else step.ended
-    begins = [(one.text, one.time) for one in events if one.kind == "phase_started" and one.step == step.id]
+    begins = [(event.text, event.time) for event in events if event.kind == "phase_started" and event.step == step.id]
     return PlaybackStep(
         id=step.id,
         verb=step.verb,

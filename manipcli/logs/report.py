@@ -1,4 +1,4 @@
-"""A log, or a task that was refused, to the page about it and to what CI reads of it."""
+"""Content of the page of a log or of a refused task, and the places of its steps and expectations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from manipcli.plan.outline import PLAN_FILE, PlanOutline
 from manipcli.record.attachments import CONTROLLERS, ROBOT, TASK
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
-from manipcli.replay.frames import Frames, telling
+from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import RATE, Playback
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
@@ -35,27 +35,27 @@ from manipcli.task.task import Task
 from manipcli.task.vocabulary import task_spec
 
 PICTURE = (640, 480)
-"""Width and height of a picture [pixel]."""
+"""Width and height of the pictures [pixel]."""
 QUALITY = 82
-"""Of WebP files, 0 to 100."""
+"""Quality of the WebP files, 0 to 100."""
 FRAMES = 1500
-"""Of the replay in a page, so that the page of a long run does not grow without end."""
+"""Most states of the replay in a page, which bounds the size of the page of a long run."""
 
 Places = tuple[tuple[Written, ...], tuple[Written, ...]]
-"""Of the steps, and of the expectations, of a task."""
+"""Places of the steps and of the expectations of a task."""
 
 
 def log_page(
     path: Path, *, meshes: Mapping[str, Path] = {}, package_path: Sequence[Path] = (), allow_outside: bool = False
 ) -> RunPage:
-    """The page about a log, from nothing but the log and the files of its meshes.
+    """The page of a log, from the log and the files of its meshes.
 
     Args:
-        path: the log of a run, or what a killed run left of it.
+        path: the log of a run, or the partial log of a killed run.
         meshes, package_path, allow_outside: see `open_playback`.
 
     Raises:
-        InvalidInput: the file is no log of ours, or is damaged.
+        InvalidInput: the file is not a log of manipcli, or is damaged.
     """
     recording = open_recording(path)
     if not any(len(span.states.time) for span in recording.spans):  # it ended before the start
@@ -64,11 +64,11 @@ def log_page(
         path, rate=_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
     )
     verdict = playback.verdict
-    assert verdict is not None, "the log is one of ours"
+    assert verdict is not None, "a log of manipcli has a verdict"
     page = _page(recording, path, verdict, end=playback.end)
     worst = page.causes[0].at if page.causes else None
     with Frames(playback, size=PICTURE, captions=False) as frames:
-        pictures = {step.id: _picture(frames, telling(playback, step)) for step in playback.steps}
+        pictures = {step.id: _picture(frames, clearest_time(playback, step)) for step in playback.steps}
         moment = _picture(frames, worst) if worst is not None else None
     return replace(
         page,
@@ -81,7 +81,7 @@ def log_page(
 
 
 def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | None) -> RunPage:
-    """What needs no tick of a log. `end` [s]: of the run; None where it did not begin."""
+    """The parts of the page that need no state of the log. `end`: end of the run [s]; None if it did not start."""
     places = log_places(recording, path, verdict.steps)
     return RunPage(
         verdict=verdict,
@@ -91,8 +91,10 @@ def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | No
         steps=places[0],
         expectations=places[1],
         limits=tuple(
-            _limit(one, outcome.unit)
-            for one, outcome in zip(recorded_task_file(recording, path).spec.judged, verdict.expectations, strict=False)
+            _limit(spec, outcome.unit)
+            for spec, outcome in zip(
+                recorded_task_file(recording, path).spec.judged, verdict.expectations, strict=False
+            )
         ),
         sources=tuple(
             Source(name, recording.attachments[name].decode("utf-8", "replace"))
@@ -105,7 +107,7 @@ def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | No
 
 
 def refused_page(task: Task, verdict: Verdict) -> RunPage:
-    """The page about a task of which a step cannot be planned: there is no log, and the file is shown as written."""
+    """The page of a task with a step that cannot be planned: without a log, with the file as written."""
     places = task_places(task.file)
     file = Path(task.file.place().file)
     return RunPage(
@@ -125,9 +127,9 @@ def refused_page(task: Task, verdict: Verdict) -> RunPage:
 
 
 def log_places(recording: Recording, path: Path, outcomes: Sequence[StepOutcome]) -> Places:
-    """Where the log says that steps and expectations were written, and their lines in the resolved task.
+    """Where steps and expectations are written according to the log, and their lines in the resolved task.
 
-    The steps are those of `outcomes`: a log whose plan is lost tells of those alone that began.
+    The steps are those of `outcomes`, since a log without its plan knows only the started steps.
     """
     task = recorded_task_file(recording, path)
     known, judged = _known_places(recording)
@@ -137,15 +139,15 @@ def log_places(recording: Recording, path: Path, outcomes: Sequence[StepOutcome]
 
     numbers = {str(step.id): k for k, step in enumerate(task.spec.steps)}
     steps = tuple(
-        written(known.get(one.id, ""), "steps", numbers[one.id]) if one.id in numbers else Written("")
-        for one in outcomes
+        written(known.get(outcome.id, ""), "steps", numbers[outcome.id]) if outcome.id in numbers else Written("")
+        for outcome in outcomes
     )
     keys = task.spec.judged_at
     return steps, tuple(written(judged[k] if len(judged) == len(keys) else "", *key) for k, key in enumerate(keys))
 
 
 def task_places(task: Located[TaskSpec]) -> Places:
-    """Where steps and expectations stand in the file of a task."""
+    """Where steps and expectations are written in a task file."""
 
     def written(*key: str | int) -> Written:
         place = task.place(*key)
@@ -157,17 +159,17 @@ def task_places(task: Located[TaskSpec]) -> Places:
 
 
 def file_places(path: Path, overrides: Sequence[str]) -> Places:
-    """The same of a task file that is read for this alone.
+    """As `task_places`, from the path of a task file.
 
     Raises:
-        InvalidInput: it cannot be used.
+        InvalidInput: the file is invalid.
     """
     return task_places(load_spec(path, model=task_spec(), overrides=overrides))
 
 
 def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
-    """Where each step was written, `pour.yaml:21:5`, by its id, of those begun where the plan does not say; and where
-    each expectation and watch, none where the plan does not say."""
+    """Places such as `pour.yaml:21:5`: of steps by id (without a plan, of started steps), and of expectations and
+    watches (empty without a plan)."""
     places = {event.step: event.place for event in recording.events if event.place}
     plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
     return places | {step.id: step.place for step in plan.steps if step.place}, list(plan.judged)
@@ -179,7 +181,7 @@ def _rate(recording: Recording) -> float:
 
 
 def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cause, ...]:
-    """Errors, then steps that went wrong, then expectations that are not met. `end` [s]: None where nothing was run."""
+    """Errors, then failed steps, then unmet expectations. `end`: end of the run [s]; None if nothing was run."""
     if verdict.verdict == "passed":
         return ()
     hint = next((finding.hint for finding in verdict.errors if finding.hint), None) or ""
@@ -192,30 +194,31 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
             at = None if end is None else step.ended if step.ended is not None else end
             causes.append(Cause(how_wrong(step), step.text, at, written, hint))
             hint = ""
-    for one, written in zip(verdict.expectations, places[1], strict=False):
-        if one.outcome != "passed" and end is not None:
-            causes.append(Cause(f"expectation '{one.name}' {_missed(one)}", one.text, one.at, written))
+    for expectation, written in zip(verdict.expectations, places[1], strict=False):
+        if expectation.outcome != "passed" and end is not None:
+            title = f"expectation '{expectation.name}' {_missed(expectation)}"
+            causes.append(Cause(title, expectation.text, expectation.at, written))
     if verdict.verdict == "failed" and verdict.ended_between:
         causes.insert(0, Cause(verdict.text, "", end))
     return tuple(causes)
 
 
-def _missed(one: ExpectationOutcome) -> str:
-    if one.outcome == "not_evaluated":
+def _missed(expectation: ExpectationOutcome) -> str:
+    if expectation.outcome == "not_evaluated":
         return "was never evaluated"
-    return f"fails by {quantity(one.distance, one.unit)}" if one.distance else "fails"
+    return f"fails by {quantity(expectation.distance, expectation.unit)}" if expectation.distance else "fails"
 
 
 def _limit(asked: ExpectationSpec, unit: str) -> float | None:
-    """As `limit_of`, of an expectation; of a combination none, since one of several decides, and none of `never`."""
+    """As `limit_of` for an expectation; None for combinations and for `never`, which have no single limit."""
     condition = asked.condition
     return None if condition.combines or asked.quantifier == "never" else limit_of(condition.body, unit)
 
 
 def limit_of(spec: Model, unit: str) -> float | None:
-    """What a margin in `unit` is measured from, in it; None where that is not stated.
+    """The limit that a margin in `unit` is measured from, in `unit`; None if the condition states none.
 
-    Conditions and expectations call it `within` or `below`, those that ask for two things have one more.
+    The limit is the key `within` or `below`; some conditions have a second one.
     """
     match spec:
         case SlipSpec() | UnmovedSpec() if unit == "rad":
@@ -223,7 +226,7 @@ def limit_of(spec: Model, unit: str) -> float | None:
         case AtPoseSpec() if unit == "m":
             return spec.slide or SLIDE
         case ContactForceSpec(above=float()):
-            return None  # either of its two may be what the margin is of
+            return None  # the margin can belong to either of its two limits
     for key in ("within", "below"):
         value = getattr(spec, key, None)
         if isinstance(value, float) and value > 0.0:
@@ -246,12 +249,12 @@ def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tup
         ("engine", verdict.engine),
         ("seed", str(verdict.seed)),
         ("control period", f"{1e3 * recording.period:g} ms"),
-        ("run", run.get("status", "") or "did not come to its end"),
+        ("run", run.get("status", "") or "did not finish"),
     )
 
 
 def _hashes(recording: Recording, path: Path) -> tuple[tuple[str, str], ...]:
-    """SHA-256 of the log, of the files that it carries, and of the meshes."""
+    """SHA-256 of the log, its attachments and the meshes."""
     with path.open("rb") as file:
         log = hashlib.file_digest(file, "sha256").hexdigest()
     carried = {name: hashlib.sha256(data).hexdigest() for name, data in recording.attachments.items()}

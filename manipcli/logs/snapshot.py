@@ -1,4 +1,4 @@
-"""A log at one moment; also of logs that somebody else wrote, as far as they go."""
+"""State in a log at one time, also in logs of other programs."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from manipcli.record.foreign.units import joint_units
 from manipcli.record.messages import WORLD
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent
-from manipcli.report.snapshot import JointMoment, Moment, PoseMoment
+from manipcli.report.logs.snapshot import JointMoment, Moment, PoseMoment
 
 
 def moment(path: Path, time: float) -> Moment:
-    """What a log says of `time` [s from its beginning].
+    """The state in a log at `time` [s from its beginning].
 
     Raises:
-        InvalidInput: the file is no log, is damaged, or ends before.
+        InvalidInput: the file is not a log, is damaged, or ends before `time`.
     """
     found = open_topics(path, damaged=True)
     if not 0.0 <= time <= found.duration + ROUNDING:
-        message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
+        message = f"{time:g} s is outside the log {path.name}, which is 0 s to {found.duration:.3f} s"
         raise InvalidInput([Diagnostic("LOG110", message)])
     if RECORD not in found.metadata:
-        return _others(path, found, time, why="manipcli did not write it")
+        return _others(path, found, time, why="not written by manipcli")
     try:
         return _ours(path, time)
     except Thinned:
@@ -48,20 +48,20 @@ def moment(path: Path, time: float) -> Moment:
 
 
 def step_ends(path: Path) -> dict[str, float]:
-    """Until when [s] each step of a log is on: one tick before the next begins, or up to the end of the log.
+    """End [s] of each step of a log: one tick before the next step starts, or the end of the log.
 
     Raises:
-        InvalidInput: the file is no log, or is damaged.
+        InvalidInput: the file is not a log, or is damaged.
     """
     end = open_topics(path, damaged=True).duration
     try:
         recording = open_recording(path)
-    except BadRecording:  # manipcli did not write it: it tells of no steps
+    except BadRecording:  # not written by manipcli: no steps
         return {}
     return {
-        one.id: end if one.ended is None else max(one.started, round(one.ended - recording.period, 9))
-        for one in step_outcomes(recording, interrupted=False)
-        if one.started is not None
+        step.id: end if step.ended is None else max(step.started, round(step.ended - recording.period, 9))
+        for step in step_outcomes(recording, interrupted=False)
+        if step.started is not None
     }
 
 
@@ -71,7 +71,7 @@ def _ours(path: Path, time: float) -> Moment:
     missing += [recording.unknown(topic) for topic in (TF, CONTACTS, EVENTS) if recording.unknown(topic)]
     span, k, touched, end = _at(recording.spans, time)
     if span is None:
-        raise InvalidInput([Diagnostic("LOG111", f"{path.name} holds no state until {time:g} s")])
+        raise InvalidInput([Diagnostic("LOG111", f"{path.name} has no state before {time:g} s")])
     states = span.states
     now = float(states.time[k])
     wanted = references(span.controllers, recording.joint_names, len(states.time))[k]
@@ -115,7 +115,7 @@ def _ours(path: Path, time: float) -> Moment:
 
 
 def _tool(recording: Recording, path: Path, q: Array, v: Array) -> PoseMoment | None:
-    """Where the tool frame of the robot is with its joints at `q` and `v` (n); None where the log lacks its files."""
+    """Pose and speed of the tool frame at joint positions `q` and velocities `v` (n); None without its files."""
     try:
         robot = recorded_robot(recording, path)
     except InvalidInput:
@@ -129,7 +129,7 @@ def _tool(recording: Recording, path: Path, q: Array, v: Array) -> PoseMoment | 
 
 
 def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Contact, ...], float]:
-    """The span with the last state until `time`, its row there, what touched, and the time [s] of the last state."""
+    """The span with the last state until `time`, the row of that state, its contacts, and the end of the log [s]."""
     chosen, k, end = None, 0, 0.0
     touched: tuple[Contact, ...] = ()
     for span in spans:
@@ -147,7 +147,7 @@ def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Con
 
 
 def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, str]:
-    """The step that is on at `time` [s], as the event that began it, and its phase; None between steps."""
+    """The start event of the step that is active at `time` [s], and its phase; None between steps."""
     step: TaskEvent | None = None
     phase = ""
     for event in events:
@@ -165,8 +165,8 @@ def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, 
 def _others(path: Path, found: Topics, time: float, *, why: str) -> Moment:
     start = found.start / 1e9
     taken = snapshot(found, start + time)
-    missing = [f"there is no {topic}" for topic in taken.lacks]
-    missing += [f"{why}: it tells of no steps, references and contacts", *taken.unread]
+    missing = [f"the log has no {topic}" for topic in taken.lacks]
+    missing += [f"{why}: no steps, references and contacts", *taken.unread]
     units = {
         before + name: unit for before, urdf in taken.urdf.items() for name, unit in joint_units(urdf.encode()).items()
     }
@@ -180,11 +180,12 @@ def _others(path: Path, found: Topics, time: float, *, why: str) -> Moment:
         verb="",
         phase="",
         joints=tuple(
-            JointMoment(name, units.get(name, ""), one.position, one.velocity, one.effort)
-            for name, one in taken.joints.items()
+            JointMoment(name, units.get(name, ""), sample.position, sample.velocity, sample.effort)
+            for name, sample in taken.joints.items()
         ),
         poses=tuple(
-            PoseMoment(name, one.parent, _pose(one.pose[:3], one.pose[3:])) for name, one in taken.frames.items()
+            PoseMoment(name, sample.parent, _pose(sample.pose[:3], sample.pose[3:]))
+            for name, sample in taken.frames.items()
         ),
         contacts=None,
         missing=(*found.faults, *missing),
@@ -193,5 +194,5 @@ def _others(path: Path, found: Topics, time: float, *, why: str) -> Moment:
 
 
 def _pose(position: npt.ArrayLike, quat_xyzw: npt.ArrayLike) -> Transform:
-    """Others write quaternions of zeros."""
+    """A pose; other programs write quaternions of zeros for the identity."""
     return Transform.of(xyz=position, quat_xyzw=quat_xyzw if np.any(quat_xyzw) else None)

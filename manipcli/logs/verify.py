@@ -1,4 +1,4 @@
-"""A log against a second one that was simulated from what the first holds."""
+"""Comparison of a log with its re-simulation."""
 
 from __future__ import annotations
 
@@ -15,41 +15,41 @@ from manipcli.record.foreign.compare import compare_logs, compared_with_itself
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
-from manipcli.report.verification import Verification
+from manipcli.report.logs.verification import Verification
 
 UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, LIMITS, "repair")
-"""Metadata that a run writes at its end; one that did not come to its end lacks it, or says something else."""
+"""Metadata that a run writes at its end; it is missing or different in an unfinished log."""
 
 
 def refused_as_unlike(unlike: Sequence[Diagnostic]) -> InvalidInput:
-    """Why a log is not simulated again: what would come out says nothing about it."""
+    """The error for a log that is not re-simulated because its inputs differ."""
     *others, last = (replace(finding, severity="error") for finding in unlike)
-    hint = "with --allow-different it is simulated all the same; differences say little then"
+    hint = "re-simulate anyway with --allow-different; the results are then not comparable"
     return InvalidInput([*others, replace(last, hint=hint)])
 
 
 def compared(
-    recording: Recording, log: Path, again: Path, *, unlike: tuple[Diagnostic, ...], began: float
+    recording: Recording, log: Path, rerun: Path, *, unlike: tuple[Diagnostic, ...], began: float
 ) -> Verification:
-    """Everything in two logs, compared.
+    """Comparison of messages, metadata and attachments of a log and its re-run.
 
     Args:
-        recording: of `log`, opened.
-        log: the log.
-        again: what was simulated from it; finished.
-        unlike: what is not as it was in the run of the log.
-        began: of the verification, by `perf_counter`.
+        recording: the opened log.
+        log: path of the log.
+        rerun: path of the finished log of the re-run.
+        unlike: versions and meshes that differ from those of the run.
+        began: start of the verification, by `perf_counter` [s].
     """
-    second = open_recording(again)
+    second = open_recording(rerun)
     interrupted = recording.metadata.get("run", {}).get("status") == RunStatus.INTERRUPTED
     cut = recording.lost or ("the run was interrupted" if interrupted else "")
-    same = filecmp.cmp(log, again, shallow=False)
-    messages = compared_with_itself(log) if same else compare_logs(log, again, exact=True, open_end=bool(cut))
+    same = filecmp.cmp(log, rerun, shallow=False)
+    messages = compared_with_itself(log) if same else compare_logs(log, rerun, exact=True, open_end=bool(cut))
     entries = () if same else compare_entries(recording, second)
     if cut:
-        entries = tuple(one for one in entries if one.name not in UNFINISHED)
+        entries = tuple(entry for entry in entries if entry.name not in UNFINISHED)
     if unlike:
-        entries = tuple(one for one in entries if one.name not in ("versions", "meshes"))
+        entries = tuple(entry for entry in entries if entry.name not in ("versions", "meshes"))
     return Verification(
         log=str(log),
         versions=second.metadata["versions"],

@@ -1,4 +1,4 @@
-"""Names of the files that a log carries as attachments."""
+"""File names of the attachments of a log."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """CDR little-endian (OMG DDS-XTypes 1.3, encoding version 1), as ROS 2 serialises: primitives, strings, sequences.
 
-Every value is aligned to its own size, counted from behind the four bytes of encapsulation `00 01 00 00`.
+Every value is aligned to its own size, counted from the end of the four bytes of encapsulation `00 01 00 00`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ NS_PER_S = 1_000_000_000
 
 
 def text_bytes(text: str) -> bytes:
-    """UTF-8; what is no text (undecodable bytes of a file name) is written as an escape."""
+    """UTF-8 bytes; undecodable bytes of a file name are written as escapes."""
     return text.encode("utf-8", errors="backslashreplace")
 
 
 class CdrWriter:
-    """Appends values to one message. Each method returns the offset at which its value stands, so that a message
-    can be kept as a template and its numbers be filled in later."""
+    """Appends values to one message. Each method returns the offset of its value, so that the message can be used as a
+    template whose numbers are filled in later."""
 
     def __init__(self) -> None:
         self._data = bytearray(ENCAPSULATION)
@@ -55,7 +55,7 @@ class CdrWriter:
         return self._put(_F64, value)
 
     def f64s(self, values: Sequence[float]) -> int:
-        """Bare doubles, one after the other; at least one."""
+        """Consecutive doubles without a length; at least one."""
         offsets = [self.f64(float(value)) for value in values]
         return offsets[0]
 
@@ -67,7 +67,7 @@ class CdrWriter:
             self._data += values.astype("<f8").tobytes()
 
     def octets(self, data: bytes) -> None:
-        """A uint8[N] of a fixed length, as it is."""
+        """A uint8[N] of fixed length."""
         self._data += data
 
     def time(self, ns: int) -> int:
@@ -90,12 +90,12 @@ class CdrWriter:
         return offset
 
     def doubles(self, count: int) -> int:
-        """A float64[] of `count` zeros; the offset of its first element (of its end when empty)."""
+        """A float64[] of `count` zeros; returns the offset of its first element (its end if empty)."""
         self.u32(count)
         return self.f64s([0.0] * count) if count else len(self._data)
 
     def header(self, ns: int, frame: str) -> int:
-        """std_msgs/Header; the offset of its stamp."""
+        """std_msgs/Header; returns the offset of its stamp."""
         offset = self.time(ns)
         self.text(frame)
         return offset
@@ -106,17 +106,17 @@ class CdrError(ValueError):
 
 
 class CdrReader:
-    """Walks over one message; every length is checked against what is there before anything is read."""
+    """Reads one message sequentially; every length is checked against the remaining bytes before reading."""
 
     def __init__(self, data: bytes | memoryview) -> None:
         self._data = memoryview(data)
-        # The last two bytes are options of whoever wrote it and change nothing.
+        # The last two bytes are options of the writer without effect on the data.
         if bytes(self._data[:2]) != ENCAPSULATION[:2] or len(self._data) < 4:
             raise CdrError("is not little-endian CDR")
         self.offset = 4
 
     def skip(self, size: int, align: int) -> int:
-        """The offset of `size` bytes that are aligned to `align`."""
+        """Skip `size` bytes aligned to `align`; returns their offset."""
         start = self.offset + (-(self.offset - 4) % align)
         if size < 0 or start + size > len(self._data):
             raise CdrError("ends too early")
@@ -147,11 +147,11 @@ class CdrReader:
         return tuple(self.text() for _ in range(self.count(4)))
 
     def expect(self, size: int) -> None:
-        """Raises CdrError where fewer than `size` bytes are left."""
+        """Raise CdrError if fewer than `size` bytes are left."""
         if size > len(self._data) - self.offset:
             raise CdrError("ends too early")
 
     def header(self) -> str:
-        """Skips the stamp; the frame."""
+        """Skip the stamp of a header; returns its frame."""
         self.skip(8, 4)
         return self.text()

@@ -1,4 +1,4 @@
-"""The table of channels: topic, type, and how the topic would be offered to a late subscriber."""
+"""Table of the recorded channels: topic, message type and quality of service."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EVENTS = "/task/events"
 ROSOUT = "/rosout"
 MARKERS = "/markers"
 
-# A quality of service profile as rosbag2 stores it: the last message is kept for whoever subscribes later.
+# A quality of service profile as rosbag2 stores it: the last message is kept for late subscribers.
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
 TRANSIENT_LOCAL = (
     "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: transient_local\n"
@@ -34,10 +34,10 @@ class ControllerChannel:
     """A controller whose reference, feedback, error and output are recorded.
 
     Attributes:
-        name: of the controller.
-        joints: in the order of its outputs.
-        interfaces: what its output is.
-        action: by which it takes goals; empty where it takes none.
+        name: name of the controller.
+        joints: its joints in the order of its outputs.
+        interfaces: command interfaces of its output.
+        action: name of its action; "" without an action.
     """
 
     name: str
@@ -75,10 +75,10 @@ class SensorChannel:
     """A broadcaster of a sensor.
 
     Attributes:
-        name: of the controller.
-        sensor: its name, the last word of the topic.
+        name: name of the controller.
+        sensor: name of the sensor, the last word of the topic.
         message: ROS type of the messages, one of `rows.SENSOR_TEMPLATES`.
-        frame: the link in whose frame they are.
+        frame: link frame of the measurements.
     """
 
     name: str
@@ -92,7 +92,7 @@ class SensorChannel:
 
 
 Recorded = ControllerChannel | SensorChannel | None
-"""What is recorded of a loaded controller; None: nothing."""
+"""Recorded channels of a loaded controller; None: not recorded."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What a recording says it holds: the metadata record by which a reader finds its way."""
+"""Metadata record with the contents of a recording, for its readers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RECORD = "recording"
 """Name of the metadata record."""
 
 REPAIR = "repair"
-"""Name of the metadata record of a file that was repaired: what it `lost`."""
+"""Name of the metadata record of a repaired file, with what it `lost`."""
 
 FORMAT = 1
 """Version of the layout of a recording."""
@@ -23,14 +23,14 @@ MAX_STRIDE = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What is in a recording.
+    """Contents of a recording.
 
     Attributes:
-        period: [s] of a tick.
-        joints, bodies, controllers: names in the order of the arrays: moving joints, movable bodies, controllers'
-            joints.
-        strides: ticks between two messages of a topic, where that is not each one.
-        absent: topics that the run was told not to record.
+        period: control period [s].
+        joints, bodies, controllers: names in the order of the arrays: moving joints, movable bodies, joints of
+            the controllers.
+        strides: ticks between two messages of a topic, if not 1.
+        absent: topics that the task excludes from the recording.
     """
 
     period: float
@@ -57,7 +57,7 @@ def contents(values: Mapping[str, str]) -> Contents:
     """The inverse of `Contents.metadata`.
 
     Raises:
-        ValueError: a later format, or not what a recorder writes; the message says which.
+        ValueError: a later format, or an invalid record; see the message.
     """
     version = values.get("format", "")
     if version != str(FORMAT):
@@ -70,7 +70,9 @@ def contents(values: Mapping[str, str]) -> Contents:
         strides, absent = json.loads(values.get("strides", "{}")), json.loads(values.get("absent", "[]"))
     except (KeyError, ValueError, RecursionError) as error:
         raise ValueError(f"has a damaged metadata record '{RECORD}'") from error
-    whole = isinstance(strides, dict) and all(type(one) is int and 0 < one <= MAX_STRIDE for one in strides.values())
+    whole = isinstance(strides, dict) and all(
+        type(stride) is int and 0 < stride <= MAX_STRIDE for stride in strides.values()
+    )
     groups = [joints, bodies, absent, *(controllers.values() if isinstance(controllers, dict) else [None])]
     if not (math.isfinite(period) and period > 0 and whole) or not all(map(_is_names, groups)):
         raise ValueError(f"has a damaged metadata record '{RECORD}'")

@@ -1,7 +1,7 @@
 """Decoder of ROS 2 messages of any type: every value with its path and its place in the bytes.
 
-The numbers of an array are one run. Elements of arrays are named by the texts in them or beside them, where there are
-any: `position[joint_3]`, `transforms[cup].transform.translation.x`. Messages with the same lengths and names have one
+The numbers of an array are one run. Elements of arrays are named by texts in them or in a parallel array, if any:
+`position[joint_3]`, `transforms[cup].transform.translation.x`. Messages with the same lengths and names have one
 layout, so that thousands of them are read with one numpy index per number.
 """
 
@@ -19,11 +19,11 @@ from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.definition import Array, Message, Number, Text, Type
 
 MAX_RUNS = 200_000
-"""Values and arrays in one message."""
+"""Most values and arrays in one message."""
 MAX_NAME = 256
-"""[byte] A longer text is not a name."""
+"""Longest text that is used as a name [byte]."""
 REMEMBERED = 16
-"""Layouts of one topic that are tried before a message is decoded."""
+"""Most cached layouts of one topic."""
 
 Int = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Element:
-    """An element of an array: its number of how many, its names, and its label among the others."""
+    """An element of an array: its index, the length of the array, its names and its label."""
 
     number: int
     count: int
@@ -41,20 +41,20 @@ class Element:
 
 
 Path = tuple[tuple[str, Element | None], ...]
-"""Fields from the message down, and the elements that were entered."""
+"""Field names from the message down, each with the array element, if any."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Adjacent values.
+    """A run of adjacent values.
 
     Attributes:
-        steps: where they are.
-        offset: of the first byte; aligned, behind the length of an array.
-        count: numbers, or bytes of a text.
-        code: of numpy; "" is a text, `#` the length of an array.
-        names: of the numbers of an array; () where they have none.
-        array: whether the numbers are those of an array.
+        steps: path of the values.
+        offset: aligned offset of the first byte, after the length of an array.
+        count: number of values, or bytes of a text.
+        code: numpy type code; "" for a text, `#` for the length of an array.
+        names: names of the numbers of an array; () without names.
+        array: whether the run is an array.
     """
 
     steps: Path
@@ -66,42 +66,42 @@ class Run:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Without the elements that were entered."""
+        """The path without array elements."""
         return tuple(name for name, _ in self.steps)
 
     @property
     def path(self) -> str:
-        """Fields, and elements by their number: `points[0].positions`."""
-        text = ".".join(name if one is None else f"{name}[{one.number}]" for name, one in self.steps)
+        """The path with elements by index: `points[0].positions`."""
+        text = ".".join(name if element is None else f"{name}[{element.number}]" for name, element in self.steps)
         return f"{text}.#" if self.code == "#" else text
 
     @property
     def label(self) -> str:
-        """Fields, and elements by their names."""
-        text = ".".join(name if one is None else f"{name}[{one.label}]" for name, one in self.steps)
+        """The path with elements by name."""
+        text = ".".join(name if element is None else f"{name}[{element.label}]" for name, element in self.steps)
         return f"number of {text}" if self.code == "#" else text
 
     @property
     def size(self) -> int:
-        """[byte]"""
+        """Size [byte]."""
         return 4 if self.code == "#" else self.count * (np.dtype(self.code).itemsize if self.code else 1)
 
     @property
     def begin(self) -> int:
-        """Of its first byte, with the length before a text."""
+        """Offset of its first byte, including the length of a text."""
         return self.offset - 4 if not self.code else self.offset
 
     @property
     def end(self) -> int:
-        """Behind its last byte."""
+        """Offset after its last byte."""
         return self.offset + self.size
 
     def name(self, k: int) -> str:
-        """Label of number `k`."""
+        """Label of the k-th number."""
         return f"{self.label}[{self.names[k] if self.names else k}]" if self.array else self.label
 
     def value(self, data: bytes | memoryview, k: int) -> float | int | str:
-        """Number `k`, or the whole text."""
+        """The k-th number, or the whole text."""
         if not self.code:
             return bytes(data[self.offset : self.offset + max(self.count - 1, 0)]).decode("utf-8", "replace")
         if self.code == "#":
@@ -114,7 +114,7 @@ def runs(message: Message, data: bytes | memoryview) -> tuple[Run, ...]:
     """Every value of one message, in the order of its bytes.
 
     Raises:
-        CdrError: it is shorter than its lengths say, or has too many parts.
+        CdrError: the message is shorter than its lengths declare, or has too many parts.
     """
     return tuple(_Walk(data).message(message, (), {}))
 
@@ -126,7 +126,7 @@ class _Walk:
         self._left = MAX_RUNS
 
     def message(self, message: Message, above: Path, names: dict[int, tuple[str, ...]]) -> Iterator[Run]:
-        """`names`: lists of names in the messages around it, by their length."""
+        """`names`: lists of names in the enclosing messages, by their length."""
         self._count()
         if not message.fields:
             self._reader.skip(1, 1)  # ROS 2 gives an empty message one byte
@@ -176,31 +176,31 @@ class _Walk:
         elements = []
         found: list[Run] = []
         for k in range(count):
-            one = Element(k, count)
-            inner = list(self._value(array.element, above, name, names, one))
+            element = Element(k, count)
+            inner = list(self._value(array.element, above, name, names, element))
             if isinstance(array.element, Message):
                 own = (run for run in inner if not run.code and len(run.steps) == len(above) + 2)
                 texts = (
                     str(run.value(self._data, 0)) for run in own if run.steps[-1][1] is None and run.count <= MAX_NAME
                 )
-                one.names = tuple(text for text in texts if text)
-            elements.append(one)
+                element.names = tuple(text for text in texts if text)
+            elements.append(element)
             found += inner
-        labels = ["+".join(one.names) for one in elements]
+        labels = ["+".join(element.names) for element in elements]
         counts = {label: labels.count(label) for label in set(labels)} if count < MAX_NAME else {}
-        for one, label in zip(elements, labels, strict=True):
-            one.label = label if label and counts.get(label) == 1 else str(one.number)
+        for element, label in zip(elements, labels, strict=True):
+            element.label = label if label and counts.get(label) == 1 else str(element.number)
         yield from found
 
     def _count(self) -> None:
         self._left -= 1
         if self._left < 0:
-            raise CdrError("has too many parts to be looked through")
+            raise CdrError("has too many parts to decode")
 
 
 @dataclass(frozen=True, slots=True)
 class _Layout(Generic[T]):
-    """What was made of the messages that have this length, and these bytes from these offsets on."""
+    """The result for messages of this length with these bytes at these offsets."""
 
     length: int
     guards: tuple[tuple[int, Bytes], ...]
@@ -208,10 +208,10 @@ class _Layout(Generic[T]):
 
 
 class Layouts(Generic[T]):
-    """Messages of one topic in groups of one layout.
+    """Groups the messages of a topic by layout.
 
     Args:
-        make: one message to what is wanted of its layout, and the bytes [begin, end) that other messages share with it.
+        make: returns the result for the layout of a message, and the byte ranges [begin, end) that define the layout.
     """
 
     def __init__(self, make: Callable[[memoryview], tuple[T, Sequence[tuple[int, int]]]]) -> None:
@@ -219,11 +219,11 @@ class Layouts(Generic[T]):
         self._known: deque[_Layout[T]] = deque(maxlen=REMEMBERED)
 
     def groups(self, data: bytes, starts: Int, lengths: Int) -> Iterator[tuple[T, Int]]:
-        """A layout, and which of the messages have it.
+        """Results of the layouts, each with the indices of its messages.
 
         Args:
             data: bytes that hold the messages.
-            starts, lengths: (n,) of the messages.
+            starts, lengths: (n,) offsets and lengths of the messages.
 
         Raises:
             CdrError: from `make`.
@@ -243,13 +243,13 @@ class Layouts(Generic[T]):
 
     def _layout(self, message: memoryview) -> _Layout[T]:
         own = np.frombuffer(message, np.uint8)
-        for one in self._known:
-            if one.length == len(own) and all(np.array_equal(own[at : at + len(x)], x) for at, x in one.guards):
-                return one
+        for layout in self._known:
+            if layout.length == len(own) and all(np.array_equal(own[at : at + len(x)], x) for at, x in layout.guards):
+                return layout
         made, guards = self._make(message)
         merged: list[tuple[int, int]] = []
         for begin, end in sorted(guards):
-            if merged and begin - merged[-1][1] < 4:  # nothing between them but what aligns
+            if merged and begin - merged[-1][1] < 4:  # only alignment bytes between them
                 begin = merged.pop()[0]
             merged.append((begin, end))
         found = _Layout(len(own), tuple((begin, own[begin:end].copy()) for begin, end in merged), made)
@@ -258,7 +258,7 @@ class Layouts(Generic[T]):
 
 
 def rows(data: bytes, starts: Int, size: int) -> Bytes:
-    """(T, size) the bytes that begin at `starts`; `size` is not 0."""
+    """(T, size) bytes that begin at `starts`; `size` is positive."""
     kind = np.dtype((np.void, size))
     every = np.ndarray((len(data) - size + 1,), dtype=kind, buffer=data, strides=(1,))
     return every[starts].view(np.uint8).reshape(len(starts), size)

@@ -1,6 +1,6 @@
-"""The message types of any ROS 2 log: the `ros2msg` text of a schema to a tree of types.
+"""Parser of ROS 2 message definitions: from the `ros2msg` text of a schema to a tree of types.
 
-Nothing in a text is trusted: types may be missing, contain themselves, or be nested without end.
+The text is untrusted: types can be missing, recursive or nested too deeply.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 MAX_TEXT = 1 << 20
-"""Characters of one schema."""
+"""Longest schema [characters]."""
 MAX_DEPTH = 24
-"""Messages within messages."""
+"""Deepest nesting of messages."""
 MAX_FIELDS = 4096
-"""Of one schema, all its types together."""
+"""Most fields of all types of one schema."""
 
 NUMBERS = {
     "bool": "|u1", "byte": "|u1", "char": "|u1", "uint8": "|u1", "int8": "|i1", "uint16": "<u2", "int16": "<i2",
@@ -22,7 +22,7 @@ NUMBERS = {
 }  # fmt: skip
 _TIME = "int32 sec\nuint32 nanosec\n"
 _KNOWN = {"builtin_interfaces/Time": _TIME, "builtin_interfaces/Duration": _TIME}
-"""What some writers leave out, since every ROS 2 has it."""
+"""Standard types that some writers leave out."""
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?:<=)?(?P<bound>\d*)\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<sign>=?)"
@@ -30,12 +30,12 @@ _FIELD = re.compile(
 
 
 class UnknownDefinition(ValueError):
-    """A schema that cannot be read; says why."""
+    """A schema that cannot be read, with the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One number, or truth value; `code` is that of numpy."""
+    """A number or boolean; `code` is its numpy type code."""
 
     name: str
 
@@ -55,7 +55,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """Several of one type; `length` is None where each message says how many."""
+    """An array of one type; `length` is None for a variable length."""
 
     element: Number | Text | Message
     length: int | None
@@ -78,35 +78,35 @@ class Message:
 
     @property
     def is_time(self) -> bool:
-        """A time or a duration: whole seconds and nanoseconds, one number."""
-        return self.name in _KNOWN and [one.name for one in self.fields] == ["sec", "nanosec"]
+        """Whether it is a time or a duration: seconds and nanoseconds, shown as one number."""
+        return self.name in _KNOWN and [field.name for field in self.fields] == ["sec", "nanosec"]
 
     def field(self, name: str) -> Field | None:
-        """The field of that name."""
-        return next((one for one in self.fields if one.name == name), None)
+        """The field with this name, or None."""
+        return next((candidate for candidate in self.fields if candidate.name == name), None)
 
 
 Type = Number | Text | Array | Message
 
 
 def read_definition(name: str, text: str) -> Message:
-    """The type `name` (`package/msg/Name` or `package/Name`), whose definition begins the text.
+    """The type `name` (`package/msg/Name` or `package/Name`), whose definition is first in the text.
 
     Args:
-        name: of the type.
-        text: its definition, then those it uses, each behind a line of `=` and a line `MSG: package/Name`.
+        name: name of the type.
+        text: its definition, then those it uses, each after a line of `=` and a line `MSG: package/Name`.
 
     Raises:
-        UnknownDefinition: a line or a type that is none, a type within itself, or a bound is passed.
+        UnknownDefinition: an invalid line or type, a recursive type, or a limit is exceeded.
     """
     if len(text) > MAX_TEXT:
-        raise UnknownDefinition(f"its definition is longer than {MAX_TEXT} characters")
+        raise UnknownDefinition(f"definition longer than {MAX_TEXT} characters")
     first, *others = _SEPARATOR.split(text)
     known = dict(_KNOWN)
     for other in others:
         head, _, body = other.strip().partition("\n")
         if not head.startswith("MSG:"):
-            raise UnknownDefinition(f"'{head[:40]}' stands where MSG: is expected")
+            raise UnknownDefinition(f"expected MSG:, found '{head[:40]}'")
         known[_short(head.removeprefix("MSG:").strip())] = body
     root = _short(name)
     known[root] = first
@@ -119,7 +119,7 @@ def _short(name: str) -> str:
 
 
 class _Reader:
-    """Makes each type once."""
+    """Parses each type once."""
 
     def __init__(self, known: dict[str, str]) -> None:
         self._known = known
@@ -143,12 +143,12 @@ class _Reader:
                 continue
             found = _FIELD.match(stripped)
             if found is None:
-                raise UnknownDefinition(f"{name}: '{stripped[:60]}' is no field")
+                raise UnknownDefinition(f"{name}: '{stripped[:60]}' is not a field")
             if found["sign"]:
-                continue  # a constant: it has no bytes
+                continue  # a constant has no bytes
             self._fields += 1
             if self._fields > MAX_FIELDS:
-                raise UnknownDefinition(f"it has more than {MAX_FIELDS} fields")
+                raise UnknownDefinition(f"more than {MAX_FIELDS} fields")
             element = self._type(found["type"], package, above)
             bounded = "<=" in (found["array"] or "")
             length = int(found["bound"]) if found["bound"] and not bounded else None
@@ -159,8 +159,8 @@ class _Reader:
             return Number(word)
         if word == "string":
             return Text()
-        # A type of the same package goes without its name, and `Header` without std_msgs.
+        # Types of the same package, and `Header` of std_msgs, can omit the package.
         for name in (_short(word),) if "/" in word else (f"{package}/{word}", f"std_msgs/{word}"):
             if name in self._known:
                 return self.message(name, above)
-        raise UnknownDefinition(f"it uses the type '{word}', which it does not define")
+        raise UnknownDefinition(f"type '{word}' is used but not defined")

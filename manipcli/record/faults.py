@@ -1,4 +1,4 @@
-"""What can go wrong with a recording: it cannot be begun, cannot be written further, or cannot be read."""
+"""Errors of recordings: refused at the start, failed while writing, or not readable."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manipcli.core.text import any_of, listed, nearest_file
 
 
 class RecordingRefused(InvalidInput):
-    """No recording can be begun at this path; nothing has been written."""
+    """A recording cannot be started at this path; nothing is written."""
 
     code = "LOG100"
 
@@ -20,9 +20,9 @@ class RecordingRefused(InvalidInput):
 
 
 class RecordingFailed(ManipcliError):
-    """The disk refused more, for `cause`. What was written until `time` [s] stays readable in the partial file.
+    """Writing failed because of `cause`. The data until `time` [s] stays readable in the partial file.
 
-    `known`: of the run, by the keys of a report, where a run is what was recorded.
+    `known`: values of the run for its report, by JSON key.
     """
 
     exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
@@ -33,61 +33,59 @@ class RecordingFailed(ManipcliError):
         self.cause = cause
         self.time = time
         self.known: Mapping[str, str | int] = {}
-        super().__init__(
-            f"the recording stopped after t = {time:.3f} s: {cause}; what was recorded until then is in {partial.name}"
-        )
+        super().__init__(f"recording stopped at t = {time:.3f} s: {cause}; data until then is in {partial.name}")
 
 
 class CopyFailed(ManipcliError):
-    """The disk refused a clean copy of a log. Nothing is left of the copy, and the log is as it was."""
+    """Writing a repaired copy failed. The incomplete copy is removed and the log is unchanged."""
 
     exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
     code: ClassVar[str] = "LOG202"
 
     def __init__(self, output: Path, cause: str, *, source: Path) -> None:
-        super().__init__(f"cannot write {output}: {cause}; nothing of the copy is left, and {source} is as it was")
+        super().__init__(f"cannot write {output}: {cause}; the incomplete copy is removed, {source} is unchanged")
 
 
 PARTIAL = ".partial"
-"""What the name of a log ends in until it is finished."""
+"""Suffix of an unfinished log."""
 
-REPAIRABLE = "manipcli repair keeps what is sound of it"
-"""The hint where a file is damaged."""
+REPAIRABLE = "recover the undamaged parts with `manipcli repair`"
+"""Hint for damaged files."""
 
 
 class BadRecording(InvalidInput):
-    """A file that is no recording of manipcli, or one that was changed or damaged after it was written."""
+    """A file that is not a recording of manipcli, or was changed or damaged."""
 
     code = "LOG300"
 
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
         self.cause = cause
-        left = path.parent / f"{path.name}{PARTIAL}"  # of a folder that has no name, too
+        left = path.parent / f"{path.name}{PARTIAL}"  # also for a path without a name, such as .
         if hint is None and not path.exists():
             hint = _beside(path)
             if left.is_file():
-                hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
+                hint = f"an unfinished run left {left.name}: use this name"
         super().__init__((Diagnostic(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))
 
 
 def _beside(path: Path) -> str | None:
-    """The log that was meant, or those that are in its folder."""
+    """The hint for a missing log: similar names, or the logs in its folder."""
     if not path.parent.is_dir():
-        return f"the folder '{path.parent}' is not there either"
-    names = sorted(each.name for each in path.parent.glob("*.mcap"))
+        return f"folder '{path.parent}' does not exist"
+    names = sorted(log.name for log in path.parent.glob("*.mcap"))
     close = nearest_file(path.name, names)
-    return f"did you mean {any_of(close)}?" if close else f"logs beside it: {listed(names)}" if names else None
+    return f"did you mean {any_of(close)}?" if close else f"logs in this folder: {listed(names)}" if names else None
 
 
-LEFT_OUT = "another program left out messages of joints, bodies, controllers or contacts"
+LEFT_OUT = "filtered by another program: messages of joints, bodies, controllers or contacts are missing"
 
 
 class Thinned(BadRecording):
-    """A recording of which another program left messages out: it can be read like a log of any program, no closer."""
+    """A recording filtered by another program; it can only be read like a log of another program."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(
             path,
             LEFT_OUT,
-            hint="manipcli replay, at and plot show what there is; all else needs the log as it was recorded",
+            hint="use the original log, or show the rest with manipcli replay, at or plot",
         )

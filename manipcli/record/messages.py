@@ -1,4 +1,4 @@
-"""Single messages: what is written once at the start, and what is written when something happens."""
+"""Encoders of messages that are written once at the start or on events."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def string_message(text: str) -> bytes:
 
 
 def static_transforms(robot: RobotModel, scene: Scene) -> tuple[tuple[str, str, Transform], ...]:
-    """(parent, child, X_PC) of all that never moves: the robot's base, fixed joints, fixed bodies, named frames."""
+    """(parent, child, X_PC) of all fixed frames: robot base, fixed joints, fixed bodies, named frames."""
     found = [] if robot.root == WORLD else [(WORLD, robot.root, robot.X_WB)]
     found += [(joint.parent, joint.child, joint.X_PJ) for joint in robot.joints if not joint.moves]
     found += [(WORLD, body.name, body.X_WO) for body in scene.bodies if body.fixed]
@@ -98,8 +98,7 @@ def _shape(geometry: Geometry) -> tuple[int, tuple[float, float, float], str]:
 
 
 def portable_name(file: str) -> str:
-    """How a log calls a file: as it is written, but for an absolute path, which would tie the log to one machine; the
-    last part of that still says which file it was."""
+    """The name of a file in a log: as written, or the last part of an absolute path, which depends on the machine."""
     return PurePath(file).name if PurePath(file).is_absolute() or file.startswith("file:") else file
 
 
@@ -113,7 +112,7 @@ def event_message(ns: int, event: TaskEvent) -> bytes:
 
 
 def log_message(ns: int, event: TaskEvent) -> bytes:
-    """rcl_interfaces/Log: the same event as a readable line; its level follows the outcome."""
+    """rcl_interfaces/Log: the event as a readable line; its level follows the outcome."""
     file, line = event.place, 0
     parts = event.place.split(":")
     if len(parts) >= 2 and parts[1].isdecimal():
@@ -133,8 +132,8 @@ def log_message(ns: int, event: TaskEvent) -> bytes:
 
 
 class ContactEncoder:
-    """manipcli_msgs/Contacts. While fingers close, sets of pairs alternate at the control rate, so the constant bytes
-    of each set are built once."""
+    """Encoder of manipcli_msgs/Contacts. The constant bytes of each set of pairs are built once, because sets can
+    alternate at the control rate while fingers close."""
 
     MAX_SETS = 512
 

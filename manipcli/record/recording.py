@@ -1,7 +1,7 @@
-"""A log read back: the only witness that judge, replay and report know.
+"""A log in memory, the only input of judge, replay and report.
 
-What is small is there at once; what grows with time comes span by span, so that an hour is judged in the memory of a
-minute. `read_recording` makes a recording that holds everything, `open_recording` one that reads spans from its file.
+Small parts are read at once. States are read span by span, so that the memory does not grow with the length of the log.
+`read_recording` returns a recording in memory, `open_recording` one that reads its spans from the file.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class TaskEvent:
 
 @dataclass(frozen=True, slots=True)
 class ControllerTrace:
-    """What one controller did: arrays (T, n) on the control ticks."""
+    """Trace of a controller: arrays (T, n) on the control ticks."""
 
     name: str
     joints: tuple[str, ...]
@@ -39,7 +39,7 @@ class ControllerTrace:
     output: Array
 
     def map(self, change: Callable[[Array], Array]) -> ControllerTrace:
-        """The same with every array changed."""
+        """The trace with every array mapped."""
         return ControllerTrace(self.name, self.joints, *(change(array) for array in self.arrays))
 
     @property
@@ -57,10 +57,10 @@ class ContactSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Successive control ticks at which everything is recorded that states and traces are made of.
+    """Successive control ticks with complete data.
 
-    `states` have a leading time axis T, each controller's trace is on the same ticks; and the changes of contacts among
-    them.
+    `states` has a leading time axis T, the traces of the controllers are on the same ticks, and `contacts` are the
+    changes of contacts during the span.
     """
 
     states: WorldState
@@ -69,28 +69,28 @@ class Span:
 
 
 EMBEDDED = "embedded_meshes"
-"""Name of the metadata record that says which attachment holds which mesh: URI -> name of the attachment."""
+"""Name of the metadata record of embedded meshes: URI -> name of the attachment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Everything in one log.
+    """Content of a log.
 
     Attributes:
-        joint_names, body_names: the order of the arrays of states.
-        spans: at least one; each follows the one before without a gap. May be gone through as often as one likes;
-            where they come from a file, that reads it again.
-        events: what happened in the task.
+        joint_names, body_names: names in the order of the state arrays.
+        spans: at least one, without gaps between them. Can be iterated repeatedly; each iteration of spans in a file
+            reads the file.
+        events: events of the task.
         metadata: name -> key -> value.
         attachments: name -> bytes.
-        lost: why the end is missing, or None.
-        period: [s] of a tick.
-        absent: topics that the task told not to record. States whose topic is absent are NaN, and a controller whose
-            state is absent has no trace.
-        silent: topics of which there is no message, though a run always records some: another program left them out, or
-            the run ended before.
+        lost: why the end of the log is missing, or None.
+        period: control period [s].
+        absent: topics that the task excludes from the recording. Their states are NaN, and a controller whose state is
+            absent has no trace.
+        silent: topics without a message although a run records them: another program removed them, or the run ended
+            before.
 
-    `states`, `controllers` and `contacts` are those of all spans together: ask them of a recording that is `whole`.
+    `states`, `controllers` and `contacts` cover all spans and need a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
     """
 
@@ -106,19 +106,19 @@ class Recording:
     silent: tuple[str, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
-        """The mesh files that the log carries, by the URI that its URDF and its scene call them by; empty unless the
-        run was told to embed them. The material libraries of OBJ files are among them, beside their meshes."""
+        """The embedded mesh files by the URI in URDF and scene, with the material files of OBJ meshes; empty unless the
+        run embeds meshes."""
         names = self.metadata.get(EMBEDDED, {})
         return {uri: self.attachments[name] for uri, name in names.items() if name in self.attachments}
 
     def unknown(self, topic: str) -> str:
-        """Why nothing is known of what a topic tells; "" where it is known."""
+        """Why the content of a topic is unknown; "" if it is known."""
         if topic in self.absent:
-            return f"the run did not record {topic}"
-        return f"the log holds no message of {topic}" if topic in self.silent else ""
+            return f"{topic} not recorded"
+        return f"the log has no message of {topic}" if topic in self.silent else ""
 
     def whole(self) -> Recording:
-        """The same with all ticks in one span in memory: some 1.2 kB a tick for an arm with a hand and two objects."""
+        """The recording with all ticks in memory: about 1.2 kB per tick for an arm with a hand and two objects."""
         return replace(self, spans=(self._span(),))
 
     @property
@@ -128,12 +128,12 @@ class Recording:
 
     @property
     def controllers(self) -> tuple[ControllerTrace, ...]:
-        """What each controller did on all ticks."""
+        """Traces of the controllers on all ticks."""
         return self._span().controllers
 
     @property
     def contacts(self) -> tuple[ContactSnapshot, ...]:
-        """Every change of contacts."""
+        """All changes of contacts."""
         return self._span().contacts
 
     def _span(self) -> Span:
@@ -144,7 +144,7 @@ class Recording:
 
 
 def joined(spans: Iterable[Span]) -> Span:
-    """At least one span, as one; each is let go of before the next is asked for."""
+    """One span from at least one; each is released before the next is read."""
     iterator = iter(spans)
     first = next(iterator)
     following = next(iterator, None)
@@ -166,7 +166,7 @@ def joined(spans: Iterable[Span]) -> Span:
 
 
 def _arrays(span: Span) -> list[Array]:
-    """Every array of a span, states first, in the order of `map`."""
+    """All arrays of a span, states first, in the order of `map`."""
     found: list[Array] = []
 
     def keep(array: Array) -> Array:
@@ -180,8 +180,8 @@ def _arrays(span: Span) -> list[Array]:
 
 
 class _Growing:
-    """A table that grows by rows, by a quarter and in place: a long recording is held once, where a list of parts and
-    their concatenation would hold it twice."""
+    """A table that grows in place by a quarter, which needs half the memory of a list of parts and its
+    concatenation."""
 
     def __init__(self, rows: Array) -> None:
         self._table = rows.copy()

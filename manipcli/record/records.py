@@ -1,4 +1,4 @@
-"""Constants of the MCAP format (https://mcap.dev/spec) that writer and readers share."""
+"""Constants of the MCAP format (https://mcap.dev/spec) for writer and readers."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, META
     0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x09, 0x0C, 0x0F,
 )  # fmt: skip
 RECORD_HEAD = struct.Struct("<BQ")
-"""Opcode and length of what follows."""
+"""Opcode and length of the body."""
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")
-"""Opcode, length of what follows, channel, sequence number, log time, publish time."""
+"""Opcode, length of the body, channel, sequence number, log time, publish time."""
 PAYLOAD = MESSAGE_HEAD.size
-"""From the beginning of a message record to its CDR bytes."""
+"""Bytes of a message record before its CDR bytes."""
 CHUNK_HEAD = struct.Struct("<QQQI")
 FOOTER_RECORD = struct.Struct("<BQQQI")
 MAX_RECORD = 1 << 28
-"""[byte] that are read of one record."""
+"""Largest record [byte]."""
 
 
 def begins_as_log(path: Path) -> bool:
-    """Whether a regular file begins with the eight bytes of every MCAP file; False where it cannot be read."""
+    """Whether a regular file begins with the MCAP magic bytes; False if it cannot be read."""
     try:
         if not path.is_file():
             return False

@@ -1,4 +1,4 @@
-"""The message types of a recording, as ROS 2 writes them: a table of definitions, and the `ros2msg` text of a type.
+"""ROS 2 message types of a recording: a table of definitions, and the `ros2msg` text of a type.
 
 The text of a schema is the definition of its type, followed by the definitions of every type it uses, each after a
 line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schema encoding of MCAP).
@@ -16,7 +16,7 @@ ACTIONS = {
     name: (f"control_msgs/action/{kind}_FeedbackMessage", f"control_msgs/action/{kind}_GetResult_Response")
     for name, kind in (("follow_joint_trajectory", "FollowJointTrajectory"), ("gripper_cmd", "ParallelGripperCommand"))
 }
-"""Action of a controller -> types of its feedback and of its results."""
+"""Types of feedback and result of each controller action."""
 LOG = "rcl_interfaces/msg/Log"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 CONTACTS = "manipcli_msgs/msg/Contacts"

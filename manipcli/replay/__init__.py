@@ -1,1 +1,1 @@
-"""What is seen: robots and scenes as triangles, in a browser or in a picture file."""
+"""Drawing of robots, scenes and runs: pages, pictures, videos and figures."""

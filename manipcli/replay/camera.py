@@ -1,4 +1,4 @@
-"""Where to look from."""
+"""Cameras: view directions and framing of a drawing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manipcli.replay.placing import Poses
 Vector = tuple[float, float, float]
 
 FROM: Vector = (1.0, 0.75, 0.55)
-"""The direction from the middle of what is shown to the eye: the front left of a robot that looks along x."""
+"""Default direction from the scene to the camera: front left of a robot that faces along x."""
 FIELD = 38.0
 VIEWS: dict[str, Vector] = {
     "iso": FROM,
@@ -30,7 +30,7 @@ VIEWS: dict[str, Vector] = {
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Looks from `eye` at `target` [m] in the world, z up; `field` of view from top to bottom [deg]."""
+    """A camera at `eye` that looks at `target` [m] in the world, z up; `field`: vertical field of view [deg]."""
 
     eye: Vector
     target: Vector
@@ -38,31 +38,31 @@ class Camera:
 
     @property
     def distance(self) -> float:
-        """[m] from the eye to the target."""
+        """Distance from the eye to the target [m]."""
         return float(np.linalg.norm(np.subtract(self.eye, self.target)))
 
     @property
     def near(self) -> float:
-        """[m] What is nearer to the eye is not drawn."""
+        """Distance of the near clipping plane [m]."""
         return self.distance / 50.0
 
     @property
     def far(self) -> float:
-        """[m] What is further from the eye is not drawn."""
+        """Distance of the far clipping plane [m]."""
         return self.distance * 12.0
 
     @property
     def up(self) -> Vector:
-        """What is up in the picture: z, or x where the camera looks along z."""
+        """Up direction of the picture: z, or x if the camera looks along z."""
         along = np.abs(np.subtract(self.target, self.eye)) / self.distance
         return (1.0, 0.0, 0.0) if along[2] > 1.0 - 1e-6 else (0.0, 0.0, 1.0)
 
     def project(self, points: Array, size: tuple[int, int]) -> tuple[Array, Array, Array]:
-        """Where points (..., 3) of the world are in a picture of that width and height.
+        """Pixel coordinates of points (..., 3) in the world, for a picture of this width and height.
 
         Returns:
-            x to the right and y down [pixel] from its upper left corner, and the depth [m] along the line of sight;
-            x and y mean nothing where that is not positive.
+            x to the right and y down [pixel] from the upper left corner, and the depth [m] along the line of sight;
+            x and y are meaningless if the depth is not positive.
         """
         forward = np.subtract(self.target, self.eye) / self.distance
         right = np.cross(forward, self.up)
@@ -76,18 +76,18 @@ class Camera:
         return x, y, depth
 
     def further(self, factor: float) -> Camera:
-        """The same from `factor` times as far away."""
+        """The camera at `factor` times its distance from the target."""
         eye = np.add(self.target, factor * np.subtract(self.eye, self.target))
         return Camera(_vector(eye), self.target, self.field)
 
 
 def direction(text: str) -> Vector:
-    """From what is shown to the eye: a name of `VIEWS`, or azimuth and elevation [deg], `30,20`.
+    """Direction from the scene to the camera: a name of `VIEWS`, or azimuth and elevation [deg], `30,20`.
 
-    Azimuth 0 looks at the front of a robot that looks along x, 90 at its left side; elevation 90 is from above.
+    Azimuth 0 shows the front of a robot that faces along x, 90 its left side; elevation 90 is from above.
 
     Raises:
-        InvalidArgument: it is neither.
+        InvalidArgument: the text is neither.
     """
     if text in VIEWS:
         return VIEWS[text]
@@ -97,8 +97,8 @@ def direction(text: str) -> Vector:
     except ValueError:
         azimuth = elevation = math.nan
     if not math.isfinite(azimuth) or not abs(elevation) <= math.pi / 2.0:
-        hint = f"views: {', '.join(VIEWS)}; or azimuth and elevation in degrees, 30,20"
-        raise InvalidArgument("REPLAY010", f"'{shorten(text)}' is no view", hint=hint)
+        hint = f"views: {', '.join(VIEWS)}; or azimuth,elevation in degrees, such as 30,20"
+        raise InvalidArgument("REPLAY010", f"'{shorten(text)}' is not a view", hint=hint)
     flat = math.cos(elevation)
     return (flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation))
 
@@ -111,14 +111,14 @@ def framing(
     leave_out: frozenset[str] = frozenset(),
     towards: Vector = FROM,
 ) -> Camera:
-    """A camera that has everything in view, as near as that allows.
+    """The nearest camera that has everything in view.
 
     Args:
-        drawing: what is shown.
-        poses: one instant, or several that are all to be in view.
+        drawing: the drawing.
+        poses: one state, or several that are all in view.
         aspect: width over height of the picture.
-        leave_out: frames that need not be in view, as the floor.
-        towards: from what is shown to the eye.
+        leave_out: frames that need not be in view, such as the floor.
+        towards: direction from the scene to the camera.
     """
     points = _points(drawing, poses, leave_out)
     backward = np.array(towards) / np.linalg.norm(towards)
@@ -130,7 +130,7 @@ def framing(
     high = 1.1 * math.tan(math.radians(FIELD) / 2.0)
     slope = np.array([high / 1.21 * aspect, high / 1.21])
     distance = 0.1
-    # The middle of what is seen is not that of the box about it: shift, then step back, and once more.
+    # The centre of the projection is not the centre of the bounding box: shift, step back, repeat.
     for _ in range(2):
         local = points - middle
         depth = local @ backward
@@ -144,16 +144,20 @@ def framing(
 
 
 def _points(drawing: Drawing, poses: Poses, leave_out: frozenset[str]) -> Array:
-    """(p, 3) what is to be in view: all vertices of one instant, the boxes around surfaces of several."""
+    """(p, 3) points to have in view: all vertices for one state, bounding boxes of the surfaces for several."""
     index = {name: k for k, name in enumerate(drawing.frames)}
-    shown = [one for one in drawing.layer("visual") if one.frame not in leave_out and len(one.surface.vertices)]
+    shown = [
+        drawable
+        for drawable in drawing.layer("visual")
+        if drawable.frame not in leave_out and len(drawable.surface.vertices)
+    ]
     position, quat = poses.position, poses.quat_xyzw
     clouds = [
-        position[..., index[one.frame], None, :] + rotate(quat[..., index[one.frame], None, :], points)
-        for one in shown
-        for points in [one.surface.vertices if position.ndim == 2 else one.surface.corners]
+        position[..., index[drawable.frame], None, :] + rotate(quat[..., index[drawable.frame], None, :], points)
+        for drawable in shown
+        for points in [drawable.surface.vertices if position.ndim == 2 else drawable.surface.corners]
     ]
-    return np.concatenate([each.reshape(-1, 3) for each in clouds]) if clouds else position.reshape(-1, 3)
+    return np.concatenate([cloud.reshape(-1, 3) for cloud in clouds]) if clouds else position.reshape(-1, 3)
 
 
 def _vector(values: Array) -> Vector:

@@ -27,7 +27,7 @@ TRACK: Rgb = (186, 196, 208)
 NOW: Rgb = (47, 111, 176)
 CAPTION_COLOURS = (INK, QUIET, DONE, FAILED, TRACK, NOW)
 TEXT_SHARE = 0.042
-"""Height of the text in that of the picture."""
+"""Height of the text relative to that of the picture."""
 
 
 @lru_cache(maxsize=8)
@@ -39,12 +39,12 @@ def font(size: int) -> FreeTypeFont | BitmapFont:
 
 
 def text_size(height: int) -> int:
-    """[pixel] Of the text in a picture of that height."""
+    """Height of the text in a picture of this height [pixel]."""
     return max(round(TEXT_SHARE * height), 9)
 
 
 def caption(image: Image, playback: Playback, time: float) -> Image:
-    """The picture with the active step and the time at its top, and the timeline at its bottom."""
+    """The picture with the active step and the time at the top, and the timeline at the bottom."""
     from PIL import Image as PillowImage
     from PIL import ImageDraw
 
@@ -69,11 +69,11 @@ def write_line(
     left: Sequence[tuple[str, Rgb]],
     right: Sequence[tuple[str, Rgb]] = (),
 ) -> None:
-    """Writes words into one line; those of `left` are cut where they do not fit.
+    """Write words into one line; `left` is truncated if it does not fit.
 
     Args:
-        pen: draws.
-        place: the left and right end of the line and the middle of its height [pixel].
+        pen: draws into the picture.
+        place: left end, right end and vertical centre of the line [pixel].
         size: height of the text [pixel].
         left, right: words and their colours, from the end of the line inwards.
     """
@@ -97,7 +97,7 @@ def _cut(pen: ImageDraw, text: str, size: int, room: float) -> str:
 
 
 def _timeline(pen: ImageDraw, playback: Playback, time: float, size: tuple[int, int], margin: int) -> None:
-    """One bar a step, filled up to now; of a step that failed, red."""
+    """One bar per step, filled up to `time`; red for a failed step."""
     high = max(round(0.009 * size[1]), 2)
     top = size[1] - margin // 2 - high
     span = playback.end - playback.start

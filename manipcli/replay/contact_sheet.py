@@ -1,4 +1,4 @@
-"""A sheet with a picture of each step, as a figure in a paper."""
+"""Contact sheet of a run: one picture per step."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from manipcli.replay.camera import FROM, Vector
 from manipcli.replay.caption import DONE, FAILED, INK, QUIET, Rgb, font, text_size, write_line
-from manipcli.replay.frames import Frames, telling
+from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import Playback
 from manipcli.replay.renderer import Image
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 TILE = (480, 360)
-"""Of one picture [pixel]."""
+"""Size of one picture [pixel]."""
 GAP = 8
 MOMENTS = 6
-"""Pictures of a run that has no steps."""
+"""Number of pictures of a run without steps."""
 PAPER: Rgb = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """What a picture shows: `time` None where the step never began, and there is nothing to show."""
+    """Content of a picture; `time` is None for a step that did not start."""
 
     label: str
     time: float | None
@@ -36,18 +36,18 @@ class Tile:
 
 
 def tiles(playback: Playback) -> tuple[Tile, ...]:
-    """One a step, of the steps that never began too; without steps, some moments of the run."""
+    """One tile per step, including steps that did not start; without steps, evenly spaced times of the run."""
     if not playback.steps:
         times = np.linspace(playback.start, playback.end, MOMENTS if playback.end > playback.start else 1)
         return tuple(Tile("", float(time), "") for time in times)
-    begun = [Tile(one.label, telling(playback, one), one.outcome, one.text) for one in playback.steps]
+    begun = [Tile(step.label, clearest_time(playback, step), step.outcome, step.text) for step in playback.steps]
     judged = playback.verdict.steps if playback.verdict is not None else ()
-    known = {one.id for one in playback.steps}
-    return (*begun, *(Tile(one.id, None, one.outcome, one.text) for one in judged if one.id not in known))
+    known = {step.id for step in playback.steps}
+    return (*begun, *(Tile(step.id, None, step.outcome, step.text) for step in judged if step.id not in known))
 
 
 def columns_of(count: int) -> int:
-    """As many as make the sheet about as wide as a page: rows of up to four."""
+    """Number of columns, at most four."""
     return min(count, 3 if count <= 9 and count != 4 else 4)
 
 
@@ -57,7 +57,7 @@ def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: 
     Args:
         playback: the run.
         size: width and height of each picture [pixel].
-        towards: from what is shown to the eye.
+        towards: direction from the scene to the camera.
     """
     from PIL import Image as PillowImage
     from PIL import ImageDraw as Drawing
@@ -79,7 +79,7 @@ def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: 
             if tile.time is None:
                 pen.rectangle((left, top, left + size[0] - 1, top + size[1] - 1), fill=(240, 242, 245))
                 middle = (left + size[0] / 2, top + size[1] / 2)
-                pen.text(middle, "not begun", fill=QUIET, font=font(letter), anchor="mm")
+                pen.text(middle, "not started", fill=QUIET, font=font(letter), anchor="mm")
             else:
                 whole.paste(PillowImage.fromarray(frames.at(tile.time)), (left, top))
             _label(pen, tile, k + 1, (left, top + size[1], size[0], strip), letter)
@@ -87,7 +87,7 @@ def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: 
 
 
 def _heading(pen: ImageDraw, playback: Playback, width: int, height: int, letter: int) -> None:
-    """The task and why it failed at the left, its verdict at the right."""
+    """Task and cause of failure at the left, verdict at the right."""
     verdict = playback.verdict
     left, right = [(playback.name, INK)], []
     if verdict is not None:
@@ -98,7 +98,7 @@ def _heading(pen: ImageDraw, playback: Playback, width: int, height: int, letter
 
 
 def _label(pen: ImageDraw, tile: Tile, number: int, box: tuple[int, int, int, int], letter: int) -> None:
-    """Number and name at the left, with the reason where the step failed; outcome and time at the right."""
+    """Number, name and cause of failure at the left, outcome and time at the right."""
     left, top, width, height = box
     colour = DONE if tile.outcome == "done" else QUIET if tile.outcome in ("", "not_run") else FAILED
     time = [] if tile.time is None else [(f"{tile.time:.2f} s", QUIET)]

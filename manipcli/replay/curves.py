@@ -1,4 +1,4 @@
-"""Curves as they are drawn or written as a table: panels over one time axis, the steps behind them."""
+"""Charts of curves: panels over one time axis with the steps behind, and their CSV table."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from manipcli.core.geometry import Array
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One number over time.
+    """A number over time.
 
     Attributes:
-        name: as a user writes it, `joint_states.position[joint_1]`.
-        label: what tells it from the others of its panel, `joint_1`.
-        log: which log it is from; "" where there is one only.
+        name: name on the command line, `joint_states.position[joint_1]`.
+        label: name within its panel, `joint_1`.
+        log: name of its log; "" if there is only one.
         times: (T,) [s].
-        values: (T,) in the unit of the panel; NaN where there is none.
-        held: each value holds until the next, so that it is drawn as stairs.
-        end: of its log [s]: the last value holds no longer.
+        values: (T,) in the unit of the panel; NaN if missing.
+        held: each value holds until the next one; drawn as a step curve.
+        end: end of its log [s], until which the last value holds.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Curves with one axis of values. `quantity` and `unit` name it, `title` says where they are from."""
+    """Curves with a common value axis, named by `quantity` and `unit`; `title` names their source."""
 
     title: str
     quantity: str
@@ -52,24 +52,24 @@ class Panel:
 
     @property
     def title_with_label(self) -> str:
-        """With the label in brackets where there is one only."""
+        """The title, with the label in brackets if there is only one."""
         only = self.labels[0] if len(self.labels) == 1 else ""
         return f"{self.title}[{only}]" if only and self.title != only else self.title
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Each once."""
+        """The distinct values, in order."""
         return tuple(dict.fromkeys(curve.label for curve in self.curves))
 
     @property
     def logs(self) -> tuple[str, ...]:
-        """Each once."""
+        """The distinct values, in order."""
         return tuple(dict.fromkeys(curve.log for curve in self.curves))
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A step, from `start` to `end` [s]; `done` where it went as it should."""
+    """A step from `start` to `end` [s]; `done` if it succeeded."""
 
     name: str
     start: float
@@ -79,14 +79,14 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """Everything that is drawn on one sheet.
+    """Content of one figure.
 
     Attributes:
-        title: of the whole.
+        title: title of the figure.
         panels: from top to bottom, at least one.
-        steps: behind all panels.
-        start, end: of the axis of time [s].
-        notes: what else there is to say, a sentence each.
+        steps: steps, drawn behind all panels.
+        start, end: range of the time axis [s].
+        notes: remarks, one sentence each.
     """
 
     title: str
@@ -98,15 +98,15 @@ class Chart:
 
 
 def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array, Array]:
-    """Few points that draw the same line: of each column of a picture the first, lowest, highest and last.
+    """Fewer points that draw the same line: the first, lowest, highest and last of each pixel column.
 
     Args:
-        curve: any.
-        start, end: what the columns cover [s].
-        columns: how many there are.
+        curve: the curve.
+        start, end: time range of the columns [s].
+        columns: number of columns.
 
     Returns:
-        Times and values; a gap (NaN) stays one, and a value that is held stays until the end of its log.
+        Times and values; gaps (NaN) are kept, and a held value lasts until the end of its log.
     """
     times, values = curve.times, curve.values
     last = min(end, curve.end)
@@ -118,7 +118,7 @@ def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array
     begins = np.flatnonzero(np.diff(column, prepend=column[0] - 1)).tolist()
     kept: set[int] = set()
     for first, stop in zip(begins, [*begins[1:], len(times)], strict=True):
-        # Of numbers with a NaN among them, argmin and argmax are the NaN.
+        # argmin and argmax return the index of a NaN if there is one.
         lowest, highest = int(values[first:stop].argmin()), int(values[first:stop].argmax())
         kept.update((first, first + lowest, first + highest, stop - 1))
     order = np.array(sorted(kept))
@@ -126,28 +126,28 @@ def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array
 
 
 def write_table(chart: Chart, stream: TextIO) -> None:
-    """Writes comma-separated values, which read back the same to the last bit.
+    """Write comma-separated values that read back bit for bit.
 
     One row per time, one column per curve; a cell is empty where a curve has no value at that time.
 
-    With several logs the first column says which, and each log has its rows after those of the one before.
+    With several logs the first column is the name of the log, and the rows are ordered by log.
     """
-    curves = list({(one.name, one.log): one for panel in chart.panels for one in panel.curves}.values())
-    names = list(dict.fromkeys(one.name for one in curves))
-    logs = list(dict.fromkeys(one.log for one in curves))
+    curves = list({(curve.name, curve.log): curve for panel in chart.panels for curve in panel.curves}.values())
+    names = list(dict.fromkeys(curve.name for curve in curves))
+    logs = list(dict.fromkeys(curve.log for curve in curves))
     writer = csv.writer(stream, lineterminator="\n")
     head = ["log"] if len(logs) > 1 else []
     writer.writerow([*head, "time", *names])
     for log in logs:
-        mine = [one for one in curves if one.log == log]
+        mine = [curve for curve in curves if curve.log == log]
         first = [log] if head else []
-        times = np.unique(np.concatenate([one.times for one in mine]))
-        columns = [_cells(times, (one for one in mine if one.name == name)) for name in names]
+        times = np.unique(np.concatenate([curve.times for curve in mine]))
+        columns = [_cells(times, (curve for curve in mine if curve.name == name)) for name in names]
         writer.writerows([*first, repr(time), *row] for time, *row in zip(times.tolist(), *columns, strict=True))
 
 
 def _cells(times: Array, curves: Iterable[Curve]) -> list[str]:
-    """The cells of a column; of several values at one time the last."""
+    """The cells of a column; the last value if there are several at one time."""
     cells = [""] * len(times)
     for curve in curves:
         at = np.searchsorted(times, curve.times).tolist()

@@ -1,4 +1,4 @@
-"""A picture of a description that `check-urdf` has found sound."""
+"""Picture of a description without errors, for `check-urdf`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from manipcli.replay.renderer import draw_robot
 
 
 def draw_description(inspection: Inspection, path: Path) -> tuple[str, ...]:
-    """Draw the robot of a description into `path`; one line for each part that could not be drawn.
+    """Draw the robot of a description into `path`; returns one line for each part that cannot be drawn.
 
     Raises:
         InvalidInput: the description has errors.
     """
     parts = inspection.examination.parts
     if parts is None or inspection.examination.errors:
-        raise InvalidInput([Diagnostic("USE041", f"'{inspection.path}' has errors and is not drawn")])
+        raise InvalidInput([Diagnostic("USE041", f"'{inspection.path}' has errors and cannot be drawn")])
     return draw_robot(bare_robot(parts), path)

@@ -1,6 +1,6 @@
-"""What is drawn of a robot and a scene: named surfaces in named frames. Knows no viewer and no renderer.
+"""Drawing of a robot and a scene: named surfaces in named frames, independent of viewers and renderers.
 
-A `Drawing` says what there is, once; `Placing` says where its frames are, for one state or for thousands.
+A `Drawing` holds the surfaces; `Placing` computes the poses of its frames, for one state or for many.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shap
 Layer = Literal["visual", "collision", "inertia"]
 
 PLAIN: Rgba = (0.72, 0.74, 0.77, 1.0)
-"""Where neither the description nor the mesh says a colour."""
+"""Default colour, without a colour in the description and the mesh."""
 COLLISION: Rgba = (0.98, 0.60, 0.10, 0.45)
 INERTIA: Rgba = (0.20, 0.45, 0.90, 0.45)
 THINNEST = 1e-3
-"""Least length of an edge of an inertia box [m]: a rod or a plate would not be seen."""
+"""Smallest edge of an inertia box [m], so that a rod or a plate stays visible."""
 WORLD = "world"
 FLOOR = "floor"
-"""The kind of body that everything is on; pages and the view draw a grid in its place."""
+"""Kind of the floor body; pages and the view draw a grid instead."""
 BONE_RADIUS, BONE_SLENDERNESS, SHORTEST_BONE = 0.02, 8.0, 1e-3
-"""Of a bone: largest radius [m], smallest length over radius, and the shortest that is drawn [m]."""
+"""Bones: largest radius [m], smallest ratio of length to radius, and shortest drawn length [m]."""
 LAST_BONE = 0.01
-"""Radius [m] of the ball in place of a link without joints below it."""
+"""Radius of the ball for a link without child joints [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Drawable:
 
     Attributes:
         name: unique in its drawing, `robot/link_1/visual_0`.
-        layer: what it shows.
+        layer: visual, collision or inertia.
         frame: the frame it is fixed in.
         surface: triangles in that frame.
         rgba: 0 to 1.
@@ -61,7 +61,7 @@ class Drawable:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A named frame that is shown as three axes: the tool, a frame of the task."""
+    """A named frame shown as three axes, such as the tool or a frame of the task."""
 
     name: str
     frame: str
@@ -70,13 +70,13 @@ class Mark:
 
 @dataclass(frozen=True)
 class Drawing:
-    """Everything that can be drawn.
+    """Surfaces and frames of a robot and a scene.
 
     Attributes:
         frames: `world`, then `robot/<link>` for each link, then the bodies by name: the order of all pose arrays.
-        drawables: each fixed in one of them.
+        drawables: surfaces, each fixed in a frame.
         marks: further frames.
-        missing: what could not be drawn, one line each.
+        missing: parts that cannot be drawn, one line each.
     """
 
     frames: tuple[str, ...]
@@ -90,15 +90,15 @@ class Drawing:
 
 
 def link_frame(link: str) -> str:
-    """The name of a link's frame: as in contacts, so that no body can have it."""
+    """The frame name of a link, as in contacts; no body can have this name."""
     return f"robot/{link}"
 
 
 def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
     """The drawing of a robot, a scene, or both.
 
-    Collision meshes are drawn as their convex hulls, which is what planner and physics take them for. The collision
-    shapes of a link stand in for its visual ones where it has none that can be drawn, and bones where it has neither.
+    Collision meshes are drawn as their convex hulls, as planner and physics use them. A link without drawable visual
+    shapes is drawn with its collision shapes, and a link without either with bones.
     """
     missing: list[str] = []
     frames: list[str] = [WORLD]
@@ -110,7 +110,7 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
             frames.append(link_frame(link.name))
             shown = tuple(_link(link, missing))
             drawables += shown
-            if (link.visuals or link.collisions) and not any(one.layer == "visual" for one in shown):
+            if (link.visuals or link.collisions) and not any(drawable.layer == "visual" for drawable in shown):
                 bare.append(link.name)
         if bare:
             drawables += (
@@ -118,7 +118,7 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
                 for name in bare
                 for k, bone in enumerate(bones(robot, name))
             )
-            missing.insert(0, f"bones between joints stand in for {listed(bare)}")
+            missing.insert(0, f"drawn as bones between joints: {listed(bare)}")
         if robot.tool is not None:
             marks.append(Mark("tool", link_frame(robot.tool.link), robot.tool.X_LT))
     if scene is not None:
@@ -133,17 +133,17 @@ def _link(link: Link, missing: list[str]) -> Iterator[Drawable]:
     frame = link_frame(link.name)
     seen = list(_shapes("visual", frame, link.visuals, None, missing))
     touched = list(_shapes("collision", frame, link.collisions, COLLISION, missing))
-    # A link that has nothing to show, or whose meshes are missing, is better seen by what it touches with than not.
+    # Draw the collision shapes of a link without visual shapes or with missing meshes.
     instead = () if seen else touched
     yield from seen
-    yield from (replace(one, name=f"{one.name}_seen", layer="visual", rgba=PLAIN) for one in instead)
+    yield from (replace(drawable, name=f"{drawable.name}_seen", layer="visual", rgba=PLAIN) for drawable in instead)
     yield from touched
     if link.inertial is not None:
         yield from _inertia(frame, link.inertial)
 
 
 def bones(robot: RobotModel, link: str) -> tuple[Surface, ...]:
-    """In place of a link without shapes, in its frame: a bone to each joint below it (at zero), or else a ball."""
+    """Surfaces for a link without shapes, in its frame: a bone to each child joint (at zero), else a ball."""
     ends = [joint.X_PJ.p for joint in robot.joints if joint.parent == link]
     found = tuple(_bone(end) for end in ends if np.linalg.norm(end) > SHORTEST_BONE)
     return found or (sphere_surface(Sphere(LAST_BONE)),)
@@ -175,20 +175,20 @@ def _shapes(
         except UnusableMesh as error:
             missing.append(f"{layer} shape of '{frame}': {error}")
             continue
-        for n, one in enumerate(surfaces):
+        for n, part in enumerate(surfaces):
             name = f"{frame}/{layer}_{k}" + (f"_{n}" if len(surfaces) > 1 else "")
-            yield Drawable(name, layer, frame, one.moved(geometry.X_LS), rgba or geometry.rgba or one.rgba or PLAIN)
+            yield Drawable(name, layer, frame, part.moved(geometry.X_LS), rgba or geometry.rgba or part.rgba or PLAIN)
 
 
 def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
-    """The surfaces of a shape in its own frame, scaled; several where a mesh file has several colours.
+    """The surfaces of a shape in its own frame, scaled; one for each colour of a mesh file.
 
     Args:
         shape: the shape.
-        hull: the convex hull of a mesh instead of its triangles.
+        hull: use the convex hull of a mesh instead of its triangles.
 
     Raises:
-        UnusableMesh: a mesh cannot be drawn.
+        UnusableMesh: the mesh cannot be drawn.
     """
     match shape:
         case Box():
@@ -198,20 +198,20 @@ def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
         case Cylinder():
             return (cylinder_surface(shape),)
         case Mesh():
-            whole = tuple(one.scaled(shape.scale) for one in mesh_surfaces(shape.path))
+            whole = tuple(part.scaled(shape.scale) for part in mesh_surfaces(shape.path))
             return (_hull(whole),) if hull else whole
 
 
 def _hull(surfaces: tuple[Surface, ...]) -> Surface:
-    """The convex hull of all vertices; where they span no volume, the surfaces themselves."""
+    """The convex hull of all vertices; the surfaces themselves if they span no volume."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points = np.concatenate([one.vertices for one in surfaces])
+    points = np.concatenate([part.vertices for part in surfaces])
     try:
         found = ConvexHull(points)
     except QhullError:
-        first = np.cumsum([0, *(len(one.vertices) for one in surfaces[:-1])])
-        return smoothed(points, np.concatenate([one.faces + k for one, k in zip(surfaces, first, strict=True)]))
+        first = np.cumsum([0, *(len(part.vertices) for part in surfaces[:-1])])
+        return smoothed(points, np.concatenate([part.faces + k for part, k in zip(surfaces, first, strict=True)]))
     faces = np.array(found.simplices)
     a, b, c = (points[faces[:, k]] for k in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
@@ -220,7 +220,7 @@ def _hull(surfaces: tuple[Surface, ...]) -> Surface:
 
 
 def inertia_box(inertial: Inertial) -> tuple[Box, Transform]:
-    """The uniform box with the mass and inertia of a body, and X_LB, where it stands in the body's frame.
+    """The uniform box with the mass and inertia of a body, and its pose X_LB in the frame of the body.
 
     With principal moments I1, I2, I3 its edges are a_i = sqrt(6 (I_j + I_k - I_i) / m), from I_i = m (a_j^2 + a_k^2)
     / 12; a negative radicand (no body has such moments) gives an edge of length 0.
@@ -241,22 +241,22 @@ def _inertia(frame: str, inertial: Inertial) -> Iterator[Drawable]:
 
 
 def floors_of(scene: Scene | None) -> frozenset[str]:
-    """The names of the floors."""
+    """Names of the floor bodies."""
     return frozenset(body.name for body in scene.bodies if body.kind == FLOOR) if scene is not None else frozenset()
 
 
 def ground_height(drawing: Drawing, poses: Poses, floors: frozenset[str]) -> float:
-    """[m] of the grid: z = 0, or under what stands lower.
+    """Height of the ground grid [m]: z = 0, or the lowest point if it is lower.
 
     Args:
-        drawing: what is shown.
-        poses: one instant.
+        drawing: the drawing.
+        poses: poses of one state.
         floors: frames that are not drawn.
     """
     index = {name: k for k, name in enumerate(drawing.frames)}
     lowest = (
-        float(poses.X_WF(index[one.frame]).apply(one.surface.vertices)[:, 2].min())
-        for one in drawing.layer("visual")
-        if one.frame not in floors and len(one.surface.vertices)
+        float(poses.X_WF(index[drawable.frame]).apply(drawable.surface.vertices)[:, 2].min())
+        for drawable in drawing.layer("visual")
+        if drawable.frame not in floors and len(drawable.surface.vertices)
     )
     return min(0.0, min(lowest, default=0.0))

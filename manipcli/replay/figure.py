@@ -1,4 +1,4 @@
-"""Curves as a figure in a file: SVG, PNG or PDF, the same bytes every time. No window, no display."""
+"""Figures of curves as SVG, PNG or PDF with matplotlib, without a display and with reproducible bytes."""
 
 from __future__ import annotations
 
@@ -17,44 +17,44 @@ Kind = Literal["svg", "png", "pdf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 WIDTH = 10.0
-"""[inch] of a figure."""
+"""Width of a figure [inch]."""
 HEIGHT = 2.3
-"""[inch] of a panel; a single one is twice as high."""
+"""Height of a panel [inch]; a single one is twice as high."""
 DPI = 120
 COLUMNS = 2400
-"""Of a curve, more than any screen shows."""
+"""Pixel columns for thinning a curve, more than any screen has."""
 INK, FAINT = "#1e242c", "#6b7684"
 GRID = "#dfe4ea"
 BANDS = ("#f1f4f8", "#e6ebf2")
 FAILED = "#fbe3e0"
-# Ten that are told apart well, also by most who are colour-blind, then the same once more, lighter.
+# Ten distinguishable colours, also for most colour-blind readers, then lighter versions of them.
 COLOURS = (
     "#2f6fb0", "#e07b28", "#3a9a5b", "#c8403f", "#7d5ba6", "#8a5a44", "#d26aa8", "#5f6b7a", "#a89a1d", "#27a3b4",
     "#8fb8e0", "#f4bd8d", "#97d0aa", "#ea9f9e", "#bfabd8", "#c4a596", "#eab6d5", "#b3bcc7", "#d8ce73", "#8fd3dc",
 )  # fmt: skip
 DASHES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
 MOST_NAMED = 24
-"""Curves in one legend: beyond, it would be higher than its panel."""
+"""Most curves in a legend, so that it is not higher than its panel."""
 
 
 def kind_of(path: Path) -> Kind:
-    """The kind of figure that a file name asks for.
+    """Format of a figure by its file name.
 
     Raises:
-        InvalidArgument: it is none.
+        InvalidArgument: unknown file ending.
     """
     for kind in KINDS:
         if path.suffix.lower() == f".{kind}":
             return kind
-    raise InvalidArgument("USE061", f"'{path}': a figure is one of {', '.join(f'.{kind}' for kind in KINDS)}")
+    raise InvalidArgument("USE061", f"'{path}' is not a figure: use {', '.join(f'.{kind}' for kind in KINDS)}")
 
 
 def render(chart: Chart, kind: Kind) -> bytes:
-    """The file of a chart."""
+    """The bytes of the figure file of a chart."""
     import matplotlib
 
     stream = BytesIO()
-    # No date: the same chart is the same bytes.
+    # No date: equal charts give equal bytes.
     metadata: dict[Kind, dict[str, str | None]] = {
         "svg": {"Date": None, "Creator": "manipcli"},
         "pdf": {"CreationDate": None, "Creator": "manipcli", "Producer": None},
@@ -109,7 +109,7 @@ def _figure(chart: Chart) -> Figure:
 
 
 def _colours(chart: Chart) -> list[dict[tuple[str, str], str]]:
-    """For each panel the colour of (label, log): of each label the same in all panels; of one label, of each log."""
+    """Colour of (label, log) for each panel: by label, the same in all panels; by log if there is only one label."""
     of: dict[str, str] = {}
     found = []
     for panel in chart.panels:
@@ -118,10 +118,10 @@ def _colours(chart: Chart) -> list[dict[tuple[str, str], str]]:
             found.append(keys)
             continue
         fresh = [label for label in panel.labels if label not in of]
-        # Things of another kind begin with the first colour again.
+        # Another kind of labels starts at the first colour.
         first = 0 if len(fresh) == len(panel.labels) else len(of)
         of.update((label, COLOURS[(first + k) % len(COLOURS)]) for k, label in enumerate(fresh))
-        found.append({(one.label, one.log): of[one.label] for one in panel.curves})
+        found.append({(curve.label, curve.log): of[curve.label] for curve in panel.curves})
     return found
 
 
@@ -181,13 +181,13 @@ def _legend(place: Axes, panel: Panel, colours: dict[tuple[str, str], str]) -> N
 
 
 def _step_names(place: Axes, chart: Chart) -> None:
-    """Above the first panel, each in its own stretch; turned where it is too short for its name."""
+    """Step names above the first panel, rotated if a step is too short for its name."""
     width = max(chart.end - chart.start, 1e-9)
     for step in chart.steps:
         start, end = max(step.start, chart.start), min(step.end, chart.end)
         if end <= start:
             continue
-        # [characters] that fit along the stretch, at about 150 on the whole width.
+        # Characters that fit; the whole width holds about 150.
         fits = len(step.name) <= (end - start) / width * 130.0
         place.annotate(
             _shown(step),

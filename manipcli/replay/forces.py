@@ -1,7 +1,7 @@
-"""Contacts as arrows: where two parts touch, and which way they push.
+"""Contact forces of a run as arrows.
 
-A log says which parts touch and how strongly; where follows from their shapes, which are taken as the physics takes
-them: primitives, and meshes by their convex hulls.
+A log holds the pair and the force of each contact. Its point and direction are computed from the collision shapes as
+the physics uses them: primitives, and convex hulls of meshes.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     from manipcli.shapes.proximity import CollisionGeometry
 
 LEAST = 0.05
-"""[N] below this no arrow is seen."""
+"""Smallest drawn force [N]."""
 LONGEST = 0.15
-"""[m] length of the arrow of a strong force."""
+"""Length of the arrow of a strong force [m]."""
 STRONG = 95.0
-"""Percentile of all forces of a run that counts as strong: a single impact must not make the rest invisible."""
+"""Percentile of the forces of a run that counts as strong, so that one impact does not hide the others."""
 
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """The normal force [N] between two parts at a point (3,) in the world; `direction` (3,), unit, is that of the force
-    on the body that can move, or on the robot."""
+    """A normal force [N] between two parts at a point (3,) [m] in the world; `direction` (3,) is the unit vector of the
+    force on the movable body, or on the robot."""
 
     point: Array
     direction: Array
@@ -42,7 +42,7 @@ class Push:
 
 
 class Forces:
-    """The arrows of a playback; the parts are looked at when they are asked for."""
+    """The force arrows of a playback, computed on demand."""
 
     def __init__(self, playback: Playback, poses: Poses) -> None:
         self._contacts = playback.contacts
@@ -56,29 +56,29 @@ class Forces:
         self._movable = {body.name for body in bodies if not body.fixed}
         self._geometries = geometries
         self._shapes: dict[str, list[tuple[Transform, CollisionGeometry]]] = {}
-        strong = [one.force for each in self._contacts for one in each if one.force > LEAST]
+        strong = [contact.force for contacts in self._contacts for contact in contacts if contact.force > LEAST]
         self.scale = LONGEST / float(np.percentile(strong, STRONG)) if strong else 0.0
-        """[m/N] length of an arrow."""
+        """Length of an arrow per force [m/N]."""
 
     def at(self, k: int) -> tuple[Push, ...]:
-        """What pushes at time number k."""
-        found = (self._push(one, k) for one in self._contacts[k] if one.force > LEAST)
+        """The contact forces at the k-th time."""
+        found = (self._push(contact, k) for contact in self._contacts[k] if contact.force > LEAST)
         return tuple(push for push in found if push is not None)
 
     def _push(self, contact: Contact, k: int) -> Push | None:
         X_WA, X_WB = (self._poses_of(name, k) for name in (contact.a, contact.b))
         found = [
-            distance(one, X_WA @ X_AS, other, X_WB @ X_BS)
-            for X_AS, one in self._of(contact.a)
-            for X_BS, other in self._of(contact.b)
+            distance(first, X_WA @ X_AS, second, X_WB @ X_BS)
+            for X_AS, first in self._of(contact.a)
+            for X_BS, second in self._of(contact.b)
         ]
         if not found:
             return None
-        nearest = min(found, key=lambda one: one.distance)
+        nearest = min(found, key=lambda result: result.distance)
         point, normal = nearest.point, nearest.normal
         if not np.isfinite(nearest.distance) or not np.isfinite(normal).all():
             return None
-        # The normal points from the first part to the second; a force on the first has the other sign.
+        # The normal points from the first part to the second; the force on the first has the opposite sign.
         on_second = contact.a not in self._movable and (contact.b in self._movable or contact.b.startswith("robot/"))
         return Push(point, normal if on_second else -normal, contact.force)
 
@@ -93,11 +93,11 @@ class Forces:
 
 
 def _usable(geometries: Sequence[Geometry]) -> list[tuple[Transform, CollisionGeometry]]:
-    """The shapes that can be read; a mesh whose file is missing touches nothing that is drawn."""
+    """The shapes that can be read, without meshes whose file is missing."""
     found = []
-    for one in geometries:
+    for geometry in geometries:
         try:
-            found.append((one.X_LS, coal_shape(one.shape)))
+            found.append((geometry.X_LS, coal_shape(geometry.shape)))
         except ValueError:
             continue
     return found

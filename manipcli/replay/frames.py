@@ -1,4 +1,4 @@
-"""Pictures of a run: what stood where at a moment, with the step's name, the time and the run's timeline drawn in."""
+"""Pictures of a run at given times, with step, time and timeline as captions."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from manipcli.replay.renderer import Image, Renderer
 Numbers = npt.NDArray[np.int64]
 
 LOOKED_AT = 60
-"""StateWindow of a run that are all to be in view."""
+"""Number of states of a run that are in view."""
 LARGE = 0.6
-"""A body that stands still and has this part of the extent of robot and things is what they stand on."""
+"""A fixed body with this share of the extent of robot and objects is a floor or table."""
 LEAST_SIZE, MOST_SIZE = 64, 4096
-"""Of a picture [pixel]."""
+"""Limits of the width and height of a picture [pixel]."""
 FALLING = 0.5
-"""[m/s] A thing that is let go of, and not set down, is faster than this."""
+"""Speed of an object that is dropped, not set down [m/s]."""
 HALF_WAY = 0.6
-"""A thing that falls is shown when it has this part of its greatest speed."""
+"""A falling object is shown at this share of its largest speed."""
 
 
 class Frames(Renderer):
-    """The pictures of a run, from one camera that does not move.
+    """The pictures of a run from one fixed camera.
 
     Args:
         playback: the run.
         size: width and height [pixel].
-        towards: from what is shown to the eye; the camera has all of the run in view.
-        captions: whether step, time and timeline are drawn in.
+        towards: direction from the scene to the camera, which has the whole run in view.
+        captions: draw step, time and timeline.
 
     Attributes:
-        camera: where it stands.
-        colours: of what is shown, 0 to 1, before light falls on it.
-        missing: what could not be drawn, a line each.
+        camera: the camera.
+        colours: unlit colours of the surfaces, 0 to 1.
+        missing: parts that cannot be drawn, one line each.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Frames(Renderer):
         self._placing = Placing(playback.robot, playback.scene)
         drawing = draw(playback.robot, playback.scene)
         self.missing = drawing.missing
-        self.colours = tuple(dict.fromkeys(one.rgba[:3] for one in drawing.layer("visual")))
+        self.colours = tuple(dict.fromkeys(drawable.rgba[:3] for drawable in drawing.layer("visual")))
         count = len(playback.times)
         some = np.unique(np.linspace(0, count - 1, min(count, LOOKED_AT)).round().astype(int))
         self.camera: Camera = framing(
@@ -61,7 +61,7 @@ class Frames(Renderer):
         super().__init__(drawing, size=size, still=self._placing.still)
 
     def at(self, time: float) -> Image:
-        """The picture at the recorded moment nearest to `time` [s]."""
+        """The picture at the recorded time nearest to `time` [s]."""
         k = self.playback.index(time)
         image = self.picture(self._poses(k), self.camera)
         return caption(image, self.playback, float(self.playback.times[k])) if self._captions else image
@@ -71,7 +71,7 @@ class Frames(Renderer):
         return self._placing.at(run.stance[k], run.body_position[k], run.body_quat_xyzw[k])
 
     def _furniture(self, some: Numbers) -> frozenset[str]:
-        """Bodies that need not be in view as a whole: the floor, and what stands still and is as large as the rest."""
+        """Bodies that need not be in view completely: the floor, and large fixed bodies."""
         scene = self.playback.scene
         fixed = [body for body in scene.bodies if body.fixed] if scene is not None else []
         poses = self._poses(some)
@@ -86,33 +86,30 @@ class Frames(Renderer):
 
 
 def moment(playback: Playback, text: str) -> float:
-    """[s] What a user calls a moment: seconds, a time with its unit, `start`, `end`, or a step, which is shown at its
-    most telling moment.
+    """Time [s] of a user's text: seconds, a time with its unit, `start`, `end`, or a step id, see `clearest_time`.
 
     Raises:
-        InvalidArgument: it is none of these, or outside of the run.
+        InvalidArgument: the text is none of these, or outside the run.
     """
     for step in playback.steps:
         if step.id == text:
-            return telling(playback, step)
+            return clearest_time(playback, step)
     if text in ("start", "end"):
         return playback.start if text == "start" else playback.end
     try:
         time = to_si(text, NUMBER, TIME)
     except UnitError:
         hint = did_you_mean(text, [*(step.id for step in playback.steps), "start", "end"], kind="steps")
-        message = f"'{shorten(text)}' is neither a time nor a step of this run"
+        message = f"'{shorten(text)}' is not a time or step of this run"
         raise InvalidArgument("REPLAY011", message, hint=hint) from None
-    # To the centisecond, as the run's end is shown.
+    # The end of the run is shown in centiseconds.
     if not playback.start - 0.005 <= time <= playback.end + 0.005:
-        raise InvalidArgument(
-            "REPLAY012", f"{time:g} s lies outside of the run: {playback.start:g} to {playback.end:g} s"
-        )
+        raise InvalidArgument("REPLAY012", f"{time:g} s is outside the run: {playback.start:g} to {playback.end:g} s")
     return time
 
 
-def telling(playback: Playback, step: PlaybackStep) -> float:
-    """[s] When a step is best seen: at its end, before the next begins; while something falls, where something does."""
+def clearest_time(playback: Playback, step: PlaybackStep) -> float:
+    """Time [s] that shows a step best: its end, before the next step starts; during the fall if an object falls."""
     within = np.flatnonzero((playback.times >= step.start) & (playback.times < step.end))
     if len(within) > 2 and playback.body_position.shape[1]:
         heights, times = playback.body_position[within, :, 2], playback.times[within]
@@ -127,10 +124,10 @@ def parse_size(text: str) -> tuple[int, int]:
     """Width and height of `640x360`.
 
     Raises:
-        InvalidArgument: it is no size, or beyond what is drawn.
+        InvalidArgument: the text is not a size, or out of range.
     """
     parts = text.lower().split("x")
     if len(parts) != 2 or not all(part.isdecimal() and LEAST_SIZE <= int(part) <= MOST_SIZE for part in parts):
-        hint = f"WIDTHxHEIGHT in pixels, as 960x540, from {LEAST_SIZE} to {MOST_SIZE} each"
-        raise InvalidArgument("REPLAY013", f"'{shorten(text)}' is no size of a picture", hint=hint)
+        hint = f"WIDTHxHEIGHT in pixels, such as 960x540, from {LEAST_SIZE} to {MOST_SIZE} each"
+        raise InvalidArgument("REPLAY013", f"'{shorten(text)}' is not a picture size", hint=hint)
     return int(parts[0]), int(parts[1])

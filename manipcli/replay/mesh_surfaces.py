@@ -1,4 +1,4 @@
-"""Mesh files as coloured surfaces: the triangles that everything else gets, too, and the colours of the file."""
+"""Coloured surfaces of mesh files: the triangles of `shapes` with the colours of the file."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ MAX_MATERIAL_BYTES = 1_000_000
 
 
 def mesh_surfaces(path: Path) -> tuple[Surface, ...]:
-    """The surfaces of a mesh file in its own frame, unscaled; each colour of the file is one.
+    """The surfaces of a mesh file in its own frame, unscaled; one per colour.
 
     Raises:
-        UnusableMesh: it is absent, of an unknown kind, damaged or empty.
+        UnusableMesh: the file is missing, of an unknown kind, damaged or empty.
     """
     try:
         mesh = read_mesh(path)
@@ -32,7 +32,7 @@ def mesh_surfaces(path: Path) -> tuple[Surface, ...]:
 
 @lru_cache(maxsize=64)
 def _surfaces(path: Path, mesh: TriangleMesh) -> tuple[Surface, ...]:
-    """The reader answers with the same mesh while the file does not change."""
+    """Cached: the reader returns the same mesh object while the file does not change."""
     colours = mesh.colours or (tuple(_obj_colours(path)) if mesh.format == "obj" else ())
     faces: dict[Rgba | None, list[slice]] = {}
     for (first, rgba), (last, _) in pairwise([*(colours or ((0, None),)), (len(mesh.faces), None)]):
@@ -41,11 +41,11 @@ def _surfaces(path: Path, mesh: TriangleMesh) -> tuple[Surface, ...]:
         smoothed(mesh.vertices, np.concatenate([mesh.faces[part] for part in parts]), rgba)
         for rgba, parts in faces.items()
     ]
-    return tuple(one for one in made if len(one.faces))
+    return tuple(coloured for coloured in made if len(coloured.faces))
 
 
 def _obj_colours(path: Path) -> Iterator[tuple[int, Rgba | None]]:
-    """The runs of one colour of an OBJ file whose materials lie beside it; textures are left out."""
+    """Ranges of faces with one colour of an OBJ file with a material file next to it; textures are ignored."""
     known: dict[bytes, Rgba] = {}
     yield 0, None
     face = 0
@@ -60,7 +60,7 @@ def _obj_colours(path: Path) -> Iterator[tuple[int, Rgba | None]]:
 
 
 def _materials(path: Path) -> dict[bytes, Rgba]:
-    """Diffuse colours of an MTL file by the names of the materials; none where it cannot be read."""
+    """Diffuse colours of an MTL file by material name; empty if it cannot be read."""
     found: dict[bytes, Rgba] = {}
     try:
         if not path.is_file() or path.is_symlink() or path.stat().st_size > MAX_MATERIAL_BYTES:

@@ -1,7 +1,7 @@
 """HTTP server on 127.0.0.1 for one HTML page.
 
-It refuses requests that name another host (`Host`, against DNS names that are bound to 127.0.0.1 later) or that come
-from another page (`Origin`). Other programs and users of this machine can read the page.
+It refuses requests with another host name (`Host`, against DNS rebinding) or from another page (`Origin`). Other
+programs and users of this machine can read the page.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from manipcli.core.errors import Diagnostic, InvalidInput
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
 MAX_PORTS = 100
-"""Ports from `DEFAULT_PORT` on that are tried."""
+"""Number of ports to try from `DEFAULT_PORT` on."""
 
 
 def is_meant_for(host: str | None, origin: str | None, port: int) -> bool:
-    """Whether a request with these headers was made for the server at `port`, by its own page or by no page."""
+    """Whether a request with these headers is for the server at `port`, from its own page or without a page."""
     names = [f"{HOST}:{port}", f"localhost:{port}"]
     return host in names and (origin is None or origin in [f"http://{name}" for name in names])
 
 
 def unusable_port(port: int, reason: str = "already in use") -> InvalidInput:
     """The error for a port that a server cannot listen on."""
-    hint = f"use another --port, or leave it out: the first free one from {DEFAULT_PORT} on is used"
+    hint = f"use another --port, or omit it to use the first free port from {DEFAULT_PORT} on"
     return InvalidInput([Diagnostic("VIEW001", f"port {port} is {reason}", hint=hint)])
 
 
 class PageServer:
-    """Serves one page in a background thread. A context manager: the port is closed at its end.
+    """Serves one page in a background thread. A context manager that closes the port at its end.
 
     Args:
         page: the HTML text.
-        port: to listen on; None takes 8080 or the next free one, 0 any free one.
+        port: port to listen on; None: 8080 or the next free port; 0: any free port.
 
     Raises:
         InvalidInput: VIEW001 the port cannot be used.
@@ -50,7 +50,7 @@ class PageServer:
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
                 if not is_meant_for(self.headers["Host"], self.headers["Origin"], self.server.server_port):  # type: ignore[attr-defined]
-                    self.send_error(HTTPStatus.FORBIDDEN, "Only for the browser of this machine")
+                    self.send_error(HTTPStatus.FORBIDDEN, "Only browsers on this machine have access")
                 elif self.path.partition("?")[0] != "/":
                     self.send_error(HTTPStatus.NOT_FOUND)
                 else:
@@ -62,7 +62,7 @@ class PageServer:
                     self.wfile.write(body)
 
             def log_message(self, format: str, *arguments: object) -> None:
-                """Nothing: stderr is for the user."""
+                """No log: stderr is for the user."""
 
         self._server = _listen(Handler, port)
         self.port = self._server.server_port
@@ -83,7 +83,7 @@ class _Server(ThreadingHTTPServer):
     block_on_close = False
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Nothing: a browser that closes its connection early is no error."""
+        """Ignored: a browser can close its connection early."""
 
 
 def _listen(handler: type[BaseHTTPRequestHandler], port: int | None) -> ThreadingHTTPServer:

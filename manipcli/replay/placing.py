@@ -1,4 +1,4 @@
-"""Where the frames of a drawing are, for one state or for thousands at once."""
+"""Poses of the frames of a drawing, for one state or for many at once."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from manipcli.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Poses:
-    """Where the frames of a drawing are: `position` (..., F, 3) [m], `quat_xyzw` (..., F, 4), in the world."""
+    """Poses of the frames of a drawing in the world: `position` (..., F, 3) [m], `quat_xyzw` (..., F, 4)."""
 
     position: Array
     quat_xyzw: Array
 
     def X_WF(self, k: int) -> Transform:
-        """The pose of frame number k, where there is one instant only."""
+        """The pose of the k-th frame, for poses of one state."""
         return Transform.of(xyz=self.position[k], quat_xyzw=self.quat_xyzw[k])
 
 
 class Placing:
-    """Joint positions and poses of bodies to the poses of all frames of `draw(robot, scene)`."""
+    """Computes the poses of all frames of `draw(robot, scene)` from joint positions and body poses."""
 
     def __init__(self, robot: RobotModel | None, scene: Scene | None = None) -> None:
         self._robot = robot
@@ -35,21 +35,21 @@ class Placing:
 
     @property
     def still(self) -> frozenset[str]:
-        """The frames of the drawing that no state moves: the world, fixed bodies, links above all moving joints."""
+        """The frames that never move: the world, fixed bodies, and links above all moving joints."""
         links = self._robot.links if self._robot is not None else ()
         bodies = self._scene.bodies if self._scene is not None else ()
         fixed = [f"robot/{link.name}" for link, (last, _) in zip(links, self._links, strict=True) if last < 0]
         return frozenset(["world", *fixed, *(body.name for body in bodies if body.fixed)])
 
     def start(self, q: Array | None = None) -> Poses:
-        """Joints at `q` (n,), bodies where the scene starts."""
+        """Poses with the joints at `q` (n,) and the bodies at their start poses."""
         movable = self._scene.movable if self._scene is not None else ()
         p = np.array([body.X_WO.p for body in movable]).reshape(-1, 3)
         quat = np.array([body.X_WO.quat_xyzw for body in movable]).reshape(-1, 4)
         return self.at(np.zeros(0) if q is None else q, p, quat)
 
     def at(self, q: Array, body_position: Array, body_quat_xyzw: Array) -> Poses:
-        """Poses at states as in `WorldState`: `q` (..., n), bodies (..., m, 3) and (..., m, 4)."""
+        """Poses at states as in `WorldState`: `q` (..., n), bodies (..., m, 3) [m] and (..., m, 4)."""
         axes = q.shape[:-1]
         count = math.prod(axes)
         bodies = self._scene.bodies if self._scene is not None else ()

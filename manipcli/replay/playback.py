@@ -1,4 +1,4 @@
-"""A run as it is shown: poses at the rate of a screen, steps and curves. Pages, pictures and videos are made of it."""
+"""A run sampled for display: states, steps and curves, the input of pages, pictures and videos."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from manipcli.replay.placing import Placing, Poses
 from manipcli.scene.scene import Scene
 
 RATE = 50.0
-"""[Hz] at which a run is shown unless somebody asks for another."""
+"""Default sampling rate of a playback [Hz]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A part of a step, from `start` to `end` [s]."""
+    """A phase of a step, from `start` to `end` [s]."""
 
     name: str
     start: float
@@ -31,7 +31,7 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class PlaybackStep:
-    """A step that was begun. `outcome` as judged; `end` [s] is that of the log where the step never ended."""
+    """A started step with its judged outcome; `end` [s] is the end of the log if the step did not end."""
 
     id: str
     verb: str
@@ -48,11 +48,11 @@ class PlotTable:
     """Curves over one time axis.
 
     Attributes:
-        name: what they show, `joint position`.
-        columns: what each is of: a joint, an axis, a pair that touches.
-        units: of each column.
+        name: quantity, `joint position`.
+        columns: name of each column: a joint, an axis, a contact pair.
+        units: unit of each column.
         times: (T,) [s].
-        values: (T, c); NaN where there is none.
+        values: (T, c); NaN if missing.
     """
 
     name: str
@@ -64,24 +64,24 @@ class PlotTable:
 
 @dataclass(frozen=True)
 class Playback:
-    """A run at the rate of a screen.
+    """A run at the sampling rate of a display.
 
     Attributes:
-        name: the task, or the file where no task is known.
-        robot: None where the log does not say what the robot is.
-        scene: None where the log says of nothing but the robot.
-        joint_names: (n) of `robot.moving_joints`, or those that the log has where there is no robot.
-        times: (T,) [s], at least one; those of the ticks nearest to the wanted rate, first and last among them.
-        position, velocity, effort: (T, n) as measured; NaN where the log has none.
-        reference: (T, n) what the joints should follow; NaN for a joint that no controller moves.
-        body_position: (T, m, 3) [m] of `Scene.movable`.
-        body_quat_xyzw: (T, m, 4).
-        contacts: for each time what touched since the time before, with the largest force of each pair.
-        steps: in the order in which they began.
-        verdict: None where the log cannot be judged.
+        name: the task; the file name if the task is unknown.
+        robot: the robot; None if the log has no description.
+        scene: the scene; None if the log has only the robot.
+        joint_names: (n) names of `robot.moving_joints`; without a robot, the joints in the log.
+        times: (T,) [s], at least one; ticks nearest to the sampling rate, including the first and the last.
+        position, velocity, effort: (T, n) as measured; NaN if missing.
+        reference: (T, n) reference positions; NaN for a joint without a controller.
+        body_position: (T, m, 3) [m] positions of `Scene.movable` in the world.
+        body_quat_xyzw: (T, m, 4) orientations.
+        contacts: for each time the contacts since the previous time, with the largest force of each pair.
+        steps: steps in the order of their start.
+        verdict: the verdict; None if the log cannot be judged.
         lost: why the end of the log is missing, or None.
-        notes: what else is missing or unlike it was in the run, a sentence each.
-        keep: what must live as long as this does: the folder of the meshes that the log carries.
+        notes: what is missing or differs from the run, one sentence each.
+        keep: owner of resources with the same lifetime: the folder of embedded meshes.
     """
 
     name: str
@@ -104,58 +104,58 @@ class Playback:
 
     @property
     def start(self) -> float:
-        """[s] the first time."""
+        """First time [s]."""
         return float(self.times[0])
 
     @property
     def end(self) -> float:
-        """[s] the last time."""
+        """Last time [s]."""
         return float(self.times[-1])
 
     @property
     def has_reference(self) -> bool:
-        """Whether a controller moves any joint of a robot that is known."""
+        """Whether there is a robot and any joint has a reference."""
         return self.robot is not None and not bool(np.isnan(self.reference).all())
 
     @property
     def total(self) -> int:
-        """Of the steps, those that were never begun too."""
+        """Number of steps, including those that did not start."""
         return max(len(self.steps), 0 if self.verdict is None else len(self.verdict.steps))
 
     def index(self, time: float) -> int:
-        """Number of the time nearest to `time` [s]."""
+        """Index of the time nearest to `time` [s]."""
         k = int(np.searchsorted(self.times, time))
         if k == len(self.times) or (k > 0 and time - self.times[k - 1] <= self.times[k] - time):
             k -= 1
         return max(k, 0)
 
     def step_at(self, time: float) -> PlaybackStep | None:
-        """The step that is on at `time` [s]; between two steps, none."""
+        """The active step at `time` [s]; None between steps."""
         return next((step for step in reversed(self.steps) if step.start <= time <= step.end), None)
 
     @cached_property
     def stance(self) -> Array:
-        """(T, n) where the joints are drawn: as measured, without a measurement as they were last, before the first one
-        as they are then, and at zero where there is none at all."""
+        """(T, n) drawn joint positions: as measured, gaps filled with the previous or else the first measurement, 0
+        without any."""
         return filled(self.position)
 
     def poses(self) -> Poses:
-        """Where the frames of `draw(robot, scene)` are at every time."""
+        """Poses of the frames of `draw(robot, scene)` at every time."""
         return Placing(self.robot, self.scene).at(self.stance, self.body_position, self.body_quat_xyzw)
 
     def reference_position(self) -> Array:
-        """(T, n) where the joints should be: what no controller moves stands as measured, mimic joints follow."""
+        """(T, n) reference positions; as measured for joints without a controller; mimic joints follow their leader."""
         assert self.robot is not None
         return with_mimics(self.robot, np.where(np.isnan(self.reference), self.stance, self.reference))
 
     def tool_path(self) -> Array:
-        """(T, 3) [m] the origin of the tool in the world; (0, 3) where the robot has none."""
+        """(T, 3) origin of the tool in the world [m]; (0, 3) for a robot without a tool."""
         if self.robot is None or self.robot.tool is None:
             return np.zeros((0, 3))
         return tool_poses(self.robot, self.stance)[0]
 
     def curves(self) -> tuple[PlotTable, ...]:
-        """Joints, reference and error, tool, contact forces at the times shown; columns without a number are left out.
+        """Joint states, references and errors, tool position and contact forces; columns without values are left out.
 
         The error of a joint without limits is the shorter rotation.
         """
@@ -177,7 +177,7 @@ class Playback:
         ):
             known = np.flatnonzero(~np.isnan(values).all(axis=0)).tolist()
             if known:
-                columns, of = (tuple(each[k] for k in known) for each in (self.joint_names, units))
+                columns, of = (tuple(names[k] for k in known) for names in (self.joint_names, units))
                 tables.append(PlotTable(title, columns, of, self.times, values[:, known]))
         if self.robot is not None and self.robot.tool is not None:
             path = tool_poses(self.robot, self.position)[0]
@@ -185,20 +185,25 @@ class Playback:
         return (*tables, *self._force_curves())
 
     def _force_curves(self) -> tuple[PlotTable, ...]:
-        """Normal force [N] of every pair that touches at some time; 0 while it does not."""
-        pairs = {pair: k for k, pair in enumerate(sorted({(one.a, one.b) for each in self.contacts for one in each}))}
+        """Normal force [N] of every pair in contact at some time; 0 without contact."""
+        pairs = {
+            pair: k
+            for k, pair in enumerate(
+                sorted({(contact.a, contact.b) for contacts in self.contacts for contact in contacts})
+            )
+        }
         if not pairs:
             return ()
         values = np.zeros((len(self.times), len(pairs)))
-        for k, each in enumerate(self.contacts):
-            for one in each:
-                values[k, pairs[one.a, one.b]] = one.force
+        for k, contacts in enumerate(self.contacts):
+            for contact in contacts:
+                values[k, pairs[contact.a, contact.b]] = contact.force
         columns = tuple(f"{a.removeprefix('robot/')} – {b.removeprefix('robot/')}" for a, b in pairs)
         return (PlotTable("contact force", columns, ("N",) * len(pairs), self.times, values),)
 
 
 def filled(values: Array) -> Array:
-    """(T, c) without NaN: each is the value before it, before the first one that, and 0 where there is none at all."""
+    """(T, c) with NaN replaced by the previous value, else by the first value, else by 0."""
     known = ~np.isnan(values)
     if known.all():
         return values

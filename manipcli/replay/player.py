@@ -1,7 +1,7 @@
-"""A run as a page that plays by itself: one file, no server, nothing fetched.
+"""HTML player of a run: one self-contained file that needs no server.
 
-`player_html` is a piece of a page, to be put into a larger one; `player_page` a page of its own. The browser gets the
-triangles once and the joints at every time, and does the kinematics itself.
+`player_html` is an element of a larger page, `player_page` a whole page. The browser gets the triangles once and the
+joint positions at every time, and computes the kinematics itself.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from manipcli.scene.scene import Scene
 
 Json = dict[str, object]
 Reference = tuple[str, int, int]
-"""Kind of number, offset [byte] and count of an array in the pack."""
+"""Number type, offset [byte] and count of an array in the pack."""
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
-"""What a page of its own may do: nothing but itself."""
+"""Content-Security-Policy of a whole page: it loads nothing."""
 LEVEL = 9
 _PAGE = files("manipcli.replay").joinpath("page")
 _LARGEST = float(np.finfo(np.float32).max)
@@ -39,7 +39,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 @dataclass(slots=True)
 class _Pack:
-    """Arrays behind each other, each at a multiple of four bytes."""
+    """Concatenated arrays, each aligned to four bytes."""
 
     parts: list[bytes] = field(default_factory=list)
     length: int = 0
@@ -47,7 +47,7 @@ class _Pack:
     def add(self, values: npt.ArrayLike, kind: str) -> Reference:
         """`kind`: f float32, H uint16, I uint32, b int8."""
         if kind == "f":
-            # What is larger than the browser's numbers is as large as they get.
+            # Values beyond float32 are clipped.
             values = np.clip(values, -_LARGEST, _LARGEST)
         array = np.ascontiguousarray(values, dtype={"f": "<f4", "H": "<u2", "I": "<u4", "b": "i1"}[kind])
         data = array.tobytes()
@@ -62,14 +62,14 @@ class _Pack:
 
 
 def player_html(playback: Playback, *, whole_page: bool = False) -> str:
-    """A run as an HTML element with its own style and script; several may stand in one page.
+    """A run as an HTML element with its own style and script; a page can hold several.
 
     Args:
         playback: the run.
-        whole_page: the element has the page to itself: it takes the keys, too.
+        whole_page: the element is alone on its page and takes the keyboard.
     """
     head, data = _contents(playback)
-    script = "".join(map(_read, sorted(one.name for one in _PAGE.iterdir() if one.name.endswith(".js"))))
+    script = "".join(map(_read, sorted(file.name for file in _PAGE.iterdir() if file.name.endswith(".js"))))
     return (
         f'<div class="mc-player"{" data-page=1" if whole_page else ""}>\n'
         f"<style>\n{_read('player.css')}</style>\n"
@@ -81,24 +81,24 @@ def player_html(playback: Playback, *, whole_page: bool = False) -> str:
 
 
 def player_page(playback: Playback) -> str:
-    """A whole page: what was run and how it went, and the run."""
+    """A whole page: task, verdict, notes and player."""
     verdict = playback.verdict
     name = html.escape(playback.name)
-    said = []
+    lines = []
     if verdict is not None:
         good = verdict.verdict == "passed"
         word = f"{'✓' if good else '✗'} {verdict.verdict}"
-        said.append(f'<p><b class="{"good" if good else "bad"}">{word}</b> {html.escape(verdict.text)}</p>')
+        lines.append(f'<p><b class="{"good" if good else "bad"}">{word}</b> {html.escape(verdict.text)}</p>')
     if playback.lost is not None:
-        said.append(f'<p class="bad">The log is not closed: {html.escape(playback.lost)}</p>')
-    said += [f'<p class="note">{html.escape(note)}</p>' for note in playback.notes]
+        lines.append(f'<p class="bad">The log is incomplete: {html.escape(playback.lost)}</p>')
+    lines += [f'<p class="note">{html.escape(note)}</p>' for note in playback.notes]
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{name}</title><link rel="icon" href="data:,">\n'
         f"<style>\n{_read('whole_page.css')}"
-        f"</style></head><body>\n<header><h1>{name}</h1>{''.join(said)}</header>\n"
+        f"</style></head><body>\n<header><h1>{name}</h1>{''.join(lines)}</header>\n"
         f"{player_html(playback, whole_page=True)}</body></html>\n"
     )
 
@@ -108,7 +108,7 @@ def _read(name: str) -> str:
 
 
 def _contents(playback: Playback) -> tuple[str, str]:
-    """What the script reads: the head as JSON that cannot end its element, and the arrays."""
+    """Input of the script: the head as JSON that is safe in a script element, and the packed arrays."""
     pack = _Pack()
     drawing = draw(playback.robot, playback.scene)
     poses = playback.poses()
@@ -140,18 +140,18 @@ def _contents(playback: Playback) -> tuple[str, str]:
         "path": pack.add(path, "f") if len(path) > 1 else None,
         "pushes": _pushes(playback, poses, pack),
         "curves": [
-            {"name": one.name, "columns": one.columns, "units": one.units, "values": pack.add(one.values, "f")}
-            for one in playback.curves()
+            {"name": table.name, "columns": table.columns, "units": table.units, "values": pack.add(table.values, "f")}
+            for table in playback.curves()
         ],
     }
     text = json.dumps(head, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    # In JSON these three stand in strings only; a name must not end the script element.
+    # These three occur only in JSON strings; a name must not end the script element.
     safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     return safe, pack.text()
 
 
 def _frames(drawing: Drawing, robot: RobotModel | None, scene: Scene | None) -> tuple[list[Json], list[int]]:
-    """How each frame of a drawing moves, and an order in which each comes after the one that it hangs on."""
+    """How each frame of a drawing moves, and an order with each frame after its parent."""
     index = {name: k for k, name in enumerate(drawing.frames)}
     found: list[Json] = [{"p": (0.0, 0.0, 0.0), "q": (0.0, 0.0, 0.0, 1.0)}]
     order = [0]
@@ -183,7 +183,7 @@ def _pose(X: Transform) -> Json:
 
 
 def _axes(drawing: Drawing, index: dict[str, int], floors: frozenset[str]) -> list[Json]:
-    """What is shown as three axes with a name: every frame but the world, and the marks."""
+    """Frames shown as named axes: every frame except the world, and the marks."""
     shown: list[Json] = [
         {"name": frame.removeprefix("robot/"), "frame": index[frame]}
         for frame in drawing.frames
@@ -195,24 +195,24 @@ def _axes(drawing: Drawing, index: dict[str, int], floors: frozenset[str]) -> li
 def _drawables(
     drawing: Drawing, index: dict[str, int], floors: frozenset[str], pack: _Pack
 ) -> tuple[list[Json], list[Json]]:
-    """Surfaces, each once however often it is drawn, and what is drawn."""
+    """Distinct surfaces, and the drawables that use them."""
     surfaces: list[Json] = []
     known: dict[bytes, int] = {}
     drawables: list[Json] = []
-    for one in drawing.layer("visual"):
-        if one.frame in floors or not len(one.surface.faces):
+    for shape in drawing.layer("visual"):
+        if shape.frame in floors or not len(shape.surface.faces):
             continue
-        key = one.surface.vertices.tobytes() + one.surface.faces.tobytes()
+        key = shape.surface.vertices.tobytes() + shape.surface.faces.tobytes()
         if key not in known:
             known[key] = len(surfaces)
-            surfaces.append(_surface(one.surface, pack))
-        drawable: Json = {"surface": known[key], "frame": index[one.frame], "rgba": [round(c, 4) for c in one.rgba]}
-        drawables.append(drawable | ({"robot": True} if one.frame.startswith("robot/") else {}))
+            surfaces.append(_surface(shape.surface, pack))
+        drawable: Json = {"surface": known[key], "frame": index[shape.frame], "rgba": [round(c, 4) for c in shape.rgba]}
+        drawables.append(drawable | ({"robot": True} if shape.frame.startswith("robot/") else {}))
     return surfaces, drawables
 
 
 def _surface(surface: Surface, pack: _Pack) -> Json:
-    """Vertices to a 65535th of their box (5 um of a link 0.3 m long), normals to a 127th, four numbers a row."""
+    """Vertices as 1/65535 of their box (5 um for a link of 0.3 m), normals as 1/127, four numbers per row."""
     low = surface.vertices.min(axis=0)
     size = np.maximum(np.ptp(surface.vertices, axis=0), 1e-9)
     count = len(surface.vertices)
@@ -230,15 +230,15 @@ def _surface(surface: Surface, pack: _Pack) -> Json:
 
 
 def _pushes(playback: Playback, poses: Poses, pack: _Pack) -> Json | None:
-    """Rows of point, direction, force, and for each time the first of its rows."""
+    """Rows of point, direction and force, and the first row of each time."""
     forces = Forces(playback, poses)
     if not forces.scale:
         return None
-    each = [forces.at(k) for k in range(len(playback.times))]
-    rows = [[*push.point, *push.direction, push.force] for pushes in each for push in pushes]
+    pushes_at = [forces.at(k) for k in range(len(playback.times))]
+    rows = [[*push.point, *push.direction, push.force] for pushes in pushes_at for push in pushes]
     return {
-        "first": pack.add(np.cumsum([0, *map(len, each)]), "I"),
-        # To a millionth, and no -0: the rest is not the same in every process.
+        "first": pack.add(np.cumsum([0, *map(len, pushes_at)]), "I"),
+        # Rounded to 1e-6 without -0: further digits differ between processes.
         "rows": pack.add(np.round(np.array(rows).reshape(-1, 7), 6) + 0.0, "f"),
         "scale": forces.scale,
         "longest": LONGEST,

@@ -1,7 +1,6 @@
-"""Pictures of robots and scenes with Bullet's TinyRenderer: no window, no GPU, the same bytes every time.
+"""Pictures of robots and scenes with Bullet's TinyRenderer: no window, no GPU, reproducible bytes.
 
-from manipcli.simulate.rasterizer import Light, Rasterizer, View
-Bullet draws our surfaces (it reads no file) at twice the size; the average of four pixels smooths the edges.
+Bullet renders at twice the size, and the average of four pixels smooths the edges.
 """
 
 from __future__ import annotations
@@ -29,23 +28,23 @@ Image = npt.NDArray[np.uint8]
 """(height, width, 3) red, green, blue; row 0 is the top."""
 
 SKY = ((203, 213, 224), (246, 248, 250))
-"""Colours behind everything, at the top and at the bottom."""
+"""Background colours at the top and at the bottom."""
 SIZE = (960, 720)
-"""Of a picture [pixel]."""
+"""Default size of a picture [pixel]."""
 FINER = 2
-"""Rendered this many times larger."""
+"""Factor of supersampling."""
 MAX_VERTICES = 60_000
-"""Of one surface in Bullet, whose commands hold some more than twice as many."""
+"""Most vertices of one surface in Bullet; its commands hold a little more than twice as many."""
 
 
 TO_LIGHT = (0.35, 0.55, 1.0)
-"""Towards the light in the world."""
+"""Direction towards the light in the world."""
 AMBIENT, DIFFUSE, SPECULAR = 0.62, 0.42, 0.08
-"""How bright is what does not face the light, what faces it, and what mirrors it."""
+"""Ambient, diffuse and specular brightness."""
 
 
 def sky(height: int) -> Image:
-    """(height, 1, 3) the background of every picture and view."""
+    """(height, 1, 3) background of all pictures and views."""
     part = np.linspace(0.0, 1.0, height)[:, None, None]
     image: Image = ((1.0 - part) * np.array(SKY[0]) + part * np.array(SKY[1])).round().astype(np.uint8)
     return image
@@ -70,20 +69,20 @@ def webp_bytes(image: Image, *, quality: int) -> bytes:
 
 
 class Renderer:
-    """A drawing in Bullet clients that only draw. A context manager: the clients end with it.
+    """Renders a drawing in Bullet clients. A context manager that ends the clients.
 
     Args:
-        drawing: what there is.
+        drawing: the drawing.
         size: width and height of the pictures [pixel].
-        still: frames that stand where they are in all pictures of one camera: they are drawn once, and of each
-            picture only the part that the others may cover.
+        still: frames that do not move between pictures of one camera; they are rendered once, and further pictures
+            only where the other frames can be.
     """
 
     def __init__(self, drawing: Drawing, *, size: tuple[int, int] = SIZE, still: frozenset[str] = frozenset()) -> None:
         self._size = size
-        shown = [one for one in drawing.layer("visual") if one.rgba[3] > 0.0]
-        self._still = _Client(drawing, [one for one in shown if one.frame in still])
-        self._moving = _Client(drawing, [one for one in shown if one.frame not in still])
+        shown = [drawable for drawable in drawing.layer("visual") if drawable.rgba[3] > 0.0]
+        self._still = _Client(drawing, [drawable for drawable in shown if drawable.frame in still])
+        self._moving = _Client(drawing, [drawable for drawable in shown if drawable.frame not in still])
         self._before: tuple[Camera, _Raster, Image] | None = None
 
     def __enter__(self) -> Self:
@@ -94,7 +93,7 @@ class Renderer:
         self._moving.close()
 
     def picture(self, poses: Poses, camera: Camera) -> Image:
-        """What the camera sees at one instant, with the sky behind."""
+        """The picture of one state, with the background."""
         whole = Window(0, 0, FINER * self._size[0], FINER * self._size[1])
         if self._before is None or self._before[0] != camera:
             raster = self._still.render(poses, camera, whole, whole)
@@ -115,7 +114,7 @@ class Renderer:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of a picture [pixel]; `right` and `bottom` are the first column and row beyond it."""
+    """Part of a picture [pixel]; `right` and `bottom` are exclusive."""
 
     left: int
     top: int
@@ -128,13 +127,13 @@ class Window:
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def divided(self, by: int) -> Window:
-        """The same in pixels that are larger."""
+        """The window in pixels that are `by` times larger."""
         return Window(self.left // by, self.top // by, self.right // by, self.bottom // by)
 
 
 @dataclass(frozen=True, slots=True)
 class _Raster:
-    """Colours (h, w, 3), and depth (h, w) as the graphics library counts it, infinite where nothing is."""
+    """Colours (h, w, 3) and depth buffer (h, w), infinite where nothing is drawn."""
 
     rgb: Image
     depth: npt.NDArray[np.float32]
@@ -146,25 +145,33 @@ class _Client:
     def __init__(self, drawing: Drawing, drawables: Sequence[Drawable]) -> None:
         frames = {name: k for k, name in enumerate(drawing.frames)}
         self._raster = Rasterizer()
-        self._bodies = [(self._add(part, one), frames[one.frame]) for one in drawables for part in _parts(one.surface)]
-        self._corners = [(frames[one.frame], one.surface.corners) for one in drawables if len(one.surface.vertices)]
+        self._bodies = [
+            (self._add(part, drawable), frames[drawable.frame])
+            for drawable in drawables
+            for part in _parts(drawable.surface)
+        ]
+        self._corners = [
+            (frames[drawable.frame], drawable.surface.corners)
+            for drawable in drawables
+            if len(drawable.surface.vertices)
+        ]
 
     def close(self) -> None:
-        """Ends the client."""
+        """End the client."""
         self._raster.close()
 
     def _add(self, part: Surface, drawable: Drawable) -> int:
         return self._raster.add(part.vertices, part.faces, part.normals, drawable.rgba)
 
     def window(self, poses: Poses, camera: Camera, whole: Window) -> Window | None:
-        """The part of a picture that the drawables may cover; None where they are outside of it."""
+        """The part of a picture that the drawables can cover; None if they are outside it."""
         if not self._corners:
             return None
         points = np.concatenate([poses.X_WF(k).apply(corners) for k, corners in self._corners])
         x, y, depth = camera.project(points, (whole.right, whole.bottom))
         if depth.min() <= camera.near:
             return whole
-        # A corner that is cut in half is none of the neighbour's: one large pixel around.
+        # One large pixel of margin, since a corner can be in half a pixel.
         left, right = int(x.min()) // FINER - 1, int(x.max()) // FINER + 2
         top, bottom = int(y.min()) // FINER - 1, int(y.max()) // FINER + 2
         found = Window(
@@ -176,7 +183,7 @@ class _Client:
         return found if found.left < found.right and found.top < found.bottom else None
 
     def render(self, poses: Poses, camera: Camera, whole: Window, part: Window) -> _Raster:
-        """A part of the whole picture."""
+        """The raster of a part of the picture."""
         for body, k in self._bodies:
             self._raster.place(body, poses.position[k], poses.quat_xyzw[k])
         up = camera.near * math.tan(math.radians(camera.field) / 2.0)
@@ -201,7 +208,7 @@ class _Client:
 
 
 def _averaged(fine: Image) -> Image:
-    """FINER by FINER pixels to one."""
+    """The average of each FINER by FINER pixels."""
     total = np.zeros((fine.shape[0] // FINER, fine.shape[1] // FINER, 3), dtype=np.uint16)
     for row in range(FINER):
         for column in range(FINER):
@@ -211,7 +218,7 @@ def _averaged(fine: Image) -> Image:
 
 
 def _parts(whole: Surface) -> list[Surface]:
-    """A surface in pieces that fit into one command of Bullet."""
+    """A surface in pieces that fit into one Bullet command."""
     if len(whole.vertices) <= MAX_VERTICES:
         return [whole]
     parts = []
@@ -222,10 +229,10 @@ def _parts(whole: Surface) -> list[Surface]:
 
 
 def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
-    """Writes a picture of a robot at `home`, or else at zero, as a PNG file.
+    """Write a PNG picture of a robot at `home`, or at zero if it has no `home`.
 
     Returns:
-        What could not be drawn, one line each.
+        Parts that cannot be drawn, one line each.
     """
     drawing, poses = draw(robot), Placing(robot).start(configuration(robot))
     with Renderer(drawing) as renderer:

@@ -1,4 +1,4 @@
-"""A recording at the rate of a screen, in one pass over its spans."""
+"""Sampling of a recording at a display rate, in one pass over its spans."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def sampled(recording: Recording, *, rate: float) -> tuple[Span, tuple[tuple[Con
     """The ticks nearest to multiples of 1 / rate, and the last one; one span in memory at a time.
 
     Args:
-        recording: any.
-        rate: [Hz]; beyond that of the recording every tick is taken.
+        recording: the recording.
+        rate: sampling rate [Hz]; above the rate of the recording, every tick is taken.
 
     Returns:
-        The ticks as one span without contacts, and for each what touched since the one before, with the largest force
-        of each pair; None where the recording has no tick.
+        The ticks as one span without contacts, and for each tick the contacts since the previous one with the largest
+        force of each pair; None for a recording without ticks.
     """
     chosen: list[Span] = []
     gathered = _Contacts()
@@ -30,7 +30,7 @@ def sampled(recording: Recording, *, rate: float) -> tuple[Span, tuple[tuple[Con
         times = span.states.time
         if not len(times):
             continue
-        # Number of the last multiple that a tick is the nearest to, or past: a tick is taken where it grows.
+        # Index of the last multiple that a tick is nearest to, or past; a tick is taken if it grows.
         number = np.floor((times + recording.period / 2.0) * rate + 1e-9)
         ticks = np.flatnonzero(np.diff(number, prepend=before))
         before = float(number[-1])
@@ -54,7 +54,7 @@ def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:
 
 
 class _Contacts:
-    """What touched since the time before, for each of a growing number of times."""
+    """Contacts since the previous time, for a growing number of times."""
 
     def __init__(self) -> None:
         self._now: tuple[Contact, ...] = ()
@@ -64,16 +64,16 @@ class _Contacts:
     def add(self, snapshots: Iterable[ContactSnapshot], times: Array) -> None:
         self._waiting += snapshots
         for time in times.tolist():
-            strongest = {(one.a, one.b): one for one in self._now}
+            strongest = {(contact.a, contact.b): contact for contact in self._now}
             taken = 0
             for snapshot in self._waiting:
                 if snapshot.time > time:
                     break
                 taken += 1
                 self._now = snapshot.contacts
-                for one in snapshot.contacts:
-                    known = strongest.get((one.a, one.b))
-                    if known is None or one.force >= known.force:
-                        strongest[one.a, one.b] = one
+                for contact in snapshot.contacts:
+                    known = strongest.get((contact.a, contact.b))
+                    if known is None or contact.force >= known.force:
+                        strongest[contact.a, contact.b] = contact
             del self._waiting[:taken]
             self.found.append(tuple(strongest[pair] for pair in sorted(strongest)))

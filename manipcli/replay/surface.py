@@ -1,4 +1,4 @@
-"""Triangles with one colour: all that a viewer or renderer has to know about a shape."""
+"""Triangle surfaces with one colour, the input of viewers and renderers."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from manipcli.shapes.primitives import Box, Cylinder, Rgba, Sphere
 Faces = npt.NDArray[np.int32]
 
 SEGMENTS = 48
-"""Around a cylinder or a sphere: no corner is seen at the size of a screen."""
+"""Segments around a cylinder or a sphere."""
 CREASE = math.radians(35.0)
-"""Two triangles that meet at more than this [rad] have an edge between them; below it they are one round surface."""
+"""Angle between triangles [rad] above which their edge is sharp; below it they are shaded as one round surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,9 +24,9 @@ class Surface:
     """Triangles in a frame of their own.
 
     Attributes:
-        vertices: (v, 3) [m]; triangles that share one are shaded as one round surface.
+        vertices: (v, 3) [m]; triangles that share a vertex are shaded as one round surface.
         faces: (f, 3) indices of vertices, counter-clockwise seen from outside.
-        rgba: 0 to 1, or None where nothing says a colour.
+        rgba: colour, 0 to 1; None without a colour.
     """
 
     vertices: Array
@@ -34,12 +34,12 @@ class Surface:
     rgba: Rgba | None = None
 
     def moved(self, X: Transform) -> Surface:
-        """The same in the frame that X leads to."""
+        """The surface transformed by X."""
         return replace(self, vertices=frozen(X.apply(self.vertices)))
 
     @property
     def normals(self) -> Array:
-        """(v, 3) unit, outwards: the mean over the triangles of a vertex, weighted by their areas."""
+        """(v, 3) outward unit normals: the mean over the triangles of a vertex, weighted by area."""
         a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
         weighted = np.cross(b - a, c - a)
         found = np.zeros_like(self.vertices)
@@ -50,13 +50,13 @@ class Surface:
 
     @property
     def corners(self) -> Array:
-        """(8, 3) of the box around it, which is not empty."""
+        """(8, 3) corners of its bounding box [m]; the surface must not be empty."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         found: Array = np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
         return found
 
     def scaled(self, scale: tuple[float, float, float]) -> Surface:
-        """Scaled along each axis; a mirrored surface is turned so that its outside stays outside."""
+        """Scaled along each axis; faces of a mirrored surface are flipped to keep their outside."""
         faces = self.faces if math.prod(scale) >= 0.0 else self.faces[:, ::-1]
         return replace(self, vertices=frozen(self.vertices * np.asarray(scale)), faces=_indices(faces))
 
@@ -68,12 +68,12 @@ def _indices(faces: npt.ArrayLike) -> Faces:
 
 
 def surface(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = None) -> Surface:
-    """A surface from anything like arrays; vertices stay shared as they are."""
+    """A surface from array-likes; shared vertices stay shared."""
     return Surface(frozen(np.reshape(vertices, (-1, 3))), _indices(np.reshape(faces, (-1, 3))), rgba)
 
 
 def box_surface(box: Box) -> Surface:
-    """Twelve triangles; the sides share no vertex."""
+    """A box of twelve triangles; its sides share no vertices."""
     corners = np.array([[k >> 2 & 1, k >> 1 & 1, k & 1] for k in range(8)]) - 0.5
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = [face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))]
@@ -81,19 +81,19 @@ def box_surface(box: Box) -> Surface:
 
 
 def sphere_surface(sphere: Sphere) -> Surface:
-    """Circles of latitude between two poles."""
+    """A sphere of circles of latitude between two poles."""
     polar = np.linspace(0.0, math.pi, SEGMENTS // 2 + 1)
     return _revolved(sphere.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1))
 
 
 def cylinder_surface(cylinder: Cylinder) -> Surface:
-    """A round side and two flat ends, with vertices of their own so that the rims stay sharp."""
+    """A cylinder; side and ends have separate vertices, so that the rims stay sharp."""
     radius, half = cylinder.radius, cylinder.length / 2.0
     return _revolved(np.array([(0.0, half), (radius, half), (radius, -half), (0.0, -half)]))
 
 
 def _revolved(profile: Array) -> Surface:
-    """The surface that a line of points (radius, z), from top to bottom, makes around the z axis."""
+    """The surface of revolution of points (radius, z), from top to bottom, around the z axis."""
     around = np.arange(SEGMENTS) * 2.0 * math.pi / SEGMENTS
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
     rings = [np.column_stack([radius * circle, np.full(SEGMENTS, z)]) for radius, z in profile]
@@ -107,10 +107,10 @@ def _revolved(profile: Array) -> Surface:
 
 
 def smoothed(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = None) -> Surface:
-    """A surface whose triangles share a vertex exactly where no crease runs between them.
+    """A surface whose triangles share vertices except across creases.
 
-    Mesh files share all vertices, or none (STL); shaded as they are, edges look melted or round parts faceted. Corners
-    of triangles at one point are joined across each edge between them that is no crease.
+    Mesh files share all vertices, or none (STL), so that edges look rounded or round parts look faceted. This function
+    joins the corners of triangles at one point across each edge that is not a crease.
 
     Args:
         vertices: (v, 3) [m].
@@ -124,7 +124,7 @@ def smoothed(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = 
     corners = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
     if not len(corners):
         return surface(np.zeros((0, 3)), np.zeros((0, 3)), rgba)
-    # One index a place: points closer than a millionth of the size are the same.
+    # One index per place: points closer than a millionth of the size are equal.
     grain = max(float(np.ptp(points, axis=0).max()), 1e-12) * 1e-6
     _, place = np.unique(np.round(points / grain), axis=0, return_inverse=True)
     place = place.reshape(-1)[corners]
@@ -137,7 +137,7 @@ def smoothed(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = 
     if not count:
         return surface(np.zeros((0, 3)), np.zeros((0, 3)), rgba)
 
-    # Every edge twice, once for each of its triangles: (low place, high place, corner at low, corner at high).
+    # Every edge twice, once per triangle: (low place, high place, corner at low, corner at high).
     tail, head = place.reshape(-1), place[:, [1, 2, 0]].reshape(-1)
     at_tail, at_head = np.arange(3 * count), np.arange(3 * count).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
     turned = tail > head
@@ -145,10 +145,10 @@ def smoothed(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = 
     at_low, at_high = np.where(turned, at_head, at_tail), np.where(turned, at_tail, at_head)
     order = np.lexsort((high, low))
     same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
-    one, other = order[:-1][same], order[1:][same]
-    smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) > math.cos(CREASE)
-    one, other = one[smooth], other[smooth]
-    ends = np.concatenate([at_low[one], at_high[one]]), np.concatenate([at_low[other], at_high[other]])
+    first, second = order[:-1][same], order[1:][same]
+    smooth = np.einsum("ij,ij->i", normals[first // 3], normals[second // 3]) > math.cos(CREASE)
+    first, second = first[smooth], second[smooth]
+    ends = np.concatenate([at_low[first], at_high[first]]), np.concatenate([at_low[second], at_high[second]])
     graph = coo_matrix((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(3 * count, 3 * count))
     number, vertex = connected_components(graph, directed=False)
     placed = np.empty((number, 3))

@@ -24,87 +24,89 @@ if TYPE_CHECKING:
 ENDINGS = (".mp4", ".webp", ".gif")
 SIZE = (640, 360)
 MAX_FPS = 100.0
-"""Above, GIF and WebP have no delays, and the clock in the picture would stop."""
+"""Largest frame rate: GIF and WebP have no shorter delays."""
 MAX_FRAMES = 50_000
 QUALITY = 80
-"""Of WebP, 0 to 100."""
+"""Quality of WebP, 0 to 100."""
 RATE_FACTOR = "20"
-"""Of H.264: lower is better; 18 looks like the original, 23 is the usual."""
+"""H.264 constant rate factor: lower is better; 18 looks like the original, 23 is the default."""
 
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Video:
-    """The times [s] that are shown, at `fps` frames per second."""
+    """The times [s] of the frames, at `fps` frames per second."""
 
     times: tuple[float, ...]
     fps: float
 
     @classmethod
     def of(cls, playback: Playback, *, fps: float, speed: float = 1.0) -> Self:
-        """The whole run, `speed` seconds of it in one second of the video.
+        """The whole run, with `speed` seconds of the run per second of the video.
 
         Raises:
-            InvalidArgument: see `check_pace`; or there would be too many frames.
+            InvalidArgument: see `check_pace`; or too many frames.
         """
         check_pace(fps, speed)
         count = (playback.end - playback.start) * fps / speed
         if count > MAX_FRAMES:
-            message = f"the video would have {count:.0f} frames; the limit is {MAX_FRAMES}"
-            raise InvalidArgument("REPLAY014", message, hint="use fewer frames a second or a higher speed")
+            message = f"{count:.0f} frames exceed the limit of {MAX_FRAMES} for a video"
+            raise InvalidArgument("REPLAY014", message, hint="use fewer frames per second or a higher speed")
         frames = math.floor(count + 1e-6) + 1
         return cls(tuple(playback.start + k * speed / fps for k in range(frames)), fps)
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """Duration of the video [s]."""
         return len(self.times) / self.fps
 
     def delays(self, step: int = 1) -> list[int]:
-        """[ms] How long each frame is shown, in multiples of `step`; together as long as the video."""
+        """Display time of each frame [ms], in multiples of `step`; their sum is the duration of the video."""
         ends = np.round(np.arange(len(self.times) + 1) * 1000.0 / self.fps / step).astype(int) * step
         return [int(delay) for delay in np.diff(ends)]
 
 
 def check_pace(fps: float, speed: float) -> None:
-    """
+    """Check the frame rate and the speed of a video.
+
     Raises:
-        InvalidArgument: a number that makes no video.
+        InvalidArgument: a number is out of range.
     """
     if not (math.isfinite(fps) and 0.0 < fps <= MAX_FPS):
-        raise InvalidArgument("REPLAY014", f"{fps:g} frames a second are not in 0 to {MAX_FPS:g}")
+        raise InvalidArgument("REPLAY014", f"{fps:g} frames per second are outside 0 to {MAX_FPS:g}")
     if not (math.isfinite(speed) and speed > 0.0):
-        raise InvalidArgument("REPLAY014", f"a speed of {speed:g} makes no video")
+        raise InvalidArgument("REPLAY014", f"speed {speed:g} is not a positive number")
 
 
 def check_ending(path: Path) -> None:
-    """
+    """Check that a video of this file ending can be written.
+
     Raises:
-        InvalidArgument: no video has this file ending, or its extra is not installed.
+        InvalidArgument: unknown file ending, or its extra is not installed.
     """
     if path.suffix.lower() not in ENDINGS:
-        raise InvalidArgument("REPLAY015", f"'{path}': a video is one of {', '.join(ENDINGS)}")
+        raise InvalidArgument("REPLAY015", f"'{path}' is not a video: use {', '.join(ENDINGS)}")
     if path.suffix.lower() == ".mp4":
         try:
-            import av  # noqa: F401 (whether it is there)
+            import av  # noqa: F401 (whether it is installed)
         except ImportError as error:
-            hint = "pip install 'manipcli[video]', or write a .webp or .gif, which needs nothing"
+            hint = "run `pip install 'manipcli[video]'`, or write .webp or .gif, which need no extra"
             raise InvalidArgument("REPLAY016", f"'{path}': .mp4 needs the extra 'video'", hint=hint) from error
 
 
 def write_video(path: Path, frames: Frames, video: Video, *, progress: Progress | None = None) -> None:
-    """Draws every frame and writes the video; the file is replaced when it is complete.
+    """Draw every frame and write the video; the file is replaced when it is complete.
 
     Args:
-        path: its ending chooses the format.
-        frames: draws them.
-        video: which times.
-        progress: called with the number of frames that are drawn, and of all.
+        path: video file; its ending selects the format.
+        frames: pictures of the run.
+        video: times of the frames.
+        progress: called with the number of drawn frames and the number of all frames.
 
     Raises:
         InvalidArgument: see `check_ending`.
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     check_ending(path)
 
@@ -137,7 +139,7 @@ def _gif(path: Path, frames: Iterator[Image], video: Video, colours: Sequence[tu
     from PIL import Image as Images
 
     start = next(frames)
-    # One palette for all frames, or colours would flicker; no dithering, or what does not move would.
+    # One palette for all frames prevents flicker of colours; no dithering prevents flicker of still parts.
     palette = _palette(Images.fromarray(start), colours)
 
     def flat(frame: Image) -> PillowImage:
@@ -149,7 +151,7 @@ def _gif(path: Path, frames: Iterator[Image], video: Video, colours: Sequence[tu
 
 
 def _palette(first: PillowImage, colours: Sequence[tuple[float, float, float]]) -> PillowImage:
-    """The colours of the first frame, and those that may come into sight later, in light and in shade."""
+    """The colours of the first frame, and lit and shaded colours that can appear later."""
     from PIL import Image as Images
 
     later = [tuple(round(255 * shade * part) for part in rgb) for rgb in colours[:24] for shade in (0.65, 0.85, 1.0)]
@@ -167,7 +169,7 @@ def _mp4(path: Path, frames: Iterator[Image], fps: float) -> None:
     with av.open(str(path), "w", format="mp4") as container:
         stream = None
         for frame in frames:
-            # H.264 with colours at half the size wants even sides.
+            # H.264 with chroma subsampling needs even sizes.
             even = frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2]
             if stream is None:
                 stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))

@@ -1,1 +1,1 @@
-"""Verdicts, plans and findings, rendered for people and for programs. Nothing here prints."""
+"""Renderers of verdicts, plans, logs and findings as text, JSON, HTML, JUnit and SARIF. Nothing here prints."""

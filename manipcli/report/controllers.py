@@ -1,4 +1,4 @@
-"""The controllers of a task as a table or as JSON: who claims what."""
+"""Controllers of a task as a table or as JSON: type, rate, state at the start and claimed interfaces."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from manipcli.report.table import table
 from manipcli.task.controller_rows import ControllerRow
 
 MOST = 3
-"""So many joints of a controller are named in the table, and the last."""
+"""Most joints of a controller that the table names."""
 
 
 def render_text(rows: Sequence[ControllerRow]) -> str:
-    """A line a controller."""
+    """A table with one row per controller."""
     return table(
         ("controller", "type", "at the start", "rate", "claims"),
         [(row.name, row.type, row.state, f"{row.update_rate:g} Hz", _claims(row)) for row in rows],
@@ -22,7 +22,7 @@ def render_text(rows: Sequence[ControllerRow]) -> str:
 
 
 def render_json(task: str, rows: Sequence[ControllerRow]) -> str:
-    """`interfaces` are those that a controller claims while it is active, `claimed` those that it does at the start."""
+    """`interfaces`: what a controller claims while it is active; `claimed`: what it claims at the start."""
     controllers = [
         {
             **picked(row, "name type state joints"),
@@ -43,4 +43,4 @@ def _claims(row: ControllerRow) -> str:
         names[MOST:-1] = ["..."]
         names[-1] += f" ({len(row.joints)} joints)"
     text = f"{', '.join(row.interfaces)} of {', '.join(names)}"
-    return text if row.active else f"once active: {text}"
+    return text if row.active else f"when active: {text}"

@@ -1,4 +1,4 @@
-"""A description that was examined: its findings, then what it consists of. As text, and as one JSON object."""
+"""Result of `check-urdf`: findings and a summary of the description, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def render_text(
     left_out: Sequence[tuple[str, int]] = (),
     tree: Sequence[str] = (),
 ) -> str:
-    """Findings, the summary, the tree where it is asked for, and the verdict in the last line."""
+    """Findings, summary, link tree if given, and the verdict in the last line."""
     lines = [*map(describe, findings)]
     lines += [f"... and {number} more of {code}" for code, number in left_out]
     if lines:
@@ -44,7 +44,7 @@ def render_text(
 
 
 def render_explanation(check: Check) -> str:
-    """What a code means, why it matters, and a description that has the defect."""
+    """What a code means, why it matters, and an example description with the defect."""
     return "\n".join(
         [
             f"{check.code} {check.name} ({check.tier}, {check.severity})",
@@ -59,13 +59,13 @@ def render_explanation(check: Check) -> str:
 
 
 def _lines(xml: str) -> list[str]:
-    """One element a line, as far as they begin on the top levels; a long example is cut."""
+    """One line per element of the top levels; a long example is shortened."""
     lines = _TOP.sub(">\n<", xml).splitlines()
     return [shorten(line, width=110) for line in lines[:20]] + (["..."] if len(lines) > 20 else [])
 
 
 def render_checks(checks: Iterable[Check]) -> str:
-    """The table of checks, one a line, with the reason of each."""
+    """A table of the checks, one per line, with the reason of each."""
     rows = [
         (check.code, check.name, check.tier, check.severity, check.summary, " ".join(check.reason.split()))
         for check in checks
@@ -102,7 +102,7 @@ def _summary(summary: Summary) -> list[str]:
 
 def _group(group: GuessedGroup) -> str:
     where = f"{group.base} -> {group.tip}" if group.tip else f"at {group.base}"
-    own = listed(group.joints, most=8) or "no joint of its own"
+    own = listed(group.joints, most=8) or "no joints"
     follow = f"; follow: {listed(group.mimics, most=8)}" if group.mimics else ""
     return f"{group.kind} of {len(group.joints)}, {where}: {own}{follow}"
 
@@ -116,7 +116,7 @@ def render_json(
     left_out: Sequence[tuple[str, int]] = (),
     tree: Sequence[str] = (),
 ) -> str:
-    """The object of `check`, with `summary` (null where the file could not be expanded), `left_out` and `tree`."""
+    """The JSON object of `check` with `summary` (null if the file cannot be expanded), `left_out` and `tree`."""
     return dumps(
         {
             "verdict": "passed" if passed else "failed",

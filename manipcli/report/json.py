@@ -1,7 +1,7 @@
-"""The machine's view: one JSON object a command, with names that are documented and kept.
+"""JSON output of the commands: one object per command, with documented and stable keys.
 
-`run` and `judge` give the same object; what only a run knows (`wall_time`, `real_time_factor`, `timing`) is null for
-`judge`. An error gives the same object too, with `errors` filled. Numbers are SI; what is not a finite number is null.
+`run` and `judge` give the same object; keys that only a run has (`wall_time`, `real_time_factor`, `timing`) are null
+for `judge`. An error gives the same object with `errors` filled. Numbers are SI; a number that is not finite is null.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ Json = None | bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"]
 
 
 def render_run(report: RunReport) -> str:
-    """A run: its verdict, its log and its times."""
+    """The JSON object of a run: verdict, log and wall times."""
     errors = (*report.verdict.errors, *report.warnings)
     return dumps(_object(report.verdict, errors, **picked(report, "wall_time real_time_factor log timing")))
 
 
 def render_verdict(verdict: Verdict, log: str | None = None) -> str:
-    """A log, judged; without one, a task that cannot be planned."""
+    """The JSON object of a judged log; `log` is None for a task that cannot be planned."""
     return dumps(_object(verdict, verdict.errors, log=log))
 
 
 def render_errors(
     findings: Sequence[Diagnostic], verdict: VerdictWord = "error", *, known: Mapping[str, Json] | None = None
 ) -> str:
-    """A command that ended before there was anything to judge; `known`: what it knew of a run by then."""
+    """The JSON object of a command that ended without a verdict; `known` holds the keys of the run known by then."""
     return dumps({**_object(None, findings, verdict=verdict), **(known or {})})
 
 
 def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
-    """Checked files: `failed` where at least one finding is an error."""
+    """The JSON object of checked files; `failed` if at least one finding is an error."""
     failed = any(finding.severity == "error" for finding in findings)
     return dumps(
         {
@@ -50,12 +50,12 @@ def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str
 
 
 def dumps(value: Json) -> str:
-    """JSON text in ASCII: control characters and what a terminal might not know are escaped."""
+    """JSON text in ASCII; all other characters are escaped."""
     return json.dumps(value, indent=2, allow_nan=False)
 
 
 def plain(value: object) -> Json:
-    """A value as JSON: a dataclass by its fields, numbers as `number`."""
+    """A value as JSON: a dataclass as an object of its fields, numbers rounded by `number`."""
     if isinstance(value, Diagnostic):
         return finding_object(value)
     if isinstance(value, float):
@@ -63,20 +63,20 @@ def plain(value: object) -> Json:
     if value is None or isinstance(value, int | str):
         return value
     if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if is_dataclass(value):
         return picked(value, " ".join(field.name for field in fields(value)))
     assert isinstance(value, Sequence)
-    return [plain(one) for one in value]
+    return [plain(item) for item in value]
 
 
 def picked(value: object, keys: str) -> dict[str, Json]:
-    """The attributes of a value that are called as the JSON `keys`, which spaces separate."""
+    """The attributes of a value named by the JSON `keys`, a list separated by spaces."""
     return {key: plain(getattr(value, key)) for key in keys.split()}
 
 
 def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json) -> dict[str, Json]:
-    """The one object, its keys always there and in this order."""
+    """The object of `run` and `judge`, with all its keys in a fixed order."""
     empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
     found |= {"steps": [], "expectations": []}
@@ -84,14 +84,16 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
         found |= picked(judged, "task verdict text seed engine simulated_time")
         found["saturated"] = saturated_object(judged.cuts)
         found["steps"] = [step_object(step) for step in judged.steps]
-        found["expectations"] = [picked(one, "name outcome margin unit at text") for one in judged.expectations]
+        found["expectations"] = [
+            picked(expectation, "name outcome margin unit at text") for expectation in judged.expectations
+        ]
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
     return {**found, **known, "errors": plain(errors)}
 
 
 def saturated_object(cuts: Saturations) -> dict[str, Json]:
-    """Ticks by joint and by actuator, of those that were cut."""
+    """Number of saturated ticks of each saturated joint and actuator."""
     return {
         "joints": _counted(cuts.joints),
         "actuators": _counted(cuts.actuators),
@@ -119,5 +121,5 @@ def finding_object(finding: Diagnostic) -> dict[str, Json]:
 
 
 def number(value: float | None) -> float | None:
-    """Rounded to 1e-9, which drops the dust of binary fractions (4.2 instead of 4.200000000000001)."""
+    """Rounded to 1e-9, which removes rounding noise (4.2 instead of 4.200000000000001); None if not finite."""
     return round(float(value), 9) if value is not None and math.isfinite(value) else None

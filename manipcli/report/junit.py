@@ -1,8 +1,7 @@
-"""A verdict as JUnit XML, which continuous integration reads: a suite a task, a case a step and an expectation.
+"""A verdict as JUnit XML for continuous integration: one suite per task, one case per step and per expectation.
 
-There is no standard; what is written here is what the readers have in common (the schema of Jenkins' xUnit plugin), and
-`file` and `line` of a case, by which GitLab and actions of GitHub point at a line, and which that schema does not know.
-Times are simulated seconds.
+JUnit XML has no standard. This file follows the schema of Jenkins' xUnit plugin, plus `file` and `line` of a case, with
+which GitLab and GitHub actions link a line. Times are simulated seconds.
 """
 
 from __future__ import annotations
@@ -25,22 +24,22 @@ def render_junit(
 ) -> bytes:
     """The file of one run.
 
-    Besides steps and expectations there is the case `run`: it tells of what neither a step nor an expectation does, as
-    an interruption or an incomplete log. What could not be judged because something else failed before is skipped.
+    The additional case `run` reports what belongs to no step or expectation, such as an interruption or an incomplete
+    log. An expectation that was not evaluated because a step failed before is skipped.
 
     Args:
-        verdict: what is told.
-        steps, expectations: where each of the verdict's stands.
-        log: the name of the log.
-        file: of the task as CI knows it; "": as in the places.
+        verdict: the verdict.
+        steps, expectations: where each of the verdict's steps and expectations is written.
+        log: name of the log.
+        file: path of the task file in CI; "" keeps the files of `steps` and `expectations`.
     """
     cases = [_run(verdict)]
     cases += [
-        _step(verdict, one, _attributes(written, file)) for one, written in zip(verdict.steps, steps, strict=True)
+        _step(verdict, step, _attributes(written, file)) for step, written in zip(verdict.steps, steps, strict=True)
     ]
     cases += [
-        _expectation(verdict, one, _attributes(written, file))
-        for one, written in zip(verdict.expectations, expectations, strict=True)
+        _expectation(verdict, outcome, _attributes(written, file))
+        for outcome, written in zip(verdict.expectations, expectations, strict=True)
     ]
     counts = {
         "tests": len(cases),
@@ -52,9 +51,9 @@ def render_junit(
     suites = Element("testsuites", {"name": "manipcli", **totals})
     suite = SubElement(suites, "testsuite", {"name": safe(verdict.task), **totals, "skipped": skipped})
     properties = SubElement(suite, "properties")
-    seed = str(verdict.seed) if verdict.engine else ""  # without an engine the task could not be read
-    told = (("verdict", verdict.verdict), ("engine", verdict.engine), ("seed", seed), ("log", log))
-    for name, value in told:
+    seed = str(verdict.seed) if verdict.engine else ""  # no engine: the task file is invalid
+    values = (("verdict", verdict.verdict), ("engine", verdict.engine), ("seed", seed), ("log", log))
+    for name, value in values:
         if value:
             SubElement(properties, "property", {"name": name, "value": safe(value)})
     suite.extend(cases)
@@ -64,7 +63,7 @@ def render_junit(
 
 
 def _run(verdict: Verdict) -> Element:
-    """Whether the run came to its end."""
+    """The case `run`: whether the run finished."""
     place = verdict.errors[0].place if verdict.errors else None
     where = {"file": safe(place.file), "line": str(place.line)} if place is not None and place.line > 0 else {}
     case = _case(verdict, "run", "run", verdict.simulated_time, where)
@@ -80,30 +79,36 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
     took = 0.0 if step.started is None or step.ended is None else step.ended - step.started
     case = _case(verdict, "steps", step.id, took, attributes)
     if step.outcome == "not_run":
-        _add(case, "skipped", "not run: the run ended before", "", [])
+        _add(case, "skipped", "not run: the run ended before this step", "", [])
     elif step.tolerated:
-        SubElement(case, "system-out").text = safe(f"{step.outcome}, and the task says that it may: {step.text}")
+        SubElement(case, "system-out").text = safe(f"{step.outcome}, tolerated by the task: {step.text}")
     elif step.outcome != "done":
         when = "" if step.ended is None else f"at {step.ended:.3f} s"
         message = how_wrong(step) + (f": {step.text}" if step.text else "")
-        hints = [f"hint: {one.hint}" for one in verdict.errors if one.hint and verdict.verdict == "failed"]
+        hints = [f"hint: {finding.hint}" for finding in verdict.errors if finding.hint and verdict.verdict == "failed"]
         _add(case, "failure", message, step.outcome, [when, *hints])
     return case
 
 
-def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str, str]) -> Element:
-    case = _case(verdict, "expect", one.name, 0.0, attributes)
-    margin = "" if one.margin is None else f"margin {one.margin:+z.9g} {one.unit}".rstrip()
-    when = "" if one.at is None else f"at {one.at:.3f} s"
-    if one.outcome == "failed":
-        size = f" by {quantity(one.distance, one.unit)}" if one.distance else ""
-        _add(case, "failure", f"expectation '{one.name}' fails{size}: {one.text}", "failed", [margin, when])
-    elif one.outcome == "not_evaluated":
+def _expectation(verdict: Verdict, expectation: ExpectationOutcome, attributes: dict[str, str]) -> Element:
+    case = _case(verdict, "expect", expectation.name, 0.0, attributes)
+    margin = "" if expectation.margin is None else f"margin {expectation.margin:+z.9g} {expectation.unit}".rstrip()
+    when = "" if expectation.at is None else f"at {expectation.at:.3f} s"
+    if expectation.outcome == "failed":
+        size = f" by {quantity(expectation.distance, expectation.unit)}" if expectation.distance else ""
+        _add(
+            case,
+            "failure",
+            f"expectation '{expectation.name}' fails{size}: {expectation.text}",
+            "failed",
+            [margin, when],
+        )
+    elif expectation.outcome == "not_evaluated":
         excused = verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
-        message = f"expectation '{one.name}' was never evaluated: {one.text}"
+        message = f"expectation '{expectation.name}' was never evaluated: {expectation.text}"
         _add(case, "skipped" if excused else "failure", message, "not_evaluated", [])
     elif margin:
-        SubElement(case, "system-out").text = safe(", ".join(part for part in (margin, when, one.text) if part))
+        SubElement(case, "system-out").text = safe(", ".join(part for part in (margin, when, expectation.text) if part))
     return case
 
 
@@ -114,13 +119,13 @@ def _case(verdict: Verdict, kind: str, name: str, time: float, attributes: dict[
 
 def _add(case: Element, kind: str, message: str, type_: str, lines: Sequence[str]) -> None:
     words = {"message": safe(message)} | ({"type": type_} if kind != "skipped" else {})
-    told = SubElement(case, kind, words)
+    result = SubElement(case, kind, words)
     if kind != "skipped":
-        told.text = "\n".join(safe(line) for part in (message, *lines) for line in part.split("\n") if line)
+        result.text = "\n".join(safe(line) for part in (message, *lines) for line in part.split("\n") if line)
 
 
 def _attributes(written: Written, file: str) -> dict[str, str]:
-    """Where a reader should point: at the file as the user wrote it, where that is known."""
+    """`file` and `line` of a case: where the user wrote it, if known."""
     name, _, line = written.place.rpartition(":")
     if not line.isdecimal():
         return {}
@@ -132,5 +137,5 @@ def _seconds(time: float) -> str:
 
 
 def safe(text: str) -> str:
-    """Without the characters that XML has no way to write."""
+    """Text without the characters that XML 1.0 does not allow."""
     return _NO_XML.sub("\ufffd", escape(text))

@@ -1,4 +1,4 @@
-"""A plan, rendered: one row a motion with what limits it; and every point as CSV."""
+"""A plan as text, JSON or CSV: one row per motion with its nearest limit, or one row per trajectory point."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from manipcli.report.table import table
 
 
 class PlannedMotion(Protocol):
-    """What is shown of a motion; `trajectory` is None where only the hand closes."""
+    """The shown fields of a motion; `trajectory` is None for a motion of the hand alone."""
 
     @property
     def step_id(self) -> str: ...
@@ -34,7 +34,7 @@ class PlannedMotion(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Limiting:
-    """The joint that comes nearest to a limit in a motion, the quantity that does, and the fraction of it used."""
+    """The nearest limit of a motion: its joint, its quantity, and the used fraction of the limit."""
 
     joint: str
     quantity: str
@@ -42,10 +42,10 @@ class Limiting:
 
 
 def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
-    """What a motion comes nearest to: the greatest |v| / v_max, |a| / a_max or |da/dt| / j_max of all joints and times.
+    """The nearest limit of a motion: the largest |v| / v_max, |a| / a_max or |da/dt| / j_max of all joints and times.
 
-    A time-optimal motion at full speed uses all of one of them; at `velocity_scaling: 0.5` half. None where the
-    points carry none of these, or no limit is stated.
+    A time-optimal motion at full speed reaches a fraction of 1, one with `velocity_scaling: 0.5` about 0.5. None if the
+    points have no derivatives or the robot has no such limit.
     """
     used: list[Limiting] = []
     jerks = None
@@ -60,11 +60,11 @@ def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
         ):
             if values is not None and limit:
                 used.append(Limiting(name, quantity, float(np.abs(values[:, k]).max()) / limit))
-    return max(used, key=lambda one: one.fraction, default=None)
+    return max(used, key=lambda use: use.fraction, default=None)
 
 
 def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) -> str:
-    """One row a motion; a step's name stands at its first motion only."""
+    """A table with one row per motion; the step's name is shown at its first motion only."""
     rows = []
     previous = None
     for motion in motions:
@@ -87,7 +87,7 @@ def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) 
 
 
 def render_json(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) -> str:
-    """The same as one JSON object; durations in s, `used` as a fraction of the limit."""
+    """The plan as one JSON object; durations in s, `used` as a fraction of the limit."""
     return dumps(
         {
             "task": task,
@@ -100,9 +100,9 @@ def render_json(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) 
 
 
 def write_csv(motions: Sequence[PlannedMotion], stream: TextIO) -> None:
-    """Every point of every trajectory: one row a point, `time` [s] from the start of its motion, rad or m.
+    """Write one row per trajectory point: `time` [s] from the start of its motion, positions in rad or m.
 
-    The columns of a joint that a motion does not move are empty, as are velocities and accelerations not given.
+    Columns of joints that a motion does not move, and missing velocities and accelerations, are empty.
     """
     joints = list(dict.fromkeys(name for motion in motions if motion.trajectory for name in motion.trajectory.names))
     kinds = ("position", "velocity", "acceleration")

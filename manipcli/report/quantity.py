@@ -1,4 +1,4 @@
-"""Numbers as people read them: SI in, the customary unit out."""
+"""SI values as text in customary units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page about a run is made of. One value, made from a log alone, or from a task that was refused."""
+"""Content of the page of a run, from its log alone or from a refused task."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manipcli.replay.playback import Playback
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file that is shown with its lines. `name` is that of the file, `text` what stands in it."""
+    """A file shown with line numbers: its `name` and its `text`."""
 
     name: str
     text: str
@@ -21,11 +21,12 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """Where a step or an expectation stands.
+    """Where a step or an expectation is written.
 
     Attributes:
-        place: `pour.yaml:13`, as the user wrote it; "" where that is not known.
-        line: its line in the file that the page shows under `Source.name` `file`; 0 where it is in none.
+        place: file and line of the user, such as `pour.yaml:13`; "" if unknown.
+        file: name of the `Source` that contains it.
+        line: its line in that source, from 1; 0 if no source contains it.
     """
 
     place: str
@@ -35,7 +36,7 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A moment: `data` is a WebP file, `time` [s] of the run."""
+    """A picture of the run: `data` is a WebP file, `time` is in s from the start of the run."""
 
     time: float
     data: bytes
@@ -44,7 +45,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Why a run did not pass. `at` [s]: when it was worst; None where it has no time."""
+    """Why a run did not pass. `at` [s] is the time of the worst value; None if it has no time."""
 
     title: str
     text: str
@@ -55,25 +56,25 @@ class Cause:
 
 @dataclass(frozen=True)
 class RunPage:
-    """Everything that the page says.
+    """Content of the page.
 
     Attributes:
-        verdict: of the log.
-        log: its name, also where it cannot be read; "" where nothing was run.
-        lost: why its end is missing, or None.
-        causes: why it did not pass, the first cause first.
-        steps, expectations: where each stands, parallel to those of the verdict.
-        limits: of each expectation the most that its margin can be, in its unit; None where that is not stated.
-        facts: what was measured; None where nothing was run or the log cannot be read.
-        playback: what is replayed; None where nothing was run.
-        pictures: of steps, by id.
-        moment: what it looked like when the first cause was worst.
+        verdict: verdict on the log.
+        log: name of the log, even if it cannot be read; "" if nothing was run.
+        lost: why the end of the log is missing, or None.
+        causes: why the run did not pass, the first cause first.
+        steps, expectations: where each is written, parallel to those of the verdict.
+        limits: largest possible margin of each expectation, in its unit; None if unknown.
+        facts: measurements; None if nothing was run or the log cannot be read.
+        playback: replay of the run; None if nothing was run.
+        pictures: pictures of the steps, by step id.
+        moment: picture at the time of the first cause.
         sources: the resolved files.
-        provenance: name and value of what is known of the origin: versions, seed, engine, period.
-        hashes: SHA-256 of files, by name.
-        notes: what is missing or unlike it was in the run, a sentence each.
-        warnings: what was doubted before the run began; none where the page is made of a log that was there already.
-        index: where, from this page, the one is that leads to it and others; "" where there is none.
+        provenance: names and values of versions, seed, engine and control period.
+        hashes: file names and their SHA-256.
+        notes: what is missing or differs from the run, one sentence each.
+        warnings: warnings from before the run; empty for the page of an existing log.
+        index: relative URL of the index of all runs; "" if there is none.
     """
 
     verdict: Verdict
@@ -96,10 +97,10 @@ class RunPage:
 
     @property
     def located_steps(self) -> tuple[tuple[StepOutcome, Written], ...]:
-        """Each step and where it stands."""
+        """Each step and where it is written."""
         return tuple(zip(self.verdict.steps, self.steps, strict=True))
 
     @property
     def judged(self) -> tuple[tuple[ExpectationOutcome, Written, float | None], ...]:
-        """Each expectation, where it stands, and its limit."""
+        """Each expectation, where it is written, and its limit."""
         return tuple(zip(self.verdict.expectations, self.expectations, self.limits, strict=True))

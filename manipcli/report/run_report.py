@@ -1,4 +1,4 @@
-"""What one run gives its caller: the verdict on its log, and how long the run took."""
+"""Result of one run: the verdict on its log and the wall time of each stage."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manipcli.judge.verdict import INTERRUPTED, Verdict
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Wall time of each part of a run [s]."""
+    """Wall time of each stage of a run [s]."""
 
     load: float = 0.0
     plan: float = 0.0
@@ -30,11 +30,11 @@ class RunReport:
     """One run.
 
     Attributes:
-        verdict: read from the log alone.
+        verdict: verdict, judged from the log alone.
         timing: wall time of each stage.
-        log: path of the log, as text; None where nothing was run, or it was not kept.
-        warnings: what was doubted before the run began: about its files, and about gains.
-        meshes: files of the robot and of the scene by the URIs that the log has for them, to draw the run with.
+        log: path of the log; None if nothing was run or the log was not kept.
+        warnings: warnings from before the run, about its files and gains.
+        meshes: mesh files of robot and scene by their URI in the log, to draw the run.
     """
 
     verdict: Verdict
@@ -45,23 +45,23 @@ class RunReport:
 
     @property
     def wall_time(self) -> float:
-        """[s] of all stages."""
+        """Sum over all stages [s]."""
         return self.timing.total
 
     @property
     def real_time_factor(self) -> float | None:
-        """Simulated time over the wall time of the simulation; None where nothing was simulated."""
+        """Simulated time over the wall time of the simulation; None if nothing was simulated."""
         return self.verdict.simulated_time / self.timing.simulate if self.timing.simulate else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedRun(RunReport):
-    """A run, and what `manipcli test` says of it.
+    """A run with its test result.
 
     Attributes:
-        passed: whether all that was expected is met, and nothing is worse than the baseline.
-        text: what went wrong and what did not, and where log and picture are.
-        picture: path of the picture of what went wrong, as text; None where nothing did.
+        passed: whether all expectations are met and no margin is worse than the baseline.
+        text: causes, met expectations, and the paths of log and picture.
+        picture: path of the picture of the failure; None if the run passed.
     """
 
     passed: bool
@@ -70,16 +70,16 @@ class JudgedRun(RunReport):
 
     @staticmethod
     def of(run: RunReport, *, passed: bool, text: str, picture: str | None) -> JudgedRun:
-        told = {field.name: getattr(run, field.name) for field in fields(RunReport)}
-        return JudgedRun(**told, passed=passed, text=text, picture=picture)
+        values = {field.name: getattr(run, field.name) for field in fields(RunReport)}
+        return JudgedRun(**values, passed=passed, text=text, picture=picture)
 
     def __repr__(self) -> str:
-        """`<passed pour 'runs/pour.mcap'>`: what an assertion shows of it."""
+        """`<passed pour 'runs/pour.mcap'>`, as shown by a failed assertion."""
         return f"<{'passed' if self.passed else 'failed'} {self.verdict.task} {self.log!r}>"
 
 
 def exit_code(verdict: Verdict) -> ExitCode:
-    """What a command returns that ends with this verdict."""
+    """Exit code of a command that ends with this verdict."""
     if verdict.verdict == "passed":
         return ExitCode.PASSED
     if verdict.verdict == "failed":

@@ -1,4 +1,4 @@
-"""Findings as SARIF 2.1.0, the format in which code hosts show what a checker found beside the line."""
+"""Findings as SARIF 2.1.0, which code hosts show next to the line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def render(findings: Sequence[Diagnostic], checks: Iterable[Check]) -> str:
-    """One run of one tool: every check as a rule, every finding as a result."""
+    """One SARIF run: every check as a rule, every finding as a result."""
     rules = list(checks)
     index = {check.code: k for k, check in enumerate(rules)}
     driver: dict[str, Json] = {
@@ -57,7 +57,7 @@ def _result(finding: Diagnostic, index: dict[str, int]) -> Json:
 
 
 def _uri(file: str) -> str:
-    """Relative to the working folder as the finding says it, else absolute."""
+    """URI of a file: relative to the working folder if its path is, else absolute."""
     path = Path(file)
     if path.is_absolute():
         return path.as_uri()

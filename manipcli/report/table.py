@@ -1,4 +1,4 @@
-"""Rows of text in aligned columns."""
+"""Text tables with aligned columns."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from io import StringIO
 
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]], *, right: Sequence[str] = ()) -> str:
-    """Columns two spaces apart, as wide as their widest cell; those named in `right` are aligned to the right.
+    """Columns two spaces apart, as wide as their widest cell; those named in `right` are right-aligned.
 
-    Rich measures the cells (wide and combining characters count as a terminal shows them); it is told of a terminal
-    wide enough that no cell is ever cut, for a log file has no width.
+    Rich measures the cells, with the terminal width of wide and combining characters. Its console is wide enough that
+    it never truncates a cell.
     """
     from rich.cells import cell_len
     from rich.console import Console

@@ -1,6 +1,6 @@
-"""The reader's view: why it failed first, then the steps, the expectations with their margins, and where the log is.
+"""Text output of runs, verdicts and findings: causes first, then steps, expectations with margins, and the log.
 
-Plain text: every mark stands beside a word that says the same. Colour is for the console to add.
+Every mark is followed by a word with the same meaning; the console adds colour.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PASS, FAIL = "✓", "✗"
 
 
 def render_run(report: RunReport, *, verbose: bool = False) -> str:
-    """A run: the verdict, then how fast it went and where its log is; of one that was refused, why."""
+    """A run: verdict, speed and path of the log; the errors of a refused task."""
     if report.log is None:
         mark, verdict = FAIL, report.verdict
         return "\n".join([*map(describe, verdict.errors), f"{mark} {verdict.task} {verdict.verdict}: nothing was run"])
@@ -37,12 +37,12 @@ def render_run(report: RunReport, *, verbose: bool = False) -> str:
 
 
 def render_verdict(verdict: Verdict, log: str) -> str:
-    """A log, judged."""
+    """The verdict on a log."""
     return "\n".join([*_verdict(verdict, f"{verdict.simulated_time:.2f} s simulated"), f"log: {log}"])
 
 
 def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
-    """Every finding of some checked files, then one line that counts them."""
+    """All findings of the checked files, then one line with their number."""
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = sum(finding.severity == "warning" for finding in findings)
     mark, word = (FAIL, "failed") if errors else (PASS, "passed")
@@ -53,13 +53,13 @@ def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str
 
 
 def describe(finding: Diagnostic) -> str:
-    """One finding on one line, whatever names it quotes: where, how grave, what; and below it the hint."""
+    """One finding on one line: place, severity, code and message; its hint on the next line."""
     line = one_line(str(finding))
     return f"{line}\n  hint: {one_line(finding.hint)}" if finding.hint else line
 
 
 def describe_step(step: StepOutcome) -> str:
-    """One step as one line, for a log that is read while it grows."""
+    """One step as one line, for progress output."""
     line = f"{step.id}: {_word(step)}{_tries(step)}"
     if step.started is not None and step.ended is not None:
         line += f" ({step.started:.2f} s to {step.ended:.2f} s)"
@@ -90,7 +90,7 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
 
 
 def _causes(verdict: Verdict) -> list[str]:
-    """Why it did not pass, the first cause first: errors, then the step that went wrong, then unmet expectations."""
+    """Causes of a verdict other than passed: errors, then failed steps, then unmet expectations."""
     if verdict.verdict == "passed":
         return []
     causes = [describe(finding) for finding in verdict.errors]
@@ -112,7 +112,6 @@ def _word(step: StepOutcome) -> str:
 
 
 def _tries(step: StepOutcome) -> str:
-    """How often it was tried, where that was more than once."""
     return f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
 
 
@@ -120,7 +119,7 @@ _WENT_WRONG = {"failed": "failed", "timeout": "ran out of time", "interrupted": 
 
 
 def how_wrong(step: StepOutcome) -> str:
-    """That a step went wrong, and how."""
+    """How a step went wrong, such as `step 'pick' ran out of time`."""
     return f"step '{step.id}' {_WENT_WRONG[step.outcome]}{_tries(step)}"
 
 
@@ -128,7 +127,7 @@ def _summary(verdict: Verdict) -> str:
     done = sum(step.outcome == "done" for step in verdict.steps)
     text = f"{done} of {number_of(len(verdict.steps), 'step')} done"
     if not verdict.expectations:
-        return f"{text}, nothing expected beyond that"
+        return f"{text}, no expectations"
     met = sum(expectation.outcome == "passed" for expectation in verdict.expectations)
     return f"{text}, {met} of {number_of(len(verdict.expectations), 'expectation')} met"
 
@@ -161,7 +160,7 @@ def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
 
 
 def _margin(expectation: ExpectationOutcome) -> str:
-    """`passes with 4.1 mm to spare (tightest at 17.32 s)`, `fails by ...`, or why there is no margin."""
+    """`passes with 4.1 mm to spare (tightest at 17.32 s)`, `fails by ...`, or why it has no margin."""
     detail = f": {expectation.text}" if expectation.text else ""
     if expectation.outcome == "not_evaluated":
         return f"was never evaluated{detail}"

@@ -1,4 +1,4 @@
-"""Proposed gains: as a table for people, as JSON for programs."""
+"""Proposed gains of `tune` as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -11,19 +11,25 @@ from manipcli.report.table import table
 
 
 def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence[str]) -> str:
-    """The gains, what they do, and what the numbers stand for."""
-    simulated = any(one.simulated is not None for one in joints)
-    integral = any(one.i for one in joints)
+    """The gains, their step responses, and the meaning of the columns."""
+    simulated = any(joint.simulated is not None for joint in joints)
+    integral = any(joint.i for joint in joints)
     headers = ["joint", "inertia", "p", *(["i"] if integral else []), "d", "damping", "overshoot", "settles"]
     headers += ["simulated", "settles "] if simulated else []
     headers += ["frequency", "-3 dB", "margin"]
     rows = []
-    for one in joints:
-        row = [one.joint, f"{one.inertia:.3g}", f"{one.p:.4g}", *([f"{one.i:.4g}"] if integral else []), f"{one.d:.4g}"]
-        row += [f"{one.damping:.2f}", *_answer(one.predicted)]
-        row += (_answer(one.simulated) if one.simulated is not None else ["-", "-"]) if simulated else []
-        row += [f"{one.frequency:.2g} Hz", f"{one.bandwidth:.2g} Hz", f"x {one.margin:.1f}"]
-        rows.append((*row, one.limited_by or "nothing"))
+    for joint in joints:
+        row = [
+            joint.joint,
+            f"{joint.inertia:.3g}",
+            f"{joint.p:.4g}",
+            *([f"{joint.i:.4g}"] if integral else []),
+            f"{joint.d:.4g}",
+        ]
+        row += [f"{joint.damping:.2f}", *_answer(joint.predicted)]
+        row += (_answer(joint.simulated) if joint.simulated is not None else ["-", "-"]) if simulated else []
+        row += [f"{joint.frequency:.2g} Hz", f"{joint.bandwidth:.2g} Hz", f"x {joint.margin:.1f}"]
+        rows.append((*row, joint.limited_by or "nothing"))
     lines = [
         f"{robot}: gains for {wish.bandwidth:g} Hz and a damping ratio of {wish.damping:g}, "
         f"at a control period of {1e3 * wish.period:g} ms",
@@ -31,29 +37,30 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
         table((*headers, "limited by"), rows, right=tuple(headers[1:])),
         "",
     ]
-    steps = sorted({one.predicted.size for one in joints})
+    steps = sorted({joint.predicted.size for joint in joints})
     lines.append(
-        f"Step of {' or '.join(f'{size:g}' for size in steps)} (rad or m), of each joint alone with the most inertia "
-        "that it meets, without gravity."
+        f"Step of {' or '.join(f'{size:g}' for size in steps)} (rad or m): predicted for each joint alone, at its "
+        "largest inertia, without gravity."
     )
     lines.append(
-        "Frequency: the natural one, which --bandwidth asks for; -3 dB: where a joint follows its reference "
-        "with 1 / sqrt 2 of the swing."
+        "Frequency: natural frequency, set by --bandwidth. -3 dB: frequency at which a joint follows its reference "
+        "with 1 / sqrt 2 of the amplitude."
     )
     if simulated:
         lines.append("Simulated: the whole robot in the engine, with gravity, the other joints held by these gains.")
     lines.append(
-        f"Margin: all gains of the joint may grow by it at its smallest inertia; {MARGIN:g} is left to all together, "
-        "in the tightest postures that were found."
+        f"Margin: factor by which all gains of the joint can grow before it is unstable, at its smallest inertia. All "
+        f"joints together keep {MARGIN:g} in the most critical configurations found."
     )
     weak = {
-        one.joint: one.damping for one in joints if one.interface == "effort" and one.damping < min(0.5, wish.damping)
+        joint.joint: joint.damping
+        for joint in joints
+        if joint.interface == "effort" and joint.damping < min(0.5, wish.damping)
     }
     if weak:
         lines.append(
-            f"Damping of {', '.join(weak)}: {min(weak.values()):.2f} at least, at the largest inertia, because more "
-            "would be unstable at the smallest; a shorter control period, or inverse dynamics with softer gains, "
-            "helps."
+            f"Damping of {', '.join(weak)}: at least {min(weak.values()):.2f} at the largest inertia. More damping is "
+            "unstable at the smallest inertia. Use a shorter control period, or inverse dynamics with lower gains."
         )
     return "\n".join([*lines, *notes])
 
@@ -64,24 +71,24 @@ def _answer(answer: StepAnswer) -> list[str]:
 
 
 def render_json(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence[str]) -> str:
-    """All numbers in SI."""
+    """The gains as one JSON object; numbers are SI."""
     document: dict[str, object] = {
         "robot": robot,
         "bandwidth": wish.bandwidth,
         "damping": wish.damping,
         "period": wish.period,
     }
-    document |= {"joints": [_joint(one) for one in joints], "notes": list(notes)}
+    document |= {"joints": [_joint(joint) for joint in joints], "notes": list(notes)}
     return json.dumps(document, indent=2)
 
 
-def _joint(one: Tuned) -> dict[str, object]:
+def _joint(joint: Tuned) -> dict[str, object]:
     keys = "joint controller interface inertia least_inertia p i d i_clamp frequency damping bandwidth margin"
     return {
-        **{key: getattr(one, "least" if key == "least_inertia" else key) for key in keys.split()},
-        "limited_by": one.limited_by or None,
-        "predicted": _measures(one.predicted),
-        "simulated": None if one.simulated is None else _measures(one.simulated),
+        **{key: getattr(joint, "least" if key == "least_inertia" else key) for key in keys.split()},
+        "limited_by": joint.limited_by or None,
+        "predicted": _measures(joint.predicted),
+        "simulated": None if joint.simulated is None else _measures(joint.simulated),
     }
 
 

@@ -27,7 +27,7 @@ from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
-from manipcli.report.suite import Case, CaseReport, Trouble
+from manipcli.report.suite.suite import Case, CaseReport, Trouble
 
 if TYPE_CHECKING:
     from manipcli.task.plan_task import PlannedStep

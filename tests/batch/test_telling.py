@@ -14,7 +14,7 @@ from manipcli.batch.job import Job, Settings
 from manipcli.batch.process import run_job
 from manipcli.batch.telling import against_baseline, draw, troubles
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report.suite import Case
+from manipcli.report.suite.suite import Case
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\

@@ -193,8 +193,8 @@ def test_a_log_that_is_not_there_is_looked_for_beside_it(tmp_path: Path, capsys:
     (tmp_path / "pour.mcap").touch()
     for given, hint in (
         ("por.mcap", "did you mean 'pour.mcap'?"),
-        ("zzz.mcap", "logs beside it: pour.mcap"),
-        ("no/a.mcap", f"the folder '{tmp_path / 'no'}' is not there either"),
+        ("zzz.mcap", "logs in this folder: pour.mcap"),
+        ("no/a.mcap", f"folder '{tmp_path / 'no'}' does not exist"),
     ):
         assert main(["judge", str(tmp_path / given)]) == 4
         assert hint in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 
 from manipcli.batch.job import Job
 from manipcli.cli.app import main
-from manipcli.report.suite import CaseReport
+from manipcli.report.suite.suite import CaseReport
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\

@@ -58,7 +58,7 @@ def test_another_motion_is_told_by_step_and_from_when_on(folder: Path, capsys: p
     assert joints["first"]["field"] == "position[pitch]" or joints["first"]["field"].startswith("velocity[")
     assert main(["diff", a, b]) == 1
     out = capsys.readouterr().out
-    assert "made from: attachment 'task.yaml', line " in out
+    assert "input: attachment 'task.yaml', line " in out
     assert "0.3 rad +0.1" in out
     assert "✗ first difference: t = 0" in out
 
@@ -100,7 +100,7 @@ def test_where_it_was_written_is_nothing_that_happened(folder: Path, capsys: pyt
 def test_the_same_motion_judged_otherwise_is_different(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["diff", str(folder / "a.mcap"), str(folder / "c.mcap")]) == 1
     out = capsys.readouterr().out
-    assert "the messages are the same, the verdict on them is not" in out
+    assert "same messages, different verdict" in out
     assert "duration     passed" in out
     assert "failed" in out
 
@@ -114,15 +114,15 @@ def test_other_robots_are_told_and_what_is_no_run_is_compared_by_messages(
     run_task(task, log=tmp_path / "other.mcap")
     assert main(["diff", str(folder / "a.mcap"), str(tmp_path / "other.mcap")]) == 1
     out = capsys.readouterr().out
-    assert "messages are not compared: the joints are others (pitch, roll" in out
-    assert "the tasks are others" in out
+    assert "messages are not compared: the joints differ (pitch, roll" in out
+    assert "the tasks differ" in out
     bare = rewrite_log(folder / "a.mcap", tmp_path / "bare.mcap", metadata=lambda name, _: None)
     assert main(["diff", str(folder / "a.mcap"), str(bare)]) == 0
     out = capsys.readouterr().out
-    assert "bare.mcap tells of no task: messages alone are compared" in out
+    assert "bare.mcap not written by manipcli: only messages are compared" in out
     assert "✓ no difference" in out
     assert "and the verdict on them" not in out
     assert main(["diff", str(bare), str(bare)]) == 0
-    assert "bare.mcap and bare.mcap tell of no task" in capsys.readouterr().out
+    assert "bare.mcap and bare.mcap not written by manipcli" in capsys.readouterr().out
     (tmp_path / "text").write_text("hello")
     assert main(["diff", str(bare), str(tmp_path / "text")]) == 4

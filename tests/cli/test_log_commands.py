@@ -69,12 +69,12 @@ def test_a_cut_log_is_told_repaired_and_never_passes(
     cut = tmp_path / "run.mcap.partial"
     cut.write_bytes(data[: len(data) * 3 // 4])
     assert main(["info", str(cut)]) == 0
-    assert "missing: it was not finished" in capsys.readouterr().out
+    assert "missing: the file is not finished" in capsys.readouterr().out
     assert main(["repair", str(cut)]) == 0
     assert "lost after t = " in capsys.readouterr().out
     clean = tmp_path / "run.repaired.mcap"
     assert main(["judge", str(clean)]) == 3
-    assert "it was repaired" in capsys.readouterr().out
+    assert "repaired with losses" in capsys.readouterr().out
     assert main(["repair", str(cut)]) == 4, "what exists stays"
     assert "the file exists" in capsys.readouterr().err
     assert main(["repair", str(log), "-o", str(clean), "--force", "--format", "json"]) == 0
@@ -87,7 +87,7 @@ def test_what_is_no_log_is_refused(command: str, tmp_path: Path, capsys: pytest.
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     (tmp_path / "text").write_text("hello")
-    for name, why in (("pipe", "not a regular file"), ("text", "no MCAP file"), ("absent", "No such file")):
+    for name, why in (("pipe", "not a regular file"), ("text", "not an MCAP file"), ("absent", "No such file")):
         assert main([command, str(tmp_path / name)]) == 4
         assert why in capsys.readouterr().err
 
@@ -124,7 +124,7 @@ def test_at_tells_joints_bodies_and_the_step(log: Path, capsys: pytest.CaptureFi
     assert found["step"] is None
     assert found["contacts"] == []
     assert main(["at", str(log), "1000"]) == 4
-    assert "there is nothing at 1000 s" in capsys.readouterr().err
+    assert "1000 s is outside the log wave.mcap" in capsys.readouterr().err
     for word in ("soon", "3 mm", "nan"):
         assert main(["at", str(log), word]) == 4
 
@@ -184,7 +184,7 @@ def test_somebody_else_s_log_is_told_as_far_as_it_goes(tmp_path: Path, capsys: p
     assert "lift   200.000 mm" in capsys.readouterr().out
     assert main(["info", str(path)]) == 0
     text = capsys.readouterr().out
-    assert "missing: manipcli did not write it" in text
+    assert "missing: not written by manipcli" in text
     assert "/joint_states" in text
 
 

@@ -76,7 +76,7 @@ def test_logs_over_each_other_and_a_partial_one(log: Path, tmp_path: Path, capsy
     cut.write_bytes(log.read_bytes()[: log.stat().st_size * 4 // 5])
     assert main(["plot", str(log), str(cut), "joint_states.position[joint_4]", "--csv", "-"]) == 0
     told = capsys.readouterr()
-    assert "note: other: it was not finished" in told.err
+    assert "note: other: the file is not finished" in told.err
     assert {row.partition(",")[0] for row in told.out.splitlines()} == {"log", "home", "other"}
     (panel,) = open_chart([log, cut], ["joint_states.position[joint_4]"]).panels
     assert [one.end for one in panel.curves] == pytest.approx([one.times[-1] for one in panel.curves], abs=0.01)
@@ -102,7 +102,7 @@ def test_the_axes_of_a_vector_share_a_panel_and_words_with_commas_too(log: Path)
 @pytest.mark.slow
 def test_a_word_without_a_value_is_told(log: Path) -> None:
     chart = open_chart([log], ["joint_states.position[joint_1]", "contacts.force"])
-    assert chart.notes == ("there is no value of contacts.force in that time",)
+    assert chart.notes == ("no value of contacts.force in this time range",)
     assert len(chart.panels) == 1
 
 
@@ -126,12 +126,12 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["joint_state.position"], "PLOT002", "did you mean 'joint_states'?"),
         (["joint_states.positions"], "PLOT002", "did you mean 'position'?"),
         (["joint_states.position[jiont_1]"], "PLOT002", "did you mean 'joint_1'?"),
-        (["task/events.kind"], "PLOT002", "none of its fields is a number"),
-        (["--from", "move_9"], "PLOT003", "neither a time nor a step"),
-        (["--from", "2 m"], "PLOT003", "neither a time nor a step"),
-        (["--from", "0.3", "--to", "0.2"], "PLOT003", "nothing lies between"),
-        (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in that time"),
-        (["--from", "500"], "PLOT004", "no value in that time"),
+        (["task/events.kind"], "PLOT002", "no numeric fields in this message"),
+        (["--from", "move_9"], "PLOT003", "is not a time or step"),
+        (["--from", "2 m"], "PLOT003", "is not a time or step"),
+        (["--from", "0.3", "--to", "0.2"], "PLOT003", "empty time range: --from 0.3 is not before --to 0.2"),
+        (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in this time range"),
+        (["--from", "500"], "PLOT004", "no value in this time range"),
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
         (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': folder 'absent' does not exist"),
         (["gone.mcap"], "LOG300", "No such file"),
@@ -159,7 +159,7 @@ def test_what_cannot_be_plotted_is_refused(
 def test_a_joint_is_told_to_stand_in_brackets(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for given in ("joint_states.joint_4.position", "joint_states.joint_4"):
         assert main(["plot", str(log), given, "--csv", "-"]) == 4
-        hint = "brackets pick an element: joint_states[joint_4].FIELD; fields: position, velocity, effort\n"
+        hint = "select an element with brackets: joint_states[joint_4].FIELD; fields: position, velocity, effort\n"
         assert hint in capsys.readouterr().err
     assert open_chart([log], ["joint_states[joint_4].position"]).panels[0].labels == ("joint_4",)
     assert main(["plot", str(log), "joint_states.positions", "--csv", "-"]) == 4

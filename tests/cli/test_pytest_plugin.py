@@ -20,7 +20,7 @@ import manipcli.spec.task  # noqa: F401
 from manipcli.batch.job import Job, Settings
 from manipcli.cli.pytest_plugin import TaskFailed, _settings
 from manipcli.cli.task_session import TaskSession
-from manipcli.report.suite import Case, CaseReport, CaseWord, Trouble
+from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Trouble
 
 pytest_plugins = ["pytester"]
 
@@ -259,7 +259,7 @@ def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pyte
     assert re.search(r"failed: duration: fails by \d+ ms|failed: duration: fails by 0\.\d+ s", told)
     assert "tasks/late.yaml:9:5: duration: fails by" in told
     assert "✓ at_pose: 2.9 deg to spare" in told
-    assert "again: manipcli run tasks/late.yaml" in told
+    assert "reproduce: manipcli run tasks/late.yaml" in told
     assert "tasks/broken.yaml:4:1: error[YAML100]" in told
     assert "Traceback" not in told
     assert "pytest_plugin.py" not in told
@@ -310,4 +310,4 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
 def test_two_workers_share_the_tasks(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess(*LOADED, "-n", "2", "-v")
     result.assert_outcomes(passed=1, failed=2)
-    assert "again: manipcli run tasks/late.yaml" in result.stdout.str()
+    assert "reproduce: manipcli run tasks/late.yaml" in result.stdout.str()

@@ -19,7 +19,7 @@ import pytest
 from manipcli.batch.job import Job
 from manipcli.cli import task_session
 from manipcli.cli.app import main
-from manipcli.report.suite import Case, CaseReport
+from manipcli.report.suite.suite import Case, CaseReport
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\
@@ -284,7 +284,7 @@ def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) 
     assert re.search(r"✓ passed   good.yaml::good +\d+\.\d\d s  duration: \d+\.\d s to spare", ran.out)
     assert re.search(r"✗ failed   late.yaml::late +\d+\.\d\d s  duration: fails by", ran.out)
     assert "::error file=late.yaml,line=8,col=5,title=late failed::duration: fails by" in ran.out
-    assert "again: manipcli run late.yaml" in ran.out
+    assert "reproduce: manipcli run late.yaml" in ran.out
     assert re.search(r"✗ 1 failed, 1 passed in \d+\.\d s, 2 processes", ran.out)
     kept = {
         str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file() and ".cache" not in path.parts

@@ -25,7 +25,7 @@ def test_the_table_names_the_joint_and_says_what_its_numbers_are(capsys: pytest.
     assert row[there + len("frequency") :].split()[0] == "3.2"  # 5 Hz sqrt(sqrt(2) - 1), where |H| is 1 / sqrt 2
     assert " ms " in row
     assert row.endswith("nothing")  # limits it
-    assert "of each joint alone" in out
+    assert "for each joint alone" in out
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_no_file_is_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixtu
         (["--bandwidth", "-3"], "no frequency above 0"),
         (["--period", "2 m"], "'2 m' is a length"),
         (["--period", "0"], "expected 1 us to 1 s"),
-        (["-o", "step.gif"], "a figure is one of"),
+        (["-o", "step.gif"], "is not a figure: use"),
     ],
 )
 def test_what_cannot_be_is_told(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -104,7 +104,7 @@ def filtered(log: Path, tmp_path: Path, rewrite_log: Callable[..., Path], name: 
 
 @pytest.mark.parametrize("name", [TASK, ROBOT, URDF, SCENE])
 def test_a_log_without_an_attachment_that_judging_needs_is_refused_by_its_name(filtered: Path, name: str) -> None:
-    with pytest.raises(InvalidInput, match=rf"the log holds no '{name}'") as caught:
+    with pytest.raises(InvalidInput, match=rf"attachment '{name}' is missing") as caught:
         judge_log(filtered)
     assert caught.value.findings[0].code == "LOG102"
 

@@ -14,7 +14,7 @@ from manipcli.conditions.members.near import NearSpec
 from manipcli.conditions.members.slip import SlipSpec
 from manipcli.logs.report import limit_of, log_page
 from manipcli.pipeline import run_task, verify_log
-from manipcli.report.html import render_page
+from manipcli.report.html.render_page import render_page
 from manipcli.spec.base import Model
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ from manipcli.logs.judge_log import judge_log
 from manipcli.logs.log_info import log_info
 from manipcli.pipeline import run_task
 from manipcli.record.read.reading import open_recording
-from manipcli.report.log_info import render_text
+from manipcli.report.logs.log_info import render_text
 
 ROOT = Path(__file__).parents[2]
 HOME = ROOT / "tasks" / "home.yaml"

@@ -14,7 +14,7 @@ from manipcli.cli.app import main
 from manipcli.logs.graph import PRODUCERS, log_graph, task_graph
 from manipcli.pipeline import run_task
 from manipcli.record.channels import channel_table
-from manipcli.report.graph import Graph
+from manipcli.report.logs.graph import Graph
 
 ROOT = Path(__file__).parents[2]
 TASK = (
@@ -134,4 +134,4 @@ def test_of_a_foreign_log_the_topics_alone_are_told(
     graph = log_graph(rewrite_log(log, tmp_path / "foreign.mcap", metadata=lambda name, _: None))
     assert {node.kind for node in graph.nodes} == {"topic"}
     assert graph.edges == ()
-    assert "tells of no task" in graph.notes[0]
+    assert "not written by manipcli" in graph.notes[0]

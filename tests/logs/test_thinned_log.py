@@ -45,13 +45,13 @@ def test_what_another_program_left_is_shown(
 
     thinned = tmp_path / "thinned.mcap"
     rewrite_log(log, thinned, message=message)
-    with pytest.raises(Thinned, match="left out messages"):
+    with pytest.raises(Thinned, match="filtered by another program"):
         judge_log(thinned)
     shown = open_playback(thinned)
     assert shown.verdict is None
-    assert any("left out messages" in note for note in shown.notes)
+    assert any("filtered by another program" in note for note in shown.notes)
     assert shown.times[-1] > 0.15
-    assert any("left out messages" in one for one in moment(thinned, 0.1).missing)
+    assert any("filtered by another program" in one for one in moment(thinned, 0.1).missing)
 
 
 def test_a_log_whose_ticks_are_thinned_alike_is_not_judged(log: Path, rewrite_log: Any, tmp_path: Path) -> None:
@@ -68,16 +68,16 @@ def test_a_log_whose_ticks_are_thinned_alike_is_not_judged(log: Path, rewrite_lo
             thinned,
             message=lambda topic, one, kept=kept: one.data if topic not in ticks or kept(one.log_time) else None,
         )
-        with pytest.raises(Thinned, match="left out messages"):
+        with pytest.raises(Thinned, match="filtered by another program"):
             judge_log(thinned)
-        assert any("left out messages" in note for note in open_playback(thinned).notes)
+        assert any("filtered by another program" in note for note in open_playback(thinned).notes)
 
 
 @pytest.mark.parametrize("topic", ["/contacts", "/task/events"])
 def test_a_topic_without_any_message_is_told(log: Path, rewrite_log: Any, tmp_path: Path, topic: str) -> None:
     emptied = tmp_path / "emptied.mcap"
     rewrite_log(log, emptied, message=lambda name, one: None if name == topic else one.data)
-    told = f"the log holds no message of {topic}"
+    told = f"the log has no message of {topic}"
     assert told in moment(emptied, 0.1).missing
     assert told in log_info(emptied).missing
     assert told in open_playback(emptied).notes

@@ -72,8 +72,8 @@ def test_fields_are_those_that_rosbags_finds_in_the_text(name: str) -> None:
     [
         ("Inner a\n", "type 'Inner'"),
         ("A a\n" + "=" * 80 + "\nMSG: p/A\nB b\n" + "=" * 80 + "\nMSG: p/B\nA a\n", "contains itself"),
-        ("float64\n", "is no field"),
-        ("float64 1st\n", "is no field"),
+        ("float64\n", "is not a field"),
+        ("float64 1st\n", "is not a field"),
         ("wstring w\n", "wstring"),
         ("int32 a\n" * 5000, "more than"),
         ("#" * (1 << 21), "longer"),

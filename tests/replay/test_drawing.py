@@ -182,5 +182,5 @@ def test_what_cannot_be_drawn_is_left_out_and_told(two: Sight, tmp_path: Path) -
     drawing = draw(dataclasses.replace(two.robot, links=links))
     stands_in, line = drawing.missing
     assert "robot/finger" in line and "gone.stl" in line
-    assert stands_in.startswith("bones") and stands_in.endswith("finger")
+    assert stands_in.startswith("drawn as bones between joints: ") and stands_in.endswith("finger")
     assert Box((0.2, 0.2, 0.1)) == two.robot.link("base").collisions[0].shape

@@ -20,7 +20,7 @@ from manipcli.replay import video as videos
 from manipcli.replay.camera import VIEWS, Camera, direction
 from manipcli.replay.caption import NOW
 from manipcli.replay.drawing import draw
-from manipcli.replay.frames import Frames, moment, parse_size, telling
+from manipcli.replay.frames import Frames, clearest_time, moment, parse_size
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.renderer import Renderer, png_bytes
@@ -210,15 +210,15 @@ def test_a_run_without_steps_is_shown_by_moments() -> None:
 
 def test_a_step_is_shown_at_its_end_or_while_something_falls() -> None:
     playback = run()
-    assert telling(playback, STEPS[0]) == pytest.approx(0.98)
+    assert clearest_time(playback, STEPS[0]) == pytest.approx(0.98)
     # g / 4: it reaches 60 % of its last speed after 60 % of its fall of 0.5 s.
-    assert telling(playback, STEPS[1]) == pytest.approx(1.5 + 0.6 * 0.5, abs=0.03)
-    assert moment(playback, "drop_1") == telling(playback, STEPS[1])
+    assert clearest_time(playback, STEPS[1]) == pytest.approx(1.5 + 0.6 * 0.5, abs=0.03)
+    assert moment(playback, "drop_1") == clearest_time(playback, STEPS[1])
     assert [moment(playback, text) for text in ("start", "end", "1.25", "300 ms")] == [0.0, 2.0, 1.25, 0.3]
 
 
 @pytest.mark.parametrize(
-    ("text", "says"), [("drop", "neither a time nor a step"), ("9", "outside of the run"), ("2 kg", "neither")]
+    ("text", "says"), [("drop", "is not a time or step"), ("9", "outside the run"), ("2 kg", "is not a time or step")]
 )
 def test_what_is_no_moment_is_told(text: str, says: str) -> None:
     with pytest.raises(InvalidArgument, match=says):
@@ -228,13 +228,13 @@ def test_what_is_no_moment_is_told(text: str, says: str) -> None:
 @pytest.mark.parametrize("text", ["640", "640x", "x", "1x1", "99999x99", "640x360x2", "-640x360"])
 def test_what_is_no_size_is_told(text: str) -> None:
     assert parse_size("640X360") == (640, 360)
-    with pytest.raises(InvalidArgument, match="no size"):
+    with pytest.raises(InvalidArgument, match="not a picture size"):
         parse_size(text)
 
 
 @pytest.mark.parametrize("text", ["nowhere", "1", "1,2,3", "nan,0", "0,91"])
 def test_what_is_no_view_is_told(text: str) -> None:
-    with pytest.raises(InvalidArgument, match="no view"):
+    with pytest.raises(InvalidArgument, match="not a view"):
         direction(text)
 
 

@@ -222,7 +222,7 @@ def test_a_mesh_that_is_another_file_than_in_the_run_is_told(log: Path, tmp_path
     victim = tmp_path / "arm7_hand3" / "meshes" / "palm.stl"
     victim.write_bytes(victim.read_bytes() + b" ")
     notes = open_playback(log, package_path=[tmp_path]).notes
-    assert [note for note in notes if "palm.stl" in note and "not the file" in note] == list(notes)
+    assert [note for note in notes if "palm.stl" in note and "differs from the file" in note] == list(notes)
 
 
 def test_meshes_that_the_log_carries_need_no_package(log: Path, playback: Playback, tmp_path: Path) -> None:
@@ -370,7 +370,9 @@ def test_what_a_log_does_not_say_is_no_curve(tmp_path: Path) -> None:
     np.testing.assert_allclose(shown.stance[inside, 0], np.sin(0.2), atol=1e-6)
     np.testing.assert_allclose(shown.stance[~late, 1], 0.05, atol=1e-6)
     assert np.isfinite(shown.poses().position).all()
-    assert any("shown as they were before" in note and "turn" in note and "push" in note for note in shown.notes)
+    assert any(
+        "held at the nearest known position" in note and "turn" in note and "push" in note for note in shown.notes
+    )
 
 
 def test_a_robot_in_a_namespace_is_the_one_that_is_shown(tmp_path: Path) -> None:
@@ -393,7 +395,7 @@ def test_of_several_robots_a_moment_names_which_and_a_replay_shows_none(tmp_path
     tree = {f"{robot}/{child}": f"{robot}/{parent}" for robot in ("r1", "r2") for child, parent in frames.items()}
     assert {name: pose.parent for name, pose in poses.items()} == tree
     assert [poses[f"{robot}/base"].pose.p[0] for robot in ("r1", "r2")] == [1.0, 2.0]
-    with pytest.raises(InvalidInput, match="several robots, in /r1"):
+    with pytest.raises(InvalidInput, match="2 robots in the log: /r1, /r2"):
         open_playback(path)
 
 
@@ -441,7 +443,7 @@ def test_a_replay_of_what_several_robots_share_says_that_it_shows_none_of_them(t
     assert shown.robot is None
     assert {body.name for body in shown.scene.bodies} == {"base", "upper", "camera"}  # type: ignore[union-attr]
     assert not [note for note in shown.notes if "/joint_states (" in note]
-    assert any("several robots, in /r1, /r2" in note and "/r2/joint_states" in note for note in shown.notes)
+    assert any("2 robots in the log: /r1, /r2" in note and "/r2/joint_states" in note for note in shown.notes)
     assert [pose.name for pose in moment(path, 5.5).poses] == ["base", "upper", "camera"]
 
 
@@ -461,7 +463,7 @@ def test_without_a_description_there_are_frames_and_curves(tmp_path: Path) -> No
     assert [one.name for one in shown.curves()] == ["joint position"]
     assert "no /robot_description" in "\n".join(shown.notes)
     page = player_page(shown)
-    assert "manipcli did not write this log" in page
+    assert "not written by manipcli" in page
     assert '"frames":[' in page and '"curves":[{"name":"joint position"' in page
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from manipcli.logs.report import log_page
 from manipcli.pipeline import run_task
-from manipcli.report.html import render_page
+from manipcli.report.html.render_page import render_page
 
 ROOT = Path(__file__).parents[2]
 

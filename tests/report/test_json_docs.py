@@ -18,8 +18,8 @@ from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Ver
 from manipcli.logs import plot as chart
 from manipcli.report.json import render_findings, render_run
 from manipcli.report.run_report import RunReport, Timing
-from manipcli.report.suite import Case, CaseReport, Suite, Trouble
-from manipcli.report.suite_json import render_suite
+from manipcli.report.suite.suite import Case, CaseReport, Suite, Trouble
+from manipcli.report.suite.suite_json import render_suite
 
 DOCS = Path(__file__).parents[2] / "docs" / "json.md"
 STEP = StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9, attempts=(Attempt("done", 0.0, 6.1),))

@@ -87,7 +87,7 @@ def test_an_expectation_that_was_never_evaluated_says_why() -> None:
 
 
 def test_a_task_without_expectations_says_so() -> None:
-    assert "nothing expected beyond that" in render_verdict(replace(PASSED, expectations=()), "x")
+    assert "1 of 1 step done, no expectations" in render_verdict(replace(PASSED, expectations=()), "x")
 
 
 def test_a_run_says_how_fast_it_was() -> None:

@@ -60,9 +60,9 @@ def test_a_log_without_bodies_is_shown_and_told_as_far_as_it_goes(
     run_task(path, log=log)
     playback = open_playback(log)
     np.testing.assert_allclose(playback.body_position[-1], [[0.8, 0.5, 0.025]])
-    assert "did not record /tf" in playback.notes[-1]
+    assert "/tf not recorded" in playback.notes[-1]
     assert main(["at", str(log), "0.05", "--format", "json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["poses"], found["contacts"]) == ([], None)
-    assert found["missing"] == ["the run did not record /tf", "the run did not record /contacts"]
+    assert found["missing"] == ["/tf not recorded", "/contacts not recorded"]
     assert found["step"] == "wait_1"

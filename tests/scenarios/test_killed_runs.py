@@ -73,7 +73,7 @@ def test_a_file_that_may_not_grow_keeps_what_is_in_it_and_the_log_before(tmp_pat
     )
     assert done.returncode == 3, done.stderr
     answer = json.loads(done.stdout)
-    assert "the recording stopped after t = " in answer["errors"][0]["message"]
+    assert "recording stopped at t = " in answer["errors"][0]["message"]
     known = {"task": "pour", "seed": 1, "engine": "pybullet", "log": f"{log}.partial"}
     assert {key: answer[key] for key in known} == known
     assert "Traceback" not in done.stderr

@@ -31,7 +31,7 @@ def at(
     Works with any ROS 2 log, as far as its topics allow.
     """
     from manipcli.logs.snapshot import moment
-    from manipcli.report.snapshot import render_json, render_text
+    from manipcli.report.logs.snapshot import render_json, render_text
 
     found = moment(log, _when(log, time))
     console.result(render_json(found) if format_ == "json" else render_text(found))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from manipcli.batch.job import Job
-    from manipcli.report.suite import CaseReport
+    from manipcli.report.suite.suite import CaseReport
 
 
 def bless(
@@ -41,8 +41,8 @@ def bless(
     with Interrupts():
         from manipcli.batch.job import Settings
         from manipcli.cli.task_session import TaskSession
-        from manipcli.report.suite_json import render_suite
-        from manipcli.report.suite_text import render_case, render_summary
+        from manipcli.report.suite.suite_json import render_suite
+        from manipcli.report.suite.suite_text import render_case, render_summary
 
         settings = Settings(
             folder=Path("runs") / "bless",

@@ -28,7 +28,7 @@ def diff(
     code.
     """
     from manipcli.logs.diff import diff_logs
-    from manipcli.report import log_diff
+    from manipcli.report.logs import log_diff
 
     made = diff_logs(a, b, tolerance=tolerance)
     console.result((log_diff.render_json if format_ == "json" else log_diff.render_text)(made))

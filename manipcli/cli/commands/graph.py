@@ -28,7 +28,7 @@ def graph(
     """
     from manipcli.logs.graph import log_graph, task_graph
     from manipcli.record.records import begins_as_log
-    from manipcli.report.graph import render
+    from manipcli.report.logs.graph import render
 
     if file.suffix in (".mcap", ".partial") or begins_as_log(file):
         made = log_graph(file)

@@ -13,7 +13,7 @@ def info(log: LogFile, *, format_: Format = "text") -> ExitCode:
     Works with any MCAP file, also a truncated or damaged one; missing parts are shown first.
     """
     from manipcli.logs.log_info import log_info
-    from manipcli.report.log_info import render_json, render_text
+    from manipcli.report.logs.log_info import render_json, render_text
 
     found = log_info(log)
     console.result(render_json(found) if format_ == "json" else render_text(found))

@@ -31,7 +31,7 @@ def repair(
     from manipcli.cli.interrupts import Interrupts
     from manipcli.record.foreign.repair import default_output
     from manipcli.record.foreign.repair import repair as repaired
-    from manipcli.report.repaired import render_json, render_text
+    from manipcli.report.logs.repaired import render_json, render_text
 
     with Interrupts():
         done = repaired(log, output if output is not None else default_output(log), overwrite=force)

@@ -18,7 +18,7 @@ from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.cli.task_session import TaskSession
-    from manipcli.report.suite import CaseReport, Suite
+    from manipcli.report.suite.suite import CaseReport, Suite
 
 PERIOD = 0.1
 """[s] between two looks at what is running."""
@@ -109,7 +109,7 @@ class _Lines:
     """Progress of the tests: a line for each test that ends, and on a terminal the running tests."""
 
     def __init__(self, session: TaskSession, *, text: bool, quiet: bool) -> None:
-        from manipcli.report.suite_text import id_width
+        from manipcli.report.suite.suite_text import id_width
 
         self._session = session
         self._width = id_width([job.case for job in session.jobs.values()])
@@ -130,7 +130,7 @@ class _Lines:
             console.redraw("")
 
     def ended(self, report: CaseReport) -> None:
-        from manipcli.report.suite_text import render_line
+        from manipcli.report.suite.suite_text import render_line
 
         with self._lock:
             self._done += 1
@@ -149,8 +149,8 @@ class _Lines:
 
 
 def _show(suite: Suite, format_: str, *, github: bool) -> None:
-    from manipcli.report import suite_json, suite_text
-    from manipcli.report.github import render_annotations
+    from manipcli.report.suite import suite_json, suite_text
+    from manipcli.report.suite.github import render_annotations
 
     if github and not all(report.passed for report in suite.reports):
         workspace = os.environ.get("GITHUB_WORKSPACE")
@@ -162,7 +162,7 @@ def _show(suite: Suite, format_: str, *, github: bool) -> None:
 def _write(suite: Suite, session: TaskSession, junit: Path | None, report: Path | None) -> list[str]:
     """Writes the requested files; returns why some could not be written."""
     from manipcli.core.whole_file import write_whole
-    from manipcli.report.suite_page import render_page
+    from manipcli.report.html.suite_page import render_page
 
     files: list[tuple[Path, bytes]] = [] if junit is None else [(junit, session.junit)]
     if report is not None:

@@ -23,7 +23,7 @@ def verify(
     """Exit code 0 where the new log is identical."""
     from manipcli import pipeline
     from manipcli.cli.progress import StepProgress
-    from manipcli.report import verification
+    from manipcli.report.logs import verification
 
     with StepProgress(quiet=not console.is_live(), interrupts=interrupts) as progress:
         made = pipeline.verify_log(

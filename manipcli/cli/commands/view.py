@@ -37,7 +37,7 @@ def view(
         given = xacro_arguments(arguments or [])
         from manipcli import pipeline
         from manipcli.description.lint.inspection import located
-        from manipcli.replay.view import View
+        from manipcli.replay.view.view import View
         from manipcli.report import text
 
         places = tuple(package_path or ())

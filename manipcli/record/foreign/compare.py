@@ -1,7 +1,7 @@
-"""Two logs of any ROS 2 topics, message by message, in the memory of a few chunks.
+"""Comparison of two logs of any ROS 2 topics, message by message, in the memory of a few chunks.
 
-Messages of a topic are pairs where their log times are the same; what has no partner is there once only. A message is
-the same when its bytes are, or, with a tolerance, when nothing but numbers differs and those by no more than that.
+Messages of a topic with equal log times are pairs. A pair is the same if its bytes are equal or, with a tolerance, if
+only numbers differ, and by no more than the tolerance.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from manipcli.record.foreign.topics import Topic, Topics, open_topics
 from manipcli.record.read.chunk import Places
 
 MAX_WAITING = 1 << 28
-"""[byte] of messages that wait for their partner. One that did not come by then counts as absent."""
+"""Most bytes of messages that wait for their partner; beyond it, the partner counts as absent."""
 HEAD = 20
-"""[byte] before a message: sequence number, log time, publish time."""
+"""Bytes before a message: sequence number, log time, publish time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A message that is not the same, or not there, in the other log.
+    """A message that differs or is missing in the other log.
 
     Attributes:
-        time: [s] log time.
-        field: path in the message; what is not a field stands in brackets.
-        a, b: its value in each log; None where there is no such message.
-        index: number of the message within its topic in the log that has it, from 0.
+        time: log time [s].
+        field: path in the message; in parentheses if it is not a field.
+        a, b: value in each log; None without the message.
+        index: index of the message within its topic, from 0.
     """
 
     time: float
@@ -47,7 +47,7 @@ class Difference:
 
     @property
     def by(self) -> float | None:
-        """b - a, of numbers."""
+        """b - a for numbers, else None."""
         if isinstance(self.a, str | None) or isinstance(self.b, str | None):
             return None
         return float(self.b - self.a)
@@ -55,15 +55,15 @@ class Difference:
 
 @dataclass(slots=True)
 class TopicComparison:
-    """One topic of both logs, or of one of them.
+    """Comparison of a topic that is in both logs or in one.
 
     Attributes:
-        name, type: of it.
-        messages: in each log.
-        different: pairs that are not the same.
-        only: messages of each log without a partner.
-        first: the earliest of all that.
-        why: why its messages cannot be compared; "" where they were.
+        name, type: name and type of the topic.
+        messages: number of messages in each log.
+        different: number of pairs that differ.
+        only: number of messages without a partner in each log.
+        first: the earliest difference.
+        why: why its messages cannot be compared; "" if they are.
     """
 
     name: str
@@ -76,35 +76,39 @@ class TopicComparison:
 
     @property
     def same(self) -> bool:
-        """Whether both logs have the same messages of it."""
+        """Whether both logs have the same messages of the topic."""
         return not self.why and not self.different and not any(self.only)
 
     def met(self, found: Difference) -> None:
-        """Keeps the earliest."""
+        """Keep the earliest difference."""
         if self.first is None or found.time < self.first.time:
             self.first = found
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All topics of two logs, in the order of the first; `end` [s]: log time of its last message."""
+    """All topics of two logs, in the order of the first log; `end`: log time of its last message [s]."""
 
     topics: tuple[TopicComparison, ...]
     end: float
 
     @property
     def same(self) -> bool:
-        """Whether both have the same messages."""
+        """Whether both logs have the same messages."""
         return all(topic.same for topic in self.topics)
 
     @property
     def first(self) -> Difference | None:
         """The earliest difference of all topics."""
-        return min((one.first for one in self.topics if one.first is not None), key=lambda one: one.time, default=None)
+        return min(
+            (topic.first for topic in self.topics if topic.first is not None),
+            key=lambda difference: difference.time,
+            default=None,
+        )
 
     @property
     def messages(self) -> int:
-        """Of the first log."""
+        """Number of messages of the first log."""
         return sum(topic.messages[0] for topic in self.topics)
 
 
@@ -121,41 +125,41 @@ def compare_logs(
 
     Args:
         a, b: MCAP files of ROS 2 messages, finished or not.
-        tolerance: numbers in messages that differ by no more are the same, whatever their unit.
-        exact: sequence numbers and publish times count, too.
-        open_end: `a` ends too early: what `b` has at its end and later is not missing in it.
-        besides: by topic, fields that may differ.
+        tolerance: largest difference of equal numbers, in any unit.
+        exact: also compare sequence numbers and publish times.
+        open_end: `a` is incomplete; messages of `b` at or after its end are not compared.
+        besides: fields by topic that are not compared.
 
     Raises:
-        BadRecording: one is no MCAP file, or damaged.
+        BadRecording: a file is not an MCAP file, or is damaged.
     """
     logs = (open_topics(a), open_topics(b))
     found = {name: _topic(logs, name) for name in (*logs[0].all, *(n for n in logs[1].all if n not in logs[0].all))}
-    comparable = {name: one for name, one in found.items() if not one.why}
+    comparable = {name: topic for name, topic in found.items() if not topic.why}
     _Merge(logs, comparable, tolerance, exact, end=logs[0].end if open_end else None, besides=besides or {}).run()
     return Comparison(tuple(found.values()), logs[0].end / 1e9)
 
 
 def compared_with_itself(log: Path) -> Comparison:
-    """Of two files with the same bytes: their messages counted, without looking at them one by one.
+    """The comparison of two files with equal bytes: only counts of messages.
 
     Raises:
-        BadRecording: it is no MCAP file, or damaged.
+        BadRecording: the file is not an MCAP file, or is damaged.
     """
     topics = open_topics(log)
-    every = tuple(TopicComparison(one.name, one.type, (one.count, one.count)) for one in topics.all.values())
+    every = tuple(TopicComparison(topic.name, topic.type, (topic.count, topic.count)) for topic in topics.all.values())
     return Comparison(every, topics.end / 1e9)
 
 
 def _topic(logs: tuple[Topics, Topics], name: str) -> TopicComparison:
     there = [log.all[name] for log in logs if name in log.all]
     counts = (_count(logs[0], name), _count(logs[1], name))
-    one = TopicComparison(name, there[0].type, counts)
+    topic = TopicComparison(name, there[0].type, counts)
     if len(there) == 2 and (there[0].type, there[0].definition) != (there[1].type, there[1].definition):
-        one.why = f"its type is {there[0].type} in one log and another {there[1].type} in the other"
+        topic.why = f"types differ: {there[0].type} and another {there[1].type}"
     elif there[0].encoding != there[-1].encoding:
-        one.why = f"it is written as {there[0].encoding} in one log and as {there[1].encoding} in the other"
-    return one
+        topic.why = f"encodings differ: {there[0].encoding} and {there[1].encoding}"
+    return topic
 
 
 def _count(log: Topics, name: str) -> int:
@@ -164,7 +168,7 @@ def _count(log: Topics, name: str) -> int:
 
 @dataclass(slots=True)
 class _Block:
-    """Messages of one topic that wait; `index`: of the first within its topic."""
+    """Waiting messages of a topic; `index`: index of the first within its topic."""
 
     data: bytes
     places: Places
@@ -174,24 +178,24 @@ class _Block:
         return len(self.places.times)
 
     def take(self, count: int) -> _Block:
-        """The first `count`, which it lets go of."""
+        """Remove and return the first `count` messages."""
         places, index = self.places, self.index
         self.places = Places(places.times[count:], places.starts[count:], places.lengths[count:])
         self.index += count
         return _Block(self.data, Places(places.times[:count], places.starts[:count], places.lengths[:count]), index)
 
     def row(self, k: int, before: int = 0) -> bytes:
-        """Message `k`, and so many bytes before it."""
+        """The k-th message with `before` bytes before it."""
         start = int(self.places.starts[k])
         return self.data[start - before : start + int(self.places.lengths[k])]
 
     def rows(self, which: Int, length: int, before: int) -> Bytes:
-        """(n, before + length) messages of one length."""
+        """(n, before + length) messages of equal length."""
         return rows(self.data, self.places.starts[which] - before, before + length)
 
 
 class _Side:
-    """One log on its way through the comparison."""
+    """Reading position in one log."""
 
     def __init__(self, log: Topics, names: Collection[str]) -> None:
         self._messages: Iterator[tuple[str, bytes, Places]] = log.messages(names)
@@ -201,7 +205,7 @@ class _Side:
         self.done = False
 
     def read(self) -> str | None:
-        """The next stretch of messages; their topic, or None at the end."""
+        """Read the next block of messages; returns their topic, or None at the end."""
         name, data, places = next(self._messages, (None, b"", None))
         if name is None or places is None:
             self.done = True
@@ -214,13 +218,13 @@ class _Side:
 
     @property
     def size(self) -> int:
-        """[byte] that what waits keeps in memory: whole chunks."""
+        """Memory of the waiting chunks [byte]."""
         kept = {id(block.data): len(block.data) for blocks in self.waiting.values() for block in blocks}
         return sum(kept.values())
 
 
 class _Merge:
-    """Both logs at once, whichever is behind goes on."""
+    """Reads both logs in parallel and compares pairs."""
 
     def __init__(
         self,
@@ -251,8 +255,8 @@ class _Merge:
             if name is not None:
                 self._meet(name)
             while side.size > MAX_WAITING:
-                # It has waited longest where most wait.
-                name = max(side.waiting, key=lambda one: len(side.waiting[one]))
+                # The topic with the most waiting messages has waited longest.
+                name = max(side.waiting, key=lambda topic: len(side.waiting[topic]))
                 self._alone(name, self._sides.index(side), side.waiting[name].popleft())
             if other.done:
                 self._let_go(side)
@@ -262,13 +266,13 @@ class _Merge:
         self._let_go(right)
 
     def _let_go(self, side: _Side) -> None:
-        """What waits has no partner any more."""
+        """Count waiting messages as messages without a partner."""
         for name, blocks in side.waiting.items():
             while blocks:
                 self._alone(name, self._sides.index(side), blocks.popleft())
 
     def _meet(self, name: str) -> None:
-        """Pairs up what both have of a topic."""
+        """Compare the waiting messages of a topic."""
         a, b = (side.waiting[name] for side in self._sides)
         while a and b:
             n = min(len(a[0]), len(b[0]))
@@ -286,8 +290,8 @@ class _Merge:
                     queue.popleft()
 
     def _pairs(self, name: str, a: _Block, b: _Block) -> None:
-        """Messages of the same times."""
-        one = self._found[name]
+        """Compare messages with equal times."""
+        topic = self._found[name]
         unlike = [np.flatnonzero(a.places.lengths != b.places.lengths)]
         same = a.places.lengths == b.places.lengths
         for length in np.unique(a.places.lengths[same]).tolist():
@@ -304,14 +308,14 @@ class _Merge:
         if name in self._besides:
             every = every[[self._first(name, a.row(k), b.row(k)) is not None for k in every.tolist()]]
         if len(every):
-            one.different += len(every)
+            topic.different += len(every)
             first = int(every.min())
             time = int(a.places.times[first])
-            if one.first is None or time / 1e9 < one.first.time:
-                one.met(self._told(name, time, a.index + first, a.row(first, HEAD), b.row(first, HEAD)))
+            if topic.first is None or time / 1e9 < topic.first.time:
+                topic.met(self._difference(name, time, a.index + first, a.row(first, HEAD), b.row(first, HEAD)))
 
-    def _told(self, name: str, ns: int, index: int, a: bytes, b: bytes) -> Difference:
-        """What of two messages differs first; both with their heads."""
+    def _difference(self, name: str, ns: int, index: int, a: bytes, b: bytes) -> Difference:
+        """The first difference of two messages with their heads."""
         message = self._messages[name]
         found: tuple[str, Value, Value] | None = None
         if message is not None and a[HEAD:] != b[HEAD:]:
@@ -330,7 +334,7 @@ class _Merge:
         try:
             return first_difference(message, a, b, self._tolerance, self._besides.get(name, ()))
         except CdrError:
-            return "(a message that is cut)", len(a), len(b)
+            return "(a truncated message)", len(a), len(b)
 
     def _alone(self, name: str, side: int, block: _Block) -> None:
         """Messages without a partner."""
@@ -339,16 +343,16 @@ class _Merge:
             times = times[times < self._end]
         if not len(times):
             return
-        one = self._found[name]
-        one.only[side] += len(times)
+        topic = self._found[name]
+        topic.only[side] += len(times)
         k = int(times.argmin())
-        here = "there is one"
+        here = "present"
         a, b = (here, None) if side == 0 else (None, here)
-        one.met(Difference(int(times[k]) / 1e9, name, "(the whole message)", a, b, block.index + k))
+        topic.met(Difference(int(times[k]) / 1e9, name, "(the whole message)", a, b, block.index + k))
 
 
 def _head_difference(a: bytes, b: bytes) -> tuple[str, int, int] | None:
-    """What differs before two messages."""
+    """The difference in the heads of two messages."""
     for label, part in (("(sequence number)", slice(0, 4)), ("(publish time)", slice(12, HEAD))):
         x, y = (int.from_bytes(head[part], "little") for head in (a, b))
         if x != y:
@@ -357,12 +361,12 @@ def _head_difference(a: bytes, b: bytes) -> tuple[str, int, int] | None:
 
 
 def _leading(true: npt.NDArray[np.bool_]) -> int:
-    """How many are true before the first that is not; one at least."""
+    """Number of leading true values; at least one."""
     return max(1, len(true) if true.all() else int(np.argmin(true)))
 
 
 def _definition(topic: Topic) -> Message | None:
-    """None where only bytes can be compared: of no ROS 2 message, or of one that nobody describes."""
+    """The message type; None if only bytes can be compared, without a readable ROS 2 definition."""
     if not topic.definition:
         return None
     try:

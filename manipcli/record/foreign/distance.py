@@ -1,4 +1,4 @@
-"""How two messages of one type differ: the first field, and whether all of it stays within a tolerance."""
+"""Difference of two messages of one type: the first differing field, and equality within a tolerance."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Value = float | int | str
 def first_difference(
     message: Message, a: bytes, b: bytes, tolerance: float = 0.0, besides: Collection[str] = ()
 ) -> tuple[str, Value, Value] | None:
-    """The first value that differs by more than `tolerance`: its field, and what each message has; else None.
+    """The first value that differs by more than `tolerance`: its field and both values; None without a difference.
 
-    Fields `besides` are not looked at.
+    Fields `besides` are not compared.
 
     Raises:
-        CdrError: a message is shorter than its lengths say.
+        CdrError: a message is shorter than its lengths declare.
     """
     left, right = runs(message, a), runs(message, b)
     for x, y in zip(left, right, strict=False):
-        assert x.path == y.path  # a length that differs is met before what it is the length of
+        assert x.path == y.path  # different lengths are found before their arrays
         if x.label in besides:
             continue
         if not x.code or x.code == "#":
@@ -51,21 +51,21 @@ def _first_number(x: Run, y: Run, a: bytes, b: bytes, tolerance: float) -> int |
 
 
 def _near(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating], tolerance: float) -> npt.NDArray[np.bool_]:
-    """Nothing is near to what is not there but the same."""
+    """Equal within `tolerance`; nan and inf equal only themselves."""
     with np.errstate(invalid="ignore"):
         return np.asarray((np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b)) | (a == b))
 
 
 @dataclass(frozen=True, slots=True)
 class _Places:
-    """Where messages of one layout have floating-point numbers, by their code, and all other bytes."""
+    """Offsets of the floating-point numbers of a layout by type code, and all other bytes."""
 
     floats: tuple[tuple[str, Int], ...]
     others: Int
 
 
 class Near:
-    """Whether messages of one type are the same within a tolerance, many at once."""
+    """Vectorised comparison of messages of one type within a tolerance."""
 
     def __init__(self, message: Message, tolerance: float) -> None:
         self._message = message
@@ -73,7 +73,7 @@ class Near:
         self._layouts = Layouts(self._places)
 
     def within(self, a: Bytes, b: Bytes) -> npt.NDArray[np.bool_]:
-        """(n,) whether the messages (n, length) differ in floating-point numbers alone, and by no more."""
+        """(n,) whether messages (n, length) differ only in floating-point numbers, by at most the tolerance."""
         near = np.zeros(len(a), dtype=bool)
         n, length = a.shape
         for found, some in self._layouts.groups(a.tobytes(), np.arange(n) * length, np.full(n, length)):
@@ -91,7 +91,7 @@ class Near:
         every = np.arange(len(data))
         try:
             found = runs(self._message, data)
-        except CdrError:  # not a message of this type: all its bytes count
+        except CdrError:  # not a message of this type: compare all bytes
             return _Places((), every), [(0, len(data))] if len(data) else []
         numbers = []
         for code in ("<f8", "<f4"):

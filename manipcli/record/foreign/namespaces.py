@@ -1,4 +1,4 @@
-"""Under which names a ROS 2 log tells of its robots: the usual ones, or those of a namespace, as `/r1/joint_states`."""
+"""Robot topics of a ROS 2 log: the usual names, or names in a namespace such as `/r1/joint_states`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Meant:
-    """What a topic is: one of the usual ones, of the robot in a `namespace`; "" is none."""
+    """Meaning of a topic: a usual topic of the robot in `namespace`; "" without a namespace."""
 
     usual: str
     namespace: str
 
 
 def meant(types: Mapping[str, str]) -> dict[str, Meant]:
-    """The topics of a log that tell of a robot, by their names; where one has its usual name, that alone.
+    """The robot topics of a log by name; a topic with its usual name excludes namespaces.
 
     Args:
         types: topic -> type.
@@ -43,5 +43,5 @@ def meant(types: Mapping[str, str]) -> dict[str, Meant]:
 
 
 def namespaces(known: Iterable[Meant]) -> tuple[str, ...]:
-    """Those that tell of robots; more than one are several robots."""
-    return tuple(sorted({one.namespace for one in known if one.namespace}))
+    """The namespaces of the robots of a log."""
+    return tuple(sorted({meaning.namespace for meaning in known if meaning.namespace}))

@@ -1,4 +1,4 @@
-"""Which program wrote a log."""
+"""Detection of the program that wrote a log."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from manipcli.record.read.salvage import Salvage
 
 
 def is_own(path: Path) -> bool:
-    """Whether manipcli wrote a log: such a one says what it holds before its first message.
+    """Whether manipcli wrote a log: its contents record comes before the first message.
 
     Raises:
-        BadRecording: it is no MCAP file, or damaged.
+        BadRecording: the file is not an MCAP file, or is damaged.
     """
     from mcap.records import Metadata
 

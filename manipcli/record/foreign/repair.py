@@ -1,4 +1,4 @@
-"""A clean MCAP file of what can be read of a cut, damaged or unfinished one, and an account of what is lost."""
+"""Repair of a truncated, damaged or unfinished MCAP file: a clean copy and a list of losses."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ SUFFIX = ".repairing"
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Something that could not be kept.
+    """A part that cannot be kept.
 
     Attributes:
-        what: it was, as far as one can tell.
-        after: [s] log time of the last message before it; None where there is none.
-        before: [s] log time of the first message behind it; None where there is none, or where it was no message.
+        what: description of the part.
+        after: log time of the last message before it [s]; None without one.
+        before: log time of the first message after it [s]; None without one, or if the part is not messages.
     """
 
     what: str
@@ -49,14 +49,14 @@ class Loss:
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
-    """What became of a file.
+    """Result of a repair.
 
     Attributes:
-        path, output: the file, and the clean one.
-        start, end: [s] log time of the first and the last message that was kept; None where there is none.
-        messages, attachments: kept.
-        messages_lost: None where nobody knows how many there were.
-        losses: what was lost, in the order of the file; empty where nothing is.
+        path, output: the damaged file and the clean copy.
+        start, end: log times of the first and the last kept message [s]; None without messages.
+        messages, attachments: what is kept.
+        messages_lost: number of lost messages; None if unknown.
+        losses: losses in the order of the file.
     """
 
     path: Path
@@ -70,30 +70,30 @@ class Repaired:
 
 
 def default_output(path: Path) -> Path:
-    """`run.repaired.mcap` beside `run.mcap` or `run.mcap.partial`."""
+    """`run.repaired.mcap` next to `run.mcap` or `run.mcap.partial`."""
     name = path.name.removesuffix(PARTIAL)
     return path.parent / f"{name.removesuffix('.mcap')}.repaired.mcap"
 
 
 def repair(path: Path, output: Path, *, overwrite: bool = False) -> Repaired:
-    """Writes all that is sound in `path` into `output`, which says of itself what it lacks; `path` stays as it is.
+    """Write all undamaged parts of `path` to `output`, with the losses in its metadata; `path` is unchanged.
 
     Args:
-        path: any MCAP file, and what a killed run left.
-        output: where the clean file goes.
-        overwrite: replace it if it exists; never `path` itself.
+        path: any MCAP file, or the partial log of a killed run.
+        output: path of the clean copy.
+        overwrite: replace `output` if it exists; never `path` itself.
 
     Raises:
-        BadRecording: the file is no MCAP file, is being written, or holds nothing that could be kept.
-        RecordingRefused: nothing can or may be written there.
-        CopyFailed: the disk refused; nothing is left of the new file.
+        BadRecording: the file is not an MCAP file, is being written, or has nothing to keep.
+        RecordingRefused: `output` cannot or must not be written.
+        CopyFailed: writing failed; the incomplete copy is removed.
     """
     _refuse_living(path)
     if output.exists() and path.exists() and output.samefile(path):
-        raise RecordingRefused(output, "it is the file that is to be repaired", hint="choose another name")
+        raise RecordingRefused(output, "output and input are the same file", hint="choose another name")
     salvage = Salvage(path)
     pieces = iter(salvage)
-    # The first piece is read before anything is written: what is no MCAP file leaves nothing behind.
+    # Read the first piece before writing, so that a file that is not MCAP creates no output.
     first = next(pieces, None)
     container = Container(output, overwrite=overwrite, suffix=SUFFIX)
     try:
@@ -113,25 +113,26 @@ def repair(path: Path, output: Path, *, overwrite: bool = False) -> Repaired:
 
 
 def _refuse_living(path: Path) -> None:
-    """
+    """Check that no run is writing the file.
+
     Raises:
         BadRecording: a run holds the file.
     """
     try:
         fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except OSError:
-        return  # the reader says why
+        return  # the reader reports why
     try:
         lock(fd, shared=True)
     except (Taken, OSError):
-        raise BadRecording(path, "a run is still writing it", hint="repair it when the run is over") from None
+        raise BadRecording(path, "a run is still writing this file", hint="repair it after the run") from None
     finally:
         os.close(fd)
 
 
 @dataclass(slots=True)
 class _Copy:
-    """The clean file while it grows."""
+    """The clean copy while it is written."""
 
     salvage: Salvage
     container: Container
@@ -146,7 +147,7 @@ class _Copy:
     _messages: int = 0
 
     def take(self, piece: object) -> None:
-        """One more piece of the file."""
+        """Add a piece of the file."""
         from mcap import records
 
         match piece:
@@ -172,27 +173,27 @@ class _Copy:
             case Stretch():
                 self._chunk(piece)
 
-    def _declare(self, one: Schema | Channel) -> None:
-        """A schema or channel, the first of each number."""
+    def _declare(self, record: Schema | Channel) -> None:
+        """Add a schema or channel; the first one of each id counts."""
         from mcap import records
 
-        if isinstance(one, records.Schema):
-            if one.id not in self._schemas:
-                self._schemas[one.id] = one
-                self.container.declare([one], [])
-        elif one.id not in self._channels and one.schema_id in {0, *self._schemas}:
-            self._channels[one.id] = one
-            self.container.declare([], [one])
+        if isinstance(record, records.Schema):
+            if record.id not in self._schemas:
+                self._schemas[record.id] = record
+                self.container.declare([record], [])
+        elif record.id not in self._channels and record.schema_id in {0, *self._schemas}:
+            self._channels[record.id] = record
+            self.container.declare([], [record])
 
     def _chunk(self, chunk: Stretch) -> None:
         if not chunk.places.keys() <= self._channels.keys():
-            # What declared them is damaged; the index may know.
-            for one in self.salvage.scan.index.declared:
-                self._declare(one)
+            # Their declarations are damaged; use those of the index.
+            for record in self.salvage.scan.index.declared:
+                self._declare(record)
         known = {channel: places for channel, places in chunk.places.items() if channel in self._channels}
         strangers = sum(len(places.times) for channel, places in chunk.places.items() if channel not in known)
         if strangers:
-            self._open.append(f"{strangers} messages of channels whose declaration is lost")
+            self._open.append(f"{strangers} messages of channels without a declaration")
         if not known:
             return
         content = _content(chunk.data, known, whole=not strangers)
@@ -203,7 +204,7 @@ class _Copy:
         self._messages += sum(len(index) for index in content.indexes.values())
 
     def _settle(self, next_ns: int | None) -> None:
-        """The damage since the last chunk lies before `next_ns`."""
+        """Record the damage since the last chunk as losses before `next_ns`."""
         after = None if self._end is None else self._end / 1e9
         before = None if next_ns is None else next_ns / 1e9
         if self._open:
@@ -211,9 +212,9 @@ class _Copy:
             self._open.clear()
 
     def finished(self, path: Path, output: Path) -> Repaired:
-        """What became of it; says so in the clean file, too."""
+        """The result, which is also written to the metadata of the copy."""
         if not self._begun or not (self._messages or self._attachments or self._channels):
-            raise BadRecording(path, "holds nothing that could be kept")
+            raise BadRecording(path, "nothing to keep in this file")
         if self.salvage.scan.lost is not None:
             self._open.append(self.salvage.scan.lost)
         self._settle(None)
@@ -238,7 +239,7 @@ class _Copy:
 
 
 def _content(data: bytes, places: dict[int, Places], *, whole: bool) -> ChunkContent:
-    """The messages at `places`; with `whole` these are all, and the data stays as it is."""
+    """The messages at `places`; with `whole` these are all messages, and the data is used unchanged."""
     if not whole:
         spans = sorted(
             (start - PAYLOAD, start + length)

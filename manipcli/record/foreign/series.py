@@ -1,6 +1,6 @@
-"""Numbers of any ROS 2 log over time: every message of a topic by the definition of its type.
+"""Time series of numbers in any ROS 2 log, decoded by the message definitions in the log.
 
-Messages that have the same layout are read together, with one numpy index per number.
+Messages with the same layout are read together, with one numpy index per number.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from manipcli.record.read.chunk import Places, every
 from manipcli.record.schemas import CONTACTS
 
 MAX_VALUES = 50_000_000
-"""Of all series together: 800 MB with their times."""
+"""Most values of all series together: 800 MB with their times."""
 MAX_DECODED = 10_000_000
-"""Values of messages that each have a layout of their own; about a minute."""
+"""Most values of messages with individual layouts, about a minute of reading."""
 MAX_LEAVES = 2000
-"""Wanted numbers in one message."""
-MANY = f"has more than {MAX_LEAVES} numbers there; say which ones in brackets"
+"""Most wanted numbers in one message."""
+MANY = f"has more than {MAX_LEAVES} numbers in this field; select some with brackets"
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A field of a topic whose type is known."""
+    """A requested field of a topic with its message type."""
 
     topic: str
     message: Message
@@ -40,7 +40,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A wanted number: the names of the elements it is in, its first byte in the message, and its code."""
+    """A requested number: label of its array elements, offset in the message, and type code."""
 
     label: str
     offset: int
@@ -49,13 +49,13 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One number over time.
+    """A number over time.
 
     Attributes:
-        label: the elements of arrays that it belongs to (`joint_1`, `cup`); "" where there is none.
-        times: (T,) [s] since the first message of the log, by log time.
-        values: (T,); NaN where it is not there for a while.
-        held: each value holds until the next.
+        label: its array elements (`joint_1`, `cup`); "" outside of arrays.
+        times: (T,) log times since the first message of the log [s].
+        values: (T,); NaN at the start of a gap.
+        held: each value holds until the next one.
     """
 
     label: str
@@ -67,20 +67,20 @@ class Series:
 def read_series(
     topics: Topics, wanted: Sequence[Wanted], *, start: float = -np.inf, end: float = np.inf
 ) -> list[list[Series]]:
-    """For each field its series, by the order in which they first appear, or by number.
+    """The series of each field, in the order of their first appearance, or by number.
 
     Args:
-        topics: of the log.
-        wanted: what to read, all of it in one pass over the file.
-        start, end: [s] only what lies between; a value that holds at `start` begins there.
+        topics: topics of the log.
+        wanted: fields, read in one pass over the file.
+        start, end: time range [s]; a value that holds at `start` begins there.
 
     Raises:
-        BadRecording: a message does not fit its type, or there is more than fits into memory.
+        BadRecording: a message does not match its type, or the values exceed the memory limit.
     """
-    gathered = [_Gathered(one.way, one.message, held=topics.all[one.topic].type == CONTACTS) for one in wanted]
+    gathered = [_Gathered(field.way, field.message, held=topics.all[field.topic].type == CONTACTS) for field in wanted]
     of: dict[str, list[_Gathered]] = {}
-    for one, into in zip(wanted, gathered, strict=True):
-        of.setdefault(one.topic, []).append(into)
+    for field, into in zip(wanted, gathered, strict=True):
+        of.setdefault(field.topic, []).append(into)
     total = 0
     for topic, data, kept, seconds in _between(topics, of, start, end):
         for into in of[topic]:
@@ -91,8 +91,8 @@ def read_series(
         if total > MAX_VALUES:
             raise BadRecording(
                 topics.path,
-                f"there are more than {MAX_VALUES} numbers",
-                hint="ask for fewer fields, or for a part of the time with --from and --to",
+                f"more than {MAX_VALUES} numbers requested",
+                hint="select fewer fields, or a time range with --from and --to",
             )
     return [into.series() for into in gathered]
 
@@ -100,8 +100,8 @@ def read_series(
 def _between(
     topics: Topics, names: Collection[str], start: float, end: float
 ) -> Iterator[tuple[str, bytes, Places, Array]]:
-    """The messages from `start` to `end` and their times [s]; of a topic whose messages hold until the next, the last
-    before `start` too, as if it were of that time."""
+    """The messages from `start` to `end` and their times [s]; for topics whose messages hold until the next one, also
+    the last message before `start`, with the time `start`."""
     earlier: dict[str, tuple[float, bytes, Places]] = {}
     for topic, data, places in topics.messages(names):
         seconds = (places.times - topics.start) / 1e9
@@ -123,7 +123,7 @@ def _between(
 
 
 class _Gathered:
-    """The series of one field, from stretch to stretch of the log."""
+    """The series of one field while the log is read."""
 
     def __init__(self, way: Way, message: Message, *, held: bool) -> None:
         self._way = way
@@ -139,7 +139,7 @@ class _Gathered:
         return self._message.name
 
     def add(self, data: bytes, places: Places, seconds: Array) -> int:
-        """Messages of one stretch; how many numbers they hold."""
+        """Add a block of messages; returns the number of values."""
         added = 0
         if self._held:
             self._seen.append(seconds)
@@ -158,16 +158,16 @@ class _Gathered:
         found = runs(self._message, message)
         self._decoded += len(found)
         if self._decoded > MAX_DECODED:
-            raise CdrError("has other parts each time, and there are too many of them")
+            raise CdrError("has a different layout in too many messages")
         fields = tuple(part.name for part in self._way.parts)
         names = [run for run in found if not run.code and _names(run.fields, fields)]
-        # Lengths decide where things are, and texts on the way to the number which element it is in.
+        # The layout depends on lengths, and on texts along the path, which name the elements.
         guards = [(run.begin, run.begin + 4) for run in found if run.code in ("", "#")]
         guards += [(run.offset, run.end) for run in names]
         return leaves(found, self._way), guards
 
     def series(self) -> list[Series]:
-        """What was gathered."""
+        """The series."""
         labels = list(self._parts)
         if all(label.isdecimal() for label in labels):
             labels.sort(key=int)
@@ -178,7 +178,7 @@ class _Gathered:
         order = np.argsort(times, kind="stable")
         times, values = times[order], values[order]
         if self._held:
-            # Each message says all that touches: who is not in it touches no more.
+            # Each message lists all contacts: a missing pair has no contact.
             seen = np.unique(np.concatenate(self._seen))
             whole = np.full(len(seen), np.nan)
             whole[np.searchsorted(seen, times)] = values
@@ -187,15 +187,15 @@ class _Gathered:
 
 
 def _names(text: tuple[str, ...], fields: tuple[str, ...]) -> bool:
-    """Whether a text is in one of the messages on the way to a number, where it may name an element."""
+    """Whether a text is in a message on the path to a number, so that it can name an element."""
     return text[:-1] == fields[: len(text) - 1] and len(text) <= len(fields)
 
 
 def leaves(found: Sequence[Run], way: Way) -> tuple[Leaf, ...]:
-    """The wanted numbers of a message; a label that occurs again gets a number.
+    """The requested numbers of a message; repeated labels are numbered.
 
     Raises:
-        CdrError: they are too many.
+        CdrError: too many numbers.
     """
     fields = tuple(part.name for part in way.parts) + (("sec",) if way.is_time else ())
     result: list[Leaf] = []
@@ -203,10 +203,10 @@ def leaves(found: Sequence[Run], way: Way) -> tuple[Leaf, ...]:
     for run in found:
         if run.code in ("", "#") or len(run.steps) != len(fields) or run.fields != fields:
             continue
-        above = [(one, part.key) for (_, one), part in zip(run.steps, way.parts, strict=False) if one is not None]
-        if not all(key is None or key.takes(one.names, one.number, one.count) for one, key in above):
+        above = [(at, part.key) for (_, at), part in zip(run.steps, way.parts, strict=False) if at is not None]
+        if not all(key is None or key.takes(at.names, at.number, at.count) for at, key in above):
             continue
-        labels = ["+".join(one.names) or str(one.number) for one, _ in above]
+        labels = ["+".join(at.names) or str(at.number) for at, _ in above]
         key = way.parts[-1].key if run.array else None
         size = np.dtype(run.code).itemsize
         for k in _few(run.count, key):
@@ -215,15 +215,15 @@ def leaves(found: Sequence[Run], way: Way) -> tuple[Leaf, ...]:
                 continue
             label = " ".join([*labels, name] if run.array else labels)
             used[label] = used.get(label, 0) + 1
-            again = "" if used[label] == 1 else f" #{used[label]}"
-            result.append(Leaf(label + again, run.offset + k * size, run.code))
+            suffix = "" if used[label] == 1 else f" #{used[label]}"
+            result.append(Leaf(label + suffix, run.offset + k * size, run.code))
         if len(result) > MAX_LEAVES:
             raise CdrError(MANY)
     return tuple(result)
 
 
 def _few(count: int, key: Key | None) -> Sequence[int]:
-    """Which numbers of an array may be meant: all, unless it is long and numbers are asked for."""
+    """Indices of an array that can match: all, except for a long array with indices in brackets."""
     if count <= MAX_LEAVES:
         return range(count)
     asked = [int(word) % count for word in (key.words if key else ()) if word.lstrip("-").isdecimal()]
@@ -233,5 +233,5 @@ def _few(count: int, key: Key | None) -> Sequence[int]:
 
 
 def _numbers(data: bytes, at: Int, code: str) -> Array:
-    """(T,) the numbers that begin at these bytes."""
+    """(T,) numbers at these byte offsets."""
     return every(data, code)[at].astype(np.float64)

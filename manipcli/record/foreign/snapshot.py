@@ -1,4 +1,4 @@
-"""The joints and frames of any ROS 2 log at one moment: the newest of each until then, whoever published it."""
+"""Joints and frames of any ROS 2 log at one time: the newest sample of each, from any publisher."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manipcli.record.read.chunk import singly
 
 @dataclass(frozen=True, slots=True)
 class JointSample:
-    """A joint as it was published last; None for what was not."""
+    """Last published state of a joint; None for missing values."""
 
     time: float
     position: float | None
@@ -26,7 +26,7 @@ class JointSample:
 
 @dataclass(frozen=True, slots=True)
 class FrameSample:
-    """A frame as it was published last: `pose` is x y z [m] and quaternion xyzw in `parent`."""
+    """Last published pose of a frame: x y z [m] and quaternion xyzw in `parent`."""
 
     time: float
     parent: str
@@ -35,11 +35,10 @@ class FrameSample:
 
 @dataclass(slots=True)
 class Snapshot:
-    """What was known at a moment, by name; of several robots, joints and frames have their namespaces before their
-    names.
+    """Last samples by name; with several robots, names of joints and frames include the namespace.
 
-    `urdf`: each /robot_description, by what stands before the names of its joints; `lacks`: usual topics without a
-    message; `unread`: why messages were left out.
+    `urdf`: each /robot_description by the prefix of its joint names; `lacks`: usual topics without a message; `unread`:
+    why messages are left out.
     """
 
     joints: dict[str, JointSample] = field(default_factory=dict)
@@ -50,12 +49,12 @@ class Snapshot:
 
 
 def snapshot(log: Topics, time: float) -> Snapshot:
-    """The newest of everything at `time` [s of log time].
+    """The newest samples at `time` [s of log time].
 
     Raises:
         BadRecording: the file cannot be read.
     """
-    # A time since 1970 in nanoseconds has more digits than a double.
+    # Nanoseconds since 1970 have more digits than a double.
     limit = round(time * 1e9) + 512
     known = meant({name: topic.type for name, topic in log.all.items()})
     there = {known[name].usual for name, topic in log.all.items() if topic.count and name in known}
@@ -83,13 +82,13 @@ def _take(taken: Snapshot, topic: Meant, several: bool, ns: int, reader: CdrRead
         taken.urdf[before] = reader.text()
     elif topic.usual == topics.JOINT_STATES:
         names, values = joint_state(reader)
-        for k, name in enumerate(before + one for one in names):
+        for k, name in enumerate(before + joint for joint in names):
             known = taken.joints.get(name)
             if known is None or known.time <= time:
                 taken.joints[name] = JointSample(time, *(run[k] if k < len(run) else None for run in values))
     else:
         for *names, pose in transforms(reader):
-            # Who published it may have put the namespace there already.
+            # The publisher can already include the namespace.
             parent, child = (before + name.removeprefix(before) for name in names)
             known_frame = taken.frames.get(child)
             if known_frame is None or known_frame.time <= time:
@@ -97,13 +96,13 @@ def _take(taken: Snapshot, topic: Meant, several: bool, ns: int, reader: CdrRead
 
 
 def joint_state(reader: CdrReader) -> tuple[Sequence[str], list[list[float]]]:
-    """The names of a sensor_msgs/JointState, and its positions, velocities and efforts, as many as there are."""
+    """The names of a sensor_msgs/JointState, and its positions, velocities and efforts, which can be shorter."""
     reader.header()
     return reader.texts(), [[reader.f64() for _ in range(reader.count(8))] for _ in range(3)]
 
 
 def transforms(reader: CdrReader) -> Iterator[tuple[str, str, list[float]]]:
-    """Parent, child and pose (x y z, quaternion xyzw) of each of a tf2_msgs/TFMessage; names without a first `/`."""
+    """Parent, child and pose (x y z, quaternion xyzw) of each of a tf2_msgs/TFMessage; names without a leading `/`."""
     for _ in range(reader.count(64)):
         parent, child = reader.header().lstrip("/"), reader.text().lstrip("/")
         yield parent, child, [reader.f64() for _ in range(7)]

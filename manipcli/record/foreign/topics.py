@@ -1,6 +1,6 @@
-"""The content of any MCAP file short of its messages, and where those are. Knows no robot and no task.
+"""Topics, metadata and attachments of any MCAP file, and the positions of its messages.
 
-One pass verifies everything in the memory of one chunk; messages are read again when they are asked for.
+One pass verifies the file in the memory of one chunk; messages are read on demand.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class Topic:
 
     Attributes:
         name: `/joint_states`.
-        type: `sensor_msgs/msg/JointState`, as the log calls it; "" where it does not say.
-        definition: the text of the schema; "" where it is not `ros2msg`, or messages are not CDR.
-        encoding: of the messages, `cdr`; of those that are not ROS 2's with that of the schema, `json/jsonschema`.
-        count: messages.
-        first, last: log times [ns]; 0 where there is no message.
+        type: `sensor_msgs/msg/JointState`, as in the log; "" if unknown.
+        definition: text of the schema; "" unless it is `ros2msg` with CDR messages.
+        encoding: message encoding, `cdr`; for other than ROS 2 messages with the schema encoding, `json/jsonschema`.
+        count: number of messages.
+        first, last: log times [ns]; 0 without messages.
     """
 
     name: str
@@ -43,11 +43,11 @@ class Topic:
 
     @property
     def rate(self) -> float | None:
-        """[Hz] the mean; None below two messages, or where all have one time."""
+        """Mean rate [Hz]; None below two messages, or if all have the same time."""
         return None if self.last <= self.first else (self.count - 1) * 1e9 / (self.last - self.first)
 
     def saw(self, times: Int) -> None:
-        """Counts messages."""
+        """Count messages."""
         low, high = int(times.min()), int(times.max())
         self.first = low if self.count == 0 else min(self.first, low)
         self.last = high if self.count == 0 else max(self.last, high)
@@ -56,7 +56,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Attached:
-    """An attachment: the last part of its name, its media type, and its size in bytes."""
+    """An attachment: last part of its name, media type, and size [byte]."""
 
     name: str
     media_type: str
@@ -65,7 +65,7 @@ class Attached:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """A stretch of the file with messages of some channels: a chunk, or messages outside chunks."""
+    """A part of the file with messages of some channels: a chunk, or messages outside chunks."""
 
     start: int
     end: int
@@ -75,17 +75,17 @@ class _Place:
 
 @dataclass(slots=True)
 class Topics:
-    """A log.
+    """Content of a log.
 
     Attributes:
         path: the file.
-        all: topics by name, in the order in which they were declared.
-        size: [byte] of the file.
-        profile, library: as the writer calls itself.
-        attachments: in the order of the file.
+        all: topics by name, in the order of their declaration.
+        size: size of the file [byte].
+        profile, library: profile and name of the writer.
+        attachments: attachments in the order of the file.
         metadata: name -> key -> value; later records of a name replace keys of earlier ones.
-        lost: what is missing at the end, or None.
-        damage: what else cannot be read, a sentence each.
+        lost: what is missing at the end of the file, or None.
+        damage: what else cannot be read, one sentence each.
     """
 
     path: Path
@@ -102,31 +102,31 @@ class Topics:
 
     @property
     def start(self) -> int:
-        """[ns] log time of the first message."""
+        """Log time of the first message [ns]."""
         return min((topic.first for topic in self.all.values() if topic.count), default=0)
 
     @property
     def end(self) -> int:
-        """[ns] log time of the last message."""
+        """Log time of the last message [ns]."""
         return max((topic.last for topic in self.all.values() if topic.count), default=0)
 
     @property
     def count(self) -> int:
-        """Of all messages."""
+        """Number of messages."""
         return sum(topic.count for topic in self.all.values())
 
     @property
     def duration(self) -> float:
-        """[s] from the first message to the last."""
+        """Time from the first to the last message [s]."""
         return (self.end - self.start) / 1e9
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is damaged or missing."""
+        """Damaged and missing parts, one sentence each."""
         return (*self.damage, *([] if self.lost is None else [self.lost]))
 
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, bytes, Places]]:
-        """The messages of some topics: name, bytes, and where in them they are; in the order of the file.
+        """The messages of some topics in the order of the file: name, bytes, and positions in the bytes.
 
         Raises:
             BadRecording: the file changed.
@@ -154,10 +154,10 @@ def open_topics(path: Path, *, damaged: bool = False) -> Topics:
 
     Args:
         path: an MCAP file.
-        damaged: where it is damaged, what is sound of it.
+        damaged: read the undamaged parts of a damaged file instead of raising.
 
     Raises:
-        BadRecording: it is no MCAP file, or damaged.
+        BadRecording: the file is not an MCAP file, or is damaged.
     """
     from mcap import records
 
@@ -181,7 +181,7 @@ def open_topics(path: Path, *, damaged: bool = False) -> Topics:
                 log._places.append(_Place(piece.start, piece.end, piece.chunk, frozenset(piece.places)))
                 for channel, places in piece.places.items():
                     if channel not in log._channels:
-                        log.damage.append(f"it has messages of channel {channel}, which is not declared")
+                        log.damage.append(f"messages of channel {channel}, which is not declared")
                         log._channels[channel] = f"(channel {channel})"
                     name = log._channels[channel]
                     log.all.setdefault(name, Topic(name)).saw(places.times)
@@ -194,7 +194,7 @@ def open_topics(path: Path, *, damaged: bool = False) -> Topics:
 
 
 def _declare(log: Topics, channel: Channel, schema: Schema | None) -> None:
-    """A channel, the first of each number."""
+    """Add a channel; the first one of each id counts."""
     if channel.id in log._channels:
         return
     log._channels[channel.id] = channel.topic

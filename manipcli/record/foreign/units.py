@@ -1,4 +1,4 @@
-"""The unit of a number in a ROS message, by where it stands (REP 103: SI, and angles in rad), and of joints."""
+"""Units of numbers in ROS messages by their field (REP 103: SI, angles in rad), and of joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from manipcli.description.located_xml import parse_document
 from manipcli.record.foreign.fields import Way
 
 JointUnits = Mapping[str, str]
-"""Unit of the position of each joint whose kind is known: rad or m."""
+"""Position unit of each joint of known type: rad or m."""
 
 _OF_JOINTS = {
     "sensor_msgs/JointState": {"position": "", "velocity": "/s", "effort": "force"},
@@ -35,12 +35,12 @@ _OF_VECTORS = frozenset({"geometry_msgs/Vector3", "geometry_msgs/Point", "geomet
 
 
 def unit_of(way: Way, label: str, joints: JointUnits) -> str:
-    """The unit of a number; "" where it has none, or none is known.
+    """The unit of a number; "" if it has none or it is unknown.
 
     Args:
-        way: where it stands.
-        label: which element of an array it is, as the name of a joint.
-        joints: what is known of the joints.
+        way: path of the number.
+        label: its array element, such as the name of a joint.
+        joints: units of the joints.
     """
     holder, last = way.holder.name, way.parts[-1].name
     if holder in _OF_JOINTS:
@@ -59,13 +59,15 @@ def unit_of(way: Way, label: str, joints: JointUnits) -> str:
 
 
 def joint_units(urdf: bytes) -> JointUnits:
-    """Unit of the position of each joint of a description; of none where it is no description."""
+    """Position unit of each joint of a URDF; empty if it is not a URDF."""
     try:
         joints = parse_document(urdf, "robot_description").getElementsByTagName("joint") if urdf else []
     except InvalidInput:
         return {}
     units = {"prismatic": "m", "revolute": "rad", "continuous": "rad"}
-    # Those inside a <transmission> have no type.
+    # <joint> elements inside a <transmission> have no type.
     return {
-        one.getAttribute("name"): units[one.getAttribute("type")] for one in joints if one.getAttribute("type") in units
+        joint.getAttribute("name"): units[joint.getAttribute("type")]
+        for joint in joints
+        if joint.getAttribute("type") in units
     }

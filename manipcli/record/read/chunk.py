@@ -1,4 +1,4 @@
-"""The messages of a chunk: its bytes, unpacked and verified, and where in them the messages of each channel are."""
+"""Decompression and verification of a chunk, and the positions of its messages by channel."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from manipcli.record.read.scan import Record
 from manipcli.record.records import CHUNK_HEAD, MESSAGE, MESSAGE_HEAD, PAYLOAD, RECORD_HEAD
 
 MAX_CHUNK = 1 << 26
-"""[byte] of a chunk, unpacked; below, it may compress as well as it likes: images and maps of one value do."""
+"""Largest decompressed chunk [byte]; the compression ratio is not limited, because uniform images compress well."""
 _MAX_OTHERS = 8192
-"""Schemas and channels in a chunk."""
+"""Most schemas and channels in a chunk."""
 
 
 def open_chunk(path: Path, record: Record) -> bytes:
-    """The decompressed message records of a chunk, bounded in size and verified by its checksum; 0 says that its writer
-    made none."""
+    """The decompressed message records of a chunk, bounded in size and verified by its checksum; checksum 0 means
+    none."""
     try:
         start_ns, end_ns, size, crc = CHUNK_HEAD.unpack_from(record.body)
         (name_length,) = struct.unpack_from("<I", record.body, CHUNK_HEAD.size)
@@ -41,8 +41,8 @@ def open_chunk(path: Path, record: Record) -> bytes:
     if size > MAX_CHUNK:
         raise BadRecording(
             path,
-            f"{where} declares {size} bytes, more than the {MAX_CHUNK} that are read of one",
-            hint="have the program that wrote it write smaller chunks",
+            f"{where} declares {size} bytes, the limit is {MAX_CHUNK}",
+            hint="write smaller chunks with the recording program",
         )
     data = _decompress(compression, packed, size)
     if data is None or len(data) != size or crc not in (0, zlib.crc32(data)):
@@ -51,21 +51,21 @@ def open_chunk(path: Path, record: Record) -> bytes:
 
 
 def _decompress(compression: str, packed: memoryview, size: int) -> bytes | None:
-    """At most `size` bytes; None when the data is not what the compression makes."""
+    """At most `size` decompressed bytes; None for invalid data."""
     if compression == "":
         return bytes(packed)
     if compression == "zstd":
         import zstandard
 
         try:
-            # A frame may declare its own size, which the decompressor would then believe.
+            # Limit the output, because a frame can declare any size.
             if zstandard.frame_content_size(packed) not in (size, -1):
                 return None
             return zstandard.ZstdDecompressor(max_window_size=1 << 27).decompress(packed, max_output_size=size)
         except zstandard.ZstdError:
             return None
     if compression == "lz4":
-        # It ships no types.
+        # lz4 has no type information.
         import lz4.frame  # type: ignore[import-untyped]
 
         try:
@@ -84,14 +84,14 @@ class Places:
     lengths: Int
 
     def at(self, which: Int) -> Places:
-        """Some of them."""
+        """The selected messages."""
         return Places(self.times[which], self.starts[which], self.lengths[which])
 
 
 def indexed(data: bytes, indexes: Mapping[int, bytes], *, whole: bool = True) -> dict[int, Places] | None:
     """Messages by channel from a chunk's message indexes (channel -> pairs of log time and offset).
 
-    None when a message is not where they say or, with `whole`, unless they account for every byte of the chunk.
+    None if an index is wrong or, with `whole`, if the indexes do not cover every byte of the chunk.
     """
     found: dict[int, Places] = {}
     for channel, raw in indexes.items():
@@ -111,7 +111,7 @@ def indexed(data: bytes, indexes: Mapping[int, bytes], *, whole: bool = True) ->
 
 
 def _located(data: bytes, channel: int, raw: bytes) -> Places | None:
-    """The messages of one channel from its message index; None when one of them is not there."""
+    """The messages of one channel from its message index; None if an entry is wrong."""
     size = len(data)
     entries = np.frombuffer(raw, dtype="<u8").reshape(-1, 2)
     if len(entries) and (size < PAYLOAD or entries[:, 1].max() > size - PAYLOAD):
@@ -131,8 +131,8 @@ def _located(data: bytes, channel: int, raw: bytes) -> Places | None:
 
 
 def chunk_places(data: bytes, indexes: Mapping[int, bytes]) -> dict[int, Places]:
-    """All messages by channel: by the indexes where they account for every byte, and otherwise by a walk, since they
-    were cut off or another tool wrote the file.
+    """All messages by channel: from the indexes if they cover every byte, else by walking over the records, for
+    truncated files and files of other tools.
 
     Raises:
         CdrError: from the walk.
@@ -145,7 +145,7 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
     """Messages by channel, found by walking over the records; and the records of other kinds (opcode, body).
 
     Raises:
-        CdrError: a record does not fit into the chunk, or there are too many that are no messages.
+        CdrError: a record exceeds the chunk, or too many records are not messages.
     """
     rows: dict[int, list[tuple[int, int, int]]] = {}
     others: list[tuple[int, bytes]] = []
@@ -161,7 +161,7 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
             _, _, channel, _, time, _ = MESSAGE_HEAD.unpack_from(data, offset)
             rows.setdefault(channel, []).append((min(time, 2**63 - 1), offset + PAYLOAD, length - (PAYLOAD - 9)))
         elif opcode == 0 or len(others) == _MAX_OTHERS:
-            raise CdrError("holds too much that is no message")
+            raise CdrError("has too many records that are not messages")
         else:
             others.append((opcode, data[offset + 9 : end]))
         offset = end

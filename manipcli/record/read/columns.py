@@ -1,4 +1,4 @@
-"""Messages of one channel to columns of numbers, with one numpy index per run of numbers over all messages."""
+"""Columns of numbers from the messages of one channel, with one numpy index per run over all messages."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from manipcli.record.schemas import schema_text
 
 @dataclass(frozen=True, slots=True)
 class NamedRuns:
-    """What a message holds: its names, and (offset, count) of its runs of doubles."""
+    """Names in a message, and (offset, count) of its runs of doubles."""
 
     names: tuple[str, ...]
     runs: tuple[tuple[int, int], ...]
 
 
 Choose = Callable[[Sequence[Run], memoryview], NamedRuns]
-"""The values of a message, and its bytes, to what is wanted of it."""
+"""Selects the wanted runs from the values and bytes of a message."""
 
 
 class Columns:
-    """The numbers of one channel on their way from chunks to spans.
+    """Collects the numbers of one channel from chunks.
 
     Args:
-        topic: its name in errors.
-        kind: of its messages.
-        choose: what is wanted of a message.
-        names: of the joints or bodies that every message must hold, in this order.
-        widths: of the runs of doubles that every message must hold.
+        topic: topic name for errors.
+        kind: type of its messages.
+        choose: selects the wanted runs of a message.
+        names: joints or bodies that every message must have, in this order.
+        widths: widths of the runs of doubles that every message must have.
     """
 
     def __init__(self, topic: str, kind: str, choose: Choose, names: tuple[str, ...], widths: tuple[int, ...]) -> None:
@@ -50,14 +50,14 @@ class Columns:
         self._parts: list[tuple[Int, list[Array]]] = []
 
     def __len__(self) -> int:
-        """Messages that were added and not yet taken."""
+        """Number of messages that are added and not yet taken."""
         return sum(len(times) for times, _ in self._parts)
 
     def add(self, data: bytes, places: Places) -> None:
-        """The channel's messages of one chunk.
+        """Add the messages of one chunk.
 
         Raises:
-            CdrError: a message is cut, holds other things than it should, or is older than the one before it.
+            CdrError: a message is truncated, has unexpected content, or is older than the previous one.
         """
         times = np.concatenate(([self._newest], places.times))
         back = np.flatnonzero(np.diff(times) <= 0)
@@ -76,7 +76,7 @@ class Columns:
         self._parts.append((places.times, numbers))
 
     def take(self, count: int) -> tuple[Int, list[Array]]:
-        """The first `count` messages: log times [ns], and each run (count, width). The columns let go of them."""
+        """The first `count` messages: log times [ns], and each run (count, width). They are removed."""
         if len(self._parts) != 1:
             times = np.concatenate([np.zeros(0, dtype=np.int64), *(times for times, _ in self._parts)])
             empty = [np.zeros((0, width)) for width in self._widths]
@@ -88,20 +88,20 @@ class Columns:
         return times[:count], [run[:count] for run in runs]
 
     def _offsets(self, message: memoryview) -> tuple[tuple[int, ...], list[tuple[int, int]]]:
-        """Where the wanted numbers of a message are, and the counts and texts that decide it."""
+        """Offsets of the wanted numbers, and the byte ranges of counts and texts that define the layout."""
         found = runs(self._message, message)
         holds = self._choose(found, message)
         if holds.names != self._names:
-            raise CdrError(f"{self._topic} names other joints or bodies than the metadata")
+            raise CdrError(f"{self._topic} has other joints or bodies than the metadata")
         if tuple(count for _, count in holds.runs) != self._widths:
-            raise CdrError(f"{self._topic} has another number of values than of names")
+            raise CdrError(f"{self._topic} has different numbers of values and names")
         guards = [(run.begin, run.end) for run in found if run.code in ("", "#")]
         return tuple(offset for offset, _ in holds.runs), guards
 
 
 @cache
 def definition(kind: str) -> Message:
-    """One of the types of a recording."""
+    """The message type `kind` of a recording."""
     return read_definition(kind, schema_text(kind))
 
 
@@ -118,8 +118,8 @@ def body_runs(bodies: frozenset[str], world: str) -> Choose:
         parents = _texts(found, data, "transforms", "header", "frame_id")
         children = _texts(found, data, "transforms", "child_frame_id")
         places = [run.offset for run in found if run.fields == ("transforms", "transform", "translation", "x")]
-        each = zip(parents, children, places, strict=True)
-        mine = [(child, at) for parent, child, at in each if parent == world and child in bodies]
+        frames = zip(parents, children, places, strict=True)
+        mine = [(child, at) for parent, child, at in frames if parent == world and child in bodies]
         return NamedRuns(tuple(child for child, _ in mine), tuple((at, 7) for _, at in mine))
 
     return choose
@@ -144,5 +144,5 @@ def _texts(found: Sequence[Run], data: memoryview, *fields: str) -> tuple[str, .
 
 
 def _run(found: Sequence[Run], *fields: str) -> tuple[int, int]:
-    """Offset and count of an array of numbers; none of them where it is empty."""
+    """Offset and count of an array of numbers; count 0 if it is empty."""
     return next(((run.offset, run.count) for run in found if run.array and run.fields == fields), (0, 0))

@@ -1,4 +1,4 @@
-"""What two logs hold beside messages: metadata and attachments, key by key and line by line."""
+"""Comparison of metadata and attachments of two logs, by key and by line."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from manipcli.record.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class EntryDifference:
-    """A metadata record or an attachment that is not the same in two logs.
+    """A metadata record or an attachment that differs in two logs.
 
     Attributes:
         kind: `metadata` or `attachment`.
-        name: of it.
-        where: the first key or line that differs; "" where the whole is not there, or is no text.
-        a, b: what each log has; None: nothing.
-        count: how many keys or lines differ; 0 where they were not counted.
+        name: its name.
+        where: the first key or line that differs; "" if it is missing or not a text.
+        a, b: value in each log; None if missing.
+        count: number of keys or lines that differ; 0 if not counted.
     """
 
     kind: str
@@ -29,14 +29,14 @@ class EntryDifference:
 
 
 def compare_entries(a: Recording, b: Recording) -> tuple[EntryDifference, ...]:
-    """Every record of metadata and every attachment that differs, in the order of the first log."""
+    """All metadata records and attachments that differ, in the order of the first log."""
     found = [
         _metadata(name, a.metadata.get(name, {}), b.metadata.get(name, {}))
         for name in dict.fromkeys((*a.metadata, *b.metadata))
     ]
     names = dict.fromkeys((*a.attachments, *b.attachments))
     found += [_attachment(name, a.attachments.get(name), b.attachments.get(name)) for name in names]
-    return tuple(one for one in found if one is not None)
+    return tuple(difference for difference in found if difference is not None)
 
 
 def _metadata(name: str, a: Mapping[str, str], b: Mapping[str, str]) -> EntryDifference | None:
@@ -60,6 +60,6 @@ def _attachment(name: str, a: bytes | None, b: bytes | None) -> EntryDifference 
     pairs = zip([*left, *[None] * (longest - len(left))], [*right, *[None] * (longest - len(right))], strict=True)
     unlike = [(k, x, y) for k, (x, y) in enumerate(pairs, start=1) if x != y]
     if not unlike:
-        return EntryDifference("attachment", name, "", "other line ends", "other line ends", 0)
+        return EntryDifference("attachment", name, "", "different line endings", "different line endings", 0)
     k, x, y = unlike[0]
     return EntryDifference("attachment", name, f"line {k}", x and x.strip(), y and y.strip(), len(unlike))

@@ -8,12 +8,12 @@ from manipcli.core.geometry import Array, rotation_between
 
 
 def body_velocities(time: Array, position: Array, quat_xyzw: Array) -> tuple[Array, Array]:
-    """Central differences; one-sided at both ends, zero when there is one instant only.
+    """Central differences; one-sided at both ends, zero for a single time.
 
         v_k = (p_{k+1} - p_{k-1}) / (t_{k+1} - t_{k-1})
         w_k = log(q_{k+1} q_{k-1}^-1) / (t_{k+1} - t_{k-1})
 
-    The error is of second order in the period; positions are doubles, so that rounding stays near 1e-13 m/s at 1 kHz.
+    The error is of second order in the period; rounding of double positions is about 1e-13 m/s at 1 kHz.
 
     Args:
         time: (T,) [s], increasing.

@@ -1,7 +1,7 @@
-"""Reads a recording back, from a finished file as from the one a killed run left behind.
+"""Reader of recordings, finished or left by a killed run.
 
-One pass over the file verifies its checksum and keeps what is small; chunks are opened where that is needed only. The
-ticks in them are read when somebody goes through the spans.
+One pass over the file verifies its checksum and reads small records; chunks are opened only if needed. Iterating over
+the spans reads the ticks.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     from mcap.records import Attachment
 
 MAX_ATTACHED = 1 << 30
-"""[byte] of all attachments together."""
+"""Largest size of all attachments together [byte]."""
 
 
 def open_recording(path: Path, *, being_written: bool = False) -> Recording:
-    """A recording whose spans are read from the file when they are asked for: its memory does not grow with its length.
+    """Open a recording whose spans are read from the file on demand, with memory independent of its length.
 
     Args:
-        path: an `.mcap` file, or the `.mcap.partial` of a run that was killed.
-        being_written: the file is a run's partial file that has just been flushed: that it has no end is no loss.
+        path: an `.mcap` file, or the `.mcap.partial` file of a killed run.
+        being_written: the run has just flushed this partial file, so its missing end is not a loss.
 
     Raises:
-        BadRecording: not a recording of manipcli, of a later format, damaged, or out of bounds; from going through
-            the spans, too. A file that merely lacks its end is read as far as it goes, and `lost` says so.
+        BadRecording: not a recording of manipcli, of a later format, damaged, or too large; also while
+            iterating over the spans. A file without its end is read up to there, with the reason in `lost`.
     """
     reader = _Reader(path)
     scan = Scan(path, being_written=being_written)
@@ -53,12 +53,12 @@ def open_recording(path: Path, *, being_written: bool = False) -> Recording:
 
 
 def read_recording(path: Path, *, being_written: bool = False) -> Recording:
-    """Everything in one recording, all ticks in memory: see `open_recording`, and `Recording.whole`."""
+    """Read a recording with all ticks in memory; see `open_recording` and `Recording.whole`."""
     return open_recording(path, being_written=being_written).whole()
 
 
 class _Reader:
-    """What was declared so far, and what happened."""
+    """State while reading the records of a file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -76,13 +76,13 @@ class _Reader:
         self._heard: set[str] = set()
 
     def declaration(self, record: Record) -> None:
-        """Anything but a chunk."""
+        """Read a record that is not a chunk."""
         if record.opcode in (SCHEMA, CHANNEL, ATTACHMENT, METADATA):
             self._named += 1
             if self._named > MAX_NAMED:
-                raise BadRecording(self._path, f"declares more than {MAX_NAMED} channels, schemas and attachments")
+                raise BadRecording(self._path, f"more than {MAX_NAMED} channels, schemas and attachments")
         elif record.opcode == MESSAGE:
-            raise BadRecording(self._path, "has messages outside chunks; manipcli writes none")
+            raise BadRecording(self._path, "not a log of manipcli: messages outside chunks")
         guarded(self._path, record, self._declaration)
 
     def _declaration(self, record: Record) -> None:
@@ -92,7 +92,7 @@ class _Reader:
         stream = ReadDataStream(BytesIO(record.body))
         if record.opcode == HEADER:
             if records.Header.read(stream).profile != "ros2":
-                raise BadRecording(self._path, "is not a recording of manipcli: its profile is not ros2")
+                raise BadRecording(self._path, "not a recording of manipcli: its profile is not ros2")
         elif record.opcode == SCHEMA:
             schema = records.Schema.read(stream)
             self._schemas[schema.id] = schema.name
@@ -111,15 +111,15 @@ class _Reader:
     def _attachment(self, record: Record, attachment: Attachment) -> None:
         if zlib.crc32(record.body[:-4]) != int.from_bytes(record.body[-4:], "little"):
             raise CdrError(f"the checksum of attachment '{attachment.name}' does not match")
-        # Only the last part of a name is taken: a log must not name a place outside the directory it is unpacked to.
+        # Keep only the last part of the name, so that an attachment cannot leave its output directory.
         name = PurePosixPath(attachment.name.replace("\\", "/").replace("\0", "")).name
         self._attached += len(attachment.data)
         if name in ("", "..") or name in self._attachments or self._attached > MAX_ATTACHED:
-            raise CdrError(f"attachment '{attachment.name}' has no name of its own, or is too large")
+            raise CdrError(f"attachment '{attachment.name}' has a missing or duplicate name, or is too large")
         self._attachments[name] = attachment.data
 
     def _expect(self, values: Mapping[str, str]) -> None:
-        """Prepares for what the recorder says the file holds."""
+        """Prepare for the contents that the metadata declares."""
         try:
             self._contents = contents(values)
         except ValueError as error:
@@ -136,7 +136,7 @@ class _Reader:
             self._types.pop(topic, None)
 
     def chunk(self, record: Record, indexes: Mapping[int, bytes]) -> None:
-        """A chunk; its indexes say whether anything in it is needed yet."""
+        """Register a chunk, and open it if its indexes have needed messages."""
         self._known()
         self._chunks.append(record.offset)
         of = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
@@ -152,17 +152,17 @@ class _Reader:
                 self._newest = int.from_bytes(entries[-16:-8], "little")
 
     def _opened(self, record: Record, needed: Mapping[int, bytes]) -> None:
-        """What the indexes `needed` point at; where there are none, all that is needed."""
+        """Read the messages of the indexes `needed`; without indexes, search the chunk."""
         data = open_chunk(self._path, record)
         places = indexed(data, needed, whole=False)
         if places is None:
-            # The indexes were cut off, or another tool wrote the file.
+            # The indexes are truncated, or another tool wrote the file.
             places, others = walked(data)
             for opcode, body in others:
                 self.declaration(Record(opcode, record.offset, body))
         for channel, found in places.items():
             if channel not in self._channels:
-                raise CdrError(f"it has a message of channel {channel}, which is not declared")
+                raise CdrError(f"a message of channel {channel}, which is not declared")
             topic, _ = self._channels[channel]
             self._heard.add(topic)
             if topic == topics.EVENTS:
@@ -171,28 +171,28 @@ class _Reader:
                 self._newest = int(found.times[-1])
 
     def _known(self) -> Contents:
-        """What the file holds, once it is sure that it holds it."""
+        """The declared contents; raises if they are missing."""
         if self._contents is None:
             raise BadRecording(
                 self._path,
-                f"is not a recording of manipcli: no metadata record '{RECORD}' comes before its messages",
+                f"not a recording of manipcli: no metadata record '{RECORD}' before its messages",
             )
         return self._contents
 
     def recording(self, lost: str | None) -> Recording:
-        """All of it, put together."""
+        """The recording of the records that were read."""
         known = self._known()
         there = {topic for topic, _ in self._channels.values()}
         missing = [f"{topic} ({kind})" for topic, kind in self._types.items() if topic not in there]
         if missing:
-            raise BadRecording(self._path, f"is not a recording of manipcli: it lacks {', '.join(missing)}")
+            raise BadRecording(self._path, f"not a recording of manipcli: missing {', '.join(missing)}")
         for topic, kind in self._channels.values():
             if kind != self._types.get(topic, kind):
                 raise BadRecording(self._path, f"{topic} is not of type {self._types[topic]}")
         if lost is not None and self._newest >= 0:
             lost = f"{lost}; recorded until t = {self._newest / 1e9:.3f} s"
         if REPAIR in self._metadata:
-            repaired = f"it was repaired, and lacks what was lost {self._metadata[REPAIR].get('lost', '')}"
+            repaired = f"repaired with losses {self._metadata[REPAIR].get('lost', '')}"
             lost = repaired if lost is None else f"{repaired}; {lost}"
         return Recording(
             joint_names=known.joints,

@@ -1,4 +1,4 @@
-"""Where to read on behind damage in an MCAP file: by its index, or by how a compressed chunk begins."""
+"""Resynchronisation after damage in an MCAP file, by its index or by the start of a compressed chunk."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 _WINDOW = 1 << 22
 _CHUNK_MARKS = (b"\x04\x00\x00\x00zstd", b"\x03\x00\x00\x00lz4")
-"""Name of the compression with its length, 28 bytes behind the body of a chunk begins."""
+"""Name of the compression with its length, 28 bytes after the start of a chunk body."""
 _MARK_AT = RECORD_HEAD.size + 28
 
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """What the end of a finished file lists; empty where there is no sound one.
+    """Index at the end of a finished file; empty if missing or damaged.
 
     Attributes:
-        offsets: where chunks, attachments and metadata begin.
-        messages: in the whole file; None where it does not say.
-        declared: schemas and channels.
+        offsets: start offsets of chunks, attachments and metadata.
+        messages: number of messages in the file; None if unknown.
+        declared: declared schemas and channels.
     """
 
     offsets: tuple[int, ...] = ()
@@ -35,7 +35,7 @@ class Index:
 
 
 def read_index(file: BinaryIO, size: int) -> Index:
-    """The summary of a finished file; empty where its checksum does not match."""
+    """The index of a finished file; empty if its checksum does not match."""
     from mcap import records
     from mcap.exceptions import McapError
     from mcap.stream_reader import StreamReader
@@ -52,7 +52,7 @@ def read_index(file: BinaryIO, size: int) -> Index:
     offsets: set[int] = set()
     declared: list[Schema | Channel] = []
     messages: int | None = None
-    # A chunk there would be packed; nothing is unpacked.
+    # Chunks are not decompressed here.
     reader = StreamReader(BytesIO(summary + MAGIC), skip_magic=True, emit_chunks=True, record_size_limit=length)
     try:
         for record in reader.records:
@@ -67,11 +67,11 @@ def read_index(file: BinaryIO, size: int) -> Index:
                     offsets.add(record.offset)
     except (McapError, struct.error, UnicodeDecodeError):
         return Index()
-    return Index(tuple(sorted(one for one in offsets if one < start)), messages, tuple(declared))
+    return Index(tuple(sorted(offset for offset in offsets if offset < start)), messages, tuple(declared))
 
 
 def next_chunk(file: BinaryIO, offset: int, size: int) -> int | None:
-    """Where the next compressed chunk begins, at `offset` or behind it."""
+    """Offset of the next compressed chunk at or after `offset`; None without one."""
     at = offset
     while at < size:
         file.seek(at)
@@ -90,7 +90,7 @@ def next_chunk(file: BinaryIO, offset: int, size: int) -> int | None:
 
 
 def _is_chunk(file: BinaryIO, start: int, size: int) -> bool:
-    """Whether the lengths of a chunk that begins at `start`, in the file and in itself, agree."""
+    """Whether the lengths inside a chunk at `start` match the length of its record."""
     file.seek(start)
     head = file.read(RECORD_HEAD.size + 48)
     opcode, length = RECORD_HEAD.unpack_from(head) if len(head) == RECORD_HEAD.size + 48 else (0, 0)

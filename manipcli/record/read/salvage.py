@@ -1,7 +1,6 @@
-"""The content of an MCAP file, whoever wrote it, as far as it is sound.
+"""Recovery of the undamaged content of any MCAP file.
 
-Every part is verified on its own: a chunk and an attachment by their checksums, everything else by whether it can be
-read.
+Every part is verified separately: chunks and attachments by their checksums, other records by decoding them.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     Declared: TypeAlias = Header | Schema | Channel | Attachment | Metadata
 
 LOOSE = 1 << 20
-"""[byte] Messages outside chunks are taken together up to this."""
+"""Largest block of messages outside chunks [byte]."""
 _WORDS = {
     HEADER: "header",
     SCHEMA: "schema",
@@ -48,9 +47,9 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """The messages of one chunk, or messages outside chunks that follow each other: records as they are in `data`.
+    """The messages of one chunk, or consecutive messages outside chunks, as records in `data`.
 
-    `start`, `end`: of its records in the file.
+    `start`, `end`: offsets of its records in the file.
     """
 
     start: int
@@ -61,7 +60,7 @@ class Stretch:
 
 
 class Salvage:
-    """Iterate once over what can be read, in the order of the file; `scan` knows its index and what its end lacks."""
+    """Iterates once over the readable parts in the order of the file; `scan` has its index and what is missing."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -73,7 +72,7 @@ class Salvage:
     def __iter__(self) -> Iterator[Declared | Stretch | Damage]:
         """
         Raises:
-            BadRecording: no MCAP file at all, not readable, or damaged in too many places.
+            BadRecording: not an MCAP file, not readable, or damaged in too many places.
         """
         for record in self.scan:
             if isinstance(record, Damage) or record.opcode != MESSAGE or len(self._loose) >= LOOSE:
@@ -98,7 +97,7 @@ class Salvage:
         self._loose += RECORD_HEAD.pack(record.opcode, len(record.body)) + record.body
 
     def _gathered(self) -> Iterator[Stretch]:
-        """The messages outside chunks so far, as one."""
+        """The collected messages outside chunks, as one block."""
         if self._loose:
             data, start = bytes(self._loose), self._loose_start
             self._loose.clear()
@@ -107,7 +106,7 @@ class Salvage:
     def _read(self, record: Record) -> Iterator[Declared | Stretch]:
         """
         Raises:
-            CdrError: the record is damaged; says what it was.
+            CdrError: the record is damaged; its message names the record.
         """
         if record.opcode in _WORDS:
             yield self._declared(record)
@@ -127,14 +126,14 @@ class Salvage:
     def _declared(self, record: Record) -> Declared:
         self._named += 1
         if self._named > MAX_NAMED:
-            raise BadRecording(self.path, f"declares more than {MAX_NAMED} channels, schemas and attachments")
+            raise BadRecording(self.path, f"more than {MAX_NAMED} channels, schemas and attachments")
         return _declaration(record)
 
 
 def _declaration(record: Record) -> Declared:
     """
     Raises:
-        CdrError: it cannot be read.
+        CdrError: the record cannot be read.
     """
     from mcap import records
     from mcap.data_stream import ReadDataStream, RecordBuilder
@@ -149,19 +148,19 @@ def _declaration(record: Record) -> Declared:
     }
     builder = RecordBuilder()
     try:
-        # The library's readers carry no types.
+        # The readers of the library have no types.
         read: Declared = kinds[record.opcode].read(ReadDataStream(BytesIO(record.body)))
         read.write(builder)
-        # The library's builder carries none either.
-        again: bytes = builder.end()  # type: ignore[no-untyped-call]
+        # The builder of the library has no types.
+        encoded: bytes = builder.end()  # type: ignore[no-untyped-call]
     except (McapError, struct.error, UnicodeError) as error:
         raise CdrError(f"a {_WORDS[record.opcode]}") from error
     name = f"attachment '{read.name}'" if isinstance(read, records.Attachment) else f"a {_WORDS[record.opcode]}"
     if isinstance(read, records.Attachment):
         if int.from_bytes(record.body[-4:], "little") not in (0, zlib.crc32(record.body[:-4])):
             raise CdrError(name)
-        again = again[:-4]
-    # The library takes what is there where less is there than a length says. Later versions of the format may append.
-    if not record.body.startswith(again[RECORD_HEAD.size :]):
+        encoded = encoded[:-4]
+    # The library accepts truncated records, so compare with the encoded record. Later formats can append fields.
+    if not record.body.startswith(encoded[RECORD_HEAD.size :]):
         raise CdrError(name)
     return read

@@ -1,9 +1,9 @@
-"""The records of an MCAP file one after the other, finished or not, whole or damaged, whoever wrote it.
+"""Sequential reader of the records of any MCAP file, finished, unfinished or damaged.
 
-Nothing is believed: lengths, checksums, sizes and the number of damaged places are bounded and verified, and memory
-holds one record at a time. A file whose writer died has no end; it is read up to its last whole record. Damage is
-refused, or, where the reader asks for that, skipped: reading goes on at the next record that fits, found through the
-index at the end of the file where that is sound, and otherwise by the beginning of a compressed chunk.
+The file is untrusted: lengths, checksums, sizes and the number of damaged places are verified and bounded, and memory
+holds one record at a time. A file without an end is read up to its last complete record. Damage is an error, or is
+skipped on request: reading continues at the next valid record, found with the index at the end of the file if that is
+intact, else by the start of a compressed chunk.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ from manipcli.record.records import (
 )
 
 MAX_NAMED = 4096
-"""Channels, schemas, attachments and metadata records in one file."""
+"""Most channels, schemas, attachments and metadata records in one file."""
 MAX_DAMAGED = 256
-"""Places; a file with more of them is not worth the time."""
+"""Most damaged places in one file."""
 _MAX_OPCODE = 0x7F
 R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One record of the data section and where it begins in the file."""
+    """A record of the data section and its offset in the file."""
 
     opcode: int
     offset: int
@@ -52,13 +52,13 @@ class Record:
 
     @property
     def end(self) -> int:
-        """Where the next record begins."""
+        """Offset of the next record."""
         return self.offset + RECORD_HEAD.size + len(self.body)
 
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """Bytes from `start` to `end` of the file that could not be read; `what` was there, as far as one can tell."""
+    """Bytes from `start` to `end` of the file that cannot be read; `what` describes them."""
 
     start: int
     end: int
@@ -67,15 +67,15 @@ class Damage:
 
 @dataclass(slots=True)
 class Scan:
-    """Iterate once over the records of the data section.
+    """Iterates once over the records of the data section.
 
     Attributes:
-        being_written: a file that stops behind a whole record is complete as far as it goes.
-        damaged: damage is yielded, and read past; else it is an error.
-        fault: set by the reader of a record, while it has it: what of it is damaged.
-        size: [byte] of the file.
-        index: what its end says, where damage is read past.
-        lost: afterwards, what is missing at the end, or None.
+        being_written: a file that ends after a complete record is not reported as incomplete.
+        damaged: yield damage and continue after it, instead of raising.
+        fault: damage of the current record, set by its reader.
+        size: size of the file [byte].
+        index: index at the end of the file, if `damaged`.
+        lost: what is missing at the end, known after the iteration, or None.
     """
 
     path: Path
@@ -90,14 +90,14 @@ class Scan:
     def __iter__(self) -> Iterator[Record | Damage]:
         """
         Raises:
-            BadRecording: no MCAP file at all, not readable, or damaged; with `damaged`, in too many places.
+            BadRecording: not an MCAP file, not readable, or damaged (with `damaged`: in too many places).
         """
         with readable(self.path), open_regular(self.path) as file:
             self.size = os.fstat(file.fileno()).st_size
             yield from self._records(file)
 
     def pieces(self) -> Iterator[tuple[Record, Mapping[int, bytes]]]:
-        """The records of a sound file; those of a chunk with the message indexes behind it, by channel."""
+        """The records of an undamaged file; chunks with their message indexes by channel."""
         chunk: Record | None = None
         indexes: dict[int, bytes] = {}
         for record in self:
@@ -113,7 +113,7 @@ class Scan:
             if chunk is None:
                 yield record, {}
         if chunk is not None:
-            # Some of its indexes may have been cut off.
+            # Some of its indexes can be missing.
             yield chunk, {}
 
     def _records(self, file: BinaryIO) -> Iterator[Record | Damage]:
@@ -127,7 +127,7 @@ class Scan:
             if record is not None and record.opcode == DATA_END:
                 changed = record.body not in (crc.to_bytes(4, "little"), bytes(4))
                 if changed and not (self.damaged and (self._places or not finished)):
-                    yield self._damage(0, offset, "something that has no checksum of its own: a name, or metadata")
+                    yield self._damage(0, offset, "a part without its own checksum, such as a name or metadata")
                 self._check_end(file, record.end, finished=finished)
                 return
             self.fault = ""
@@ -139,35 +139,37 @@ class Scan:
                     continue
             following = self._following(file, offset, record) if self.damaged else None
             if following is None and record is None and not finished:
-                self.lost = f"it was not finished, and is cut within the record at byte {offset}"
+                self.lost = f"the file is not finished, truncated in the record at byte {offset}"
                 return
             following = self.size if following is None else following
-            what = self.fault or f"{following - offset} bytes that hold no record"
+            what = self.fault or f"{following - offset} bytes without a record"
             yield self._damage(offset, following, what)
             offset = following
         if finished:
-            self.lost = "its data has no end"
+            self.lost = "the end of its data is missing"
             if not self.damaged:
-                raise BadRecording(self.path, "has an end, but no end of its data")
+                raise BadRecording(self.path, "the end of its data is missing")
         elif not self.being_written:
-            self.lost = "it was not finished"
+            self.lost = "the file is not finished"
 
     def _damage(self, start: int, end: int, what: str) -> Damage:
         if not self.damaged:
-            changed = "its checksum does not match: it was changed after it was written"
+            changed = "checksum mismatch: the file was changed after it was written"
             cause = f"the record at byte {start} is damaged" if start else changed
             raise BadRecording(self.path, cause, hint=REPAIRABLE)
         self._places += 1
         if self._places > MAX_DAMAGED:
-            raise BadRecording(self.path, f"is damaged in more than {MAX_DAMAGED} places")
+            raise BadRecording(self.path, f"damaged in more than {MAX_DAMAGED} places")
         return Damage(start, end, what)
 
     def _record_at(self, file: BinaryIO, offset: int) -> Record | None:
-        """The record that begins there; None where none fits."""
+        """The record at `offset`; None if it is invalid."""
         file.seek(offset)
         opcode, length = _head(file)
         if length > MAX_RECORD and not self.damaged:
-            raise BadRecording(self.path, f"the record at byte {offset} is said to be {length} bytes long")
+            raise BadRecording(
+                self.path, f"the record at byte {offset} declares {length} bytes, the limit is {MAX_RECORD}"
+            )
         highest = DATA_END if self.damaged else _MAX_OPCODE
         if not 0 < opcode <= highest or length > MAX_RECORD or offset + RECORD_HEAD.size + length > self.size:
             return None
@@ -175,23 +177,23 @@ class Scan:
         return Record(opcode, offset, body) if len(body) == length else None
 
     def _check_end(self, file: BinaryIO, start: int, *, finished: bool) -> None:
-        """The summary is not needed to read the data, but it tells whether somebody changed the file."""
+        """Verify the summary, which shows whether the file was changed."""
         if not finished:
             self.lost = "the index at its end is missing"
             return
         if self.damaged:
             return
         if self.size - start > MAX_RECORD:
-            raise BadRecording(self.path, "its summary is too large")
+            raise BadRecording(self.path, f"summary larger than {MAX_RECORD} bytes")
         file.seek(start)
         rest = file.read(self.size - start)
         footer = len(rest) - len(MAGIC) - FOOTER_RECORD.size
         summary_start, crc = FOOTER_RECORD.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
         if summary_start not in (0, start) or crc not in (0, zlib.crc32(rest[: footer + FOOTER_RECORD.size - 4])):
-            raise BadRecording(self.path, "the checksum of its summary does not match: it was changed", hint=REPAIRABLE)
+            raise BadRecording(self.path, "checksum mismatch of the summary: the file was changed", hint=REPAIRABLE)
 
     def _following(self, file: BinaryIO, offset: int, record: Record | None) -> int | None:
-        """Where to read on behind damage at `offset`; None where nothing more is found."""
+        """Offset at which to continue after damage at `offset`; None if there is none."""
         if record is not None:
             behind = self._record_at(file, record.end)
             if record.end == self.size or (behind is not None and behind.opcode != MESSAGE):
@@ -205,24 +207,24 @@ class Scan:
 
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
-    """What the system refuses becomes an error that names the file."""
+    """Convert OS errors to `BadRecording` with the path."""
     try:
         yield
     except OSError as error:
-        raise BadRecording(path, f"cannot be read: {error.strerror or error}") from error
+        raise BadRecording(path, f"cannot read the file: {error.strerror or error}") from error
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """A file to read; opening a pipe would wait for its writer.
+    """Open a regular file for reading; opening a pipe would block.
 
     Raises:
-        BadRecording: it is not a regular file.
-        OSError: it cannot be opened.
+        BadRecording: not a regular file.
+        OSError: the file cannot be opened.
     """
     file = os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb")
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
-        raise BadRecording(path, "is not a regular file")
+        raise BadRecording(path, "not a regular file")
     return file
 
 
@@ -237,10 +239,10 @@ def is_finished(file: BinaryIO, size: int) -> bool:
 
 
 def chunk_at(path: Path, file: BinaryIO, offset: int) -> tuple[Record, dict[int, bytes]]:
-    """A chunk and the message indexes behind it, once more from a file that was scanned before.
+    """Read a chunk and its message indexes from a file that was scanned before.
 
     Raises:
-        BadRecording: it is not there any more.
+        BadRecording: the file changed.
     """
     indexes: dict[int, bytes] = {}
     chunk: Record | None = None
@@ -253,19 +255,19 @@ def chunk_at(path: Path, file: BinaryIO, offset: int) -> tuple[Record, dict[int,
         record = Record(opcode, offset, body)
         if chunk is None:
             if opcode != CHUNK or len(body) < length:
-                raise BadRecording(path, "changed while it was read")
+                raise BadRecording(path, "the file changed while it was read")
             chunk = record
         else:
             try:
                 channel, entries = message_index(record)
-            except (CdrError, struct.error):  # it is damaged, or cut: without all indexes none is used
+            except (CdrError, struct.error):  # damaged or truncated: use no index unless all are valid
                 return chunk, {}
             indexes[channel] = entries
         offset = record.end
 
 
 def guarded(path: Path, record: Record, read: Callable[[Record], R]) -> R:
-    """What `read` makes of a record; damage becomes an error that says where."""
+    """`read(record)`; damage raises `BadRecording` with the offset."""
     from mcap.exceptions import McapError
 
     try:
@@ -276,10 +278,10 @@ def guarded(path: Path, record: Record, read: Callable[[Record], R]) -> R:
 
 
 def message_index(record: Record) -> tuple[int, bytes]:
-    """Channel, and the pairs of log time and offset as they are in the file."""
+    """Channel, and the encoded pairs of log time and offset."""
     channel, length = struct.unpack_from("<HI", record.body)
     if length != len(record.body) - 6 or length % 16:
-        raise CdrError("a message index has another length than it says")
+        raise CdrError("a message index has a wrong length")
     return channel, record.body[6:]
 
 
@@ -287,13 +289,13 @@ def _first_bytes(path: Path, file: BinaryIO) -> bytes:
     file.seek(0)
     start = file.read(len(MAGIC))
     if start != MAGIC:
-        cause = "is empty" if not start else "is no MCAP file (its first bytes are others)"
-        raise BadRecording(path, cause, hint="a recording is an .mcap file that manipcli run has written")
+        cause = "the file is empty" if not start else "not an MCAP file (wrong first bytes)"
+        raise BadRecording(path, cause, hint="use an .mcap file, such as those of `manipcli run`")
     return start
 
 
 def _head(file: BinaryIO) -> tuple[int, int]:
-    """Opcode and length of the next record; (0, 0) where it is cut."""
+    """Opcode and length of the next record; (0, 0) if truncated."""
     head = file.read(RECORD_HEAD.size)
     opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
     return opcode, length

@@ -1,4 +1,4 @@
-"""The spans of a recording, read from its file chunk by chunk whenever somebody goes through them."""
+"""Spans of a recording, read from its file chunk by chunk."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from manipcli.record.selection import common_stride
 
 @dataclass(frozen=True, slots=True)
 class FileSpans:
-    """An iterable of the spans in a file; never more of them than three are in memory.
+    """Iterable of the spans in a file, with at most three in memory.
 
     Attributes:
         path: the file.
-        contents: what it says it holds.
+        contents: declared contents.
         channels: channel id -> topic.
-        chunks: where its chunks begin.
-        cut: whether its end is missing, or parts of it, so that messages of some ticks may be, too.
+        chunks: offsets of its chunks.
+        cut: whether parts of the file are missing, so that messages of some ticks can be missing.
     """
 
     path: Path
@@ -53,7 +53,7 @@ class FileSpans:
     def __iter__(self) -> Iterator[Span]:
         """
         Raises:
-            BadRecording: a chunk is damaged, the parts contradict each other, or time runs backwards.
+            BadRecording: a chunk is damaged, parts are inconsistent, or time runs backwards.
         """
         before: Span | None = None
         span: Span | None = None
@@ -61,7 +61,7 @@ class FileSpans:
             if span is not None:
                 yield _with_velocities(before, span, after)
             before, span = span, after
-        assert span is not None, "there is one span at least"
+        assert span is not None, "at least one span"
         yield _with_velocities(before, span, None)
 
     def _without_velocities(self) -> Iterator[Span]:
@@ -93,21 +93,20 @@ class FileSpans:
 
 
 class _Apart(Exception):
-    """Joints, bodies and controllers were not recorded at the same times, or not as often as the log says; or contacts
-    are missing among others."""
+    """Joints, bodies and controllers have different times or rates than declared, or contacts are missing."""
 
 
 class _SpanReader:
-    """Gathers the messages of successive chunks, and gives them out once a tick is complete.
+    """Collects the messages of successive chunks into complete ticks.
 
-    `gaps`: ticks may be missing.
+    `gaps`: ticks can be missing.
     """
 
     def __init__(self, contents: Contents, channels: Mapping[int, str], *, gaps: bool) -> None:
         n, m = len(contents.joints), len(contents.bodies)
         self._channels = channels
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
-        self._controllers = [one for one in everyone if one.state_topic not in contents.absent]
+        self._controllers = [controller for controller in everyone if controller.state_topic not in contents.absent]
         self._bodies = m
         self._columns = {
             topics.JOINT_STATES: Columns(
@@ -132,18 +131,18 @@ class _SpanReader:
 
     @property
     def ready(self) -> int:
-        """Ticks of which every message is there."""
+        """Number of complete ticks."""
         return min(len(columns) for columns in self._columns.values())
 
     @property
     def waiting(self) -> bool:
-        """Whether there are messages of a tick that is not complete."""
+        """Whether there are messages of an incomplete tick."""
         return any(len(columns) for columns in self._columns.values())
 
     def add(self, data: bytes, places: Mapping[int, Places]) -> None:
         for channel, found in places.items():
             if channel not in self._channels:
-                raise CdrError(f"it has a message of channel {channel}, which is not declared")
+                raise CdrError(f"a message of channel {channel}, which is not declared")
             topic = self._channels[channel]
             if topic in self._columns:
                 common = self._common(found) if self._strided else found
@@ -154,21 +153,21 @@ class _SpanReader:
                 self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in singly(data, found)]
 
     def _follow(self, numbers: Int) -> None:
-        """Contacts hold until the next ones, so that nothing but their numbers tells that some are missing; those that
-        another program wrote again may begin at 0, or all be 0."""
+        """Detect missing contact messages by their sequence numbers, which another program can restart at 0 or set to
+        0."""
         before = min(int(numbers[0]) - 1, 0) if self._number is None else self._number
         if not self._gaps and numbers.any() and not np.all(np.diff(numbers, prepend=before) == 1):
             raise _Apart
         self._number = int(numbers[-1])
 
     def _common(self, places: Places) -> Places:
-        """The messages of the ticks at which every topic has one."""
+        """The messages of the ticks with a message of every topic."""
         ticks = np.rint(places.times / self._grid_ns) * self._grid_ns
-        on = np.abs(places.times - ticks) < 1.0  # [ns] what rounding leaves
+        on = np.abs(places.times - ticks) < 1.0  # [ns] rounding error
         return Places(places.times[on], places.starts[on], places.lengths[on])
 
     def span(self, ticks: int) -> Span:
-        """The next `ticks`, with velocities of bodies left at zero; with 0 ticks, all contacts."""
+        """The next `ticks`, with zero body velocities; with 0 ticks, all contacts."""
         ns, (position, velocity, effort) = self._columns[topics.JOINT_STATES].take(ticks)
         if topics.TF in self._columns:
             body_ns, poses = self._columns[topics.TF].take(ticks)
@@ -193,7 +192,7 @@ class _SpanReader:
         )
 
     def _count(self, ns: Int) -> None:
-        """Ticks begin at 0, and none is left out."""
+        """Check that ticks start at 0 without gaps."""
         ticks = np.concatenate(([self._last], np.rint(ns / self._grid_ns).astype(np.int64)))
         if not self._gaps and not np.all(np.diff(ticks) == 1):
             raise _Apart
@@ -206,7 +205,7 @@ class _SpanReader:
 
 
 def _with_velocities(before: Span | None, span: Span, after: Span | None) -> Span:
-    """The span with velocities of its bodies, for which the ticks next to it are needed."""
+    """The span with body velocities, computed with the adjacent ticks."""
     near = [span.states]
     if before is not None:
         near.insert(0, before.states.map(lambda a: a[-1:]))

@@ -1,4 +1,4 @@
-"""Half a second of a run in numbers, and its encoding as the content of one MCAP chunk."""
+"""Buffer of half a second of a run, and its encoding as one MCAP chunk."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Ticks = slice | Places
 
 @dataclass(frozen=True, slots=True)
 class Single:
-    """A message of its own size that waits for its chunk; `record`: the whole MCAP message record."""
+    """A message of variable size that waits for its chunk; `record` is its whole MCAP message record."""
 
     ns: int
     channel: int
@@ -50,7 +50,7 @@ class Single:
 
 @dataclass(frozen=True, slots=True)
 class ChunkContent:
-    """Message records in the order of time; `indexes`: channel id -> (messages, 2) of log time and offset."""
+    """Message records in time order; `indexes`: channel id -> (messages, 2) of log time and offset."""
 
     data: bytes
     start_ns: int
@@ -60,15 +60,15 @@ class ChunkContent:
 
 Values = Callable[[Ticks], list[Array]]
 _Source = tuple[str, Template, Values]
-"""A topic, the message of a tick, and its numbers at some ticks."""
+"""A topic, the template of its message, and a function of its numbers at some ticks."""
 
 FIELDS: tuple[Interface, ...] = ("position", "velocity", "acceleration", "effort")
 """The order of the fields of a message."""
 
 
 class _ControllerRows:
-    """What one controller put out on the ticks of a block: `rows` (capacity, 3 + k, n), as `ControllerOutput.rows`; NaN
-    where it was not active."""
+    """Output of a controller on the ticks of a block: `rows` (capacity, 3 + k, n) as `ControllerOutput.rows`, NaN while
+    it is inactive."""
 
     def __init__(self, channel: ControllerChannel, robot: RobotModel, capacity: int) -> None:
         self.rows = np.zeros((capacity, REFERENCE_ROWS + len(channel.interfaces), len(channel.joints)))
@@ -77,7 +77,7 @@ class _ControllerRows:
         self._endless = np.array([robot.joint(name).type == "continuous" for name in channel.joints], dtype=bool)
 
     def state(self, at: Ticks, position: Array, velocity: Array, effort: Array) -> list[Array]:
-        """Numbers of the controller's state at some ticks, where all joints (T, n) were measured so."""
+        """Numbers of the controller state at some ticks, from measured joints (T, n)."""
         rows = self.rows[at]
         feedback, speed, force = (a[:, self._columns] for a in (position, velocity, effort))
         outputs = [rows[:, k] for k in self._outputs]
@@ -85,22 +85,22 @@ class _ControllerRows:
         return [*self.reference(at), rows[:, 2], feedback, speed, force, *errors, *outputs]
 
     def reference(self, at: Ticks) -> list[Array]:
-        """What it wants: positions and velocities."""
+        """Reference positions and velocities."""
         rows = self.rows[at]
         return [rows[:, 0], rows[:, 1]]
 
     def errors(self, at: Ticks, position: Array, velocity: Array) -> list[Array]:
-        """What it wants less what is."""
+        """Reference minus measurement."""
         reference, reference_speed = self.reference(at)
         error = reference - position[:, self._columns]
-        # A joint without limits errs the short way round.
+        # The error of a continuous joint is the shorter rotation.
         error[:, self._endless] = wrapped(error[:, self._endless])
         return [error, reference_speed - velocity[:, self._columns]]
 
 
 @dataclass(slots=True)
 class _Group:
-    """The messages of every `stride`-th tick: `values`, for each, gives its numbers at some ticks."""
+    """The messages of every `stride`-th tick; `values` are functions of their numbers at some ticks."""
 
     stride: int
     rows: RowBlock
@@ -108,7 +108,7 @@ class _Group:
     written: int = 0
 
     def fill(self, ticks: Times, times: Times) -> Places:
-        """Encodes what a block holds of them; at which of its ticks."""
+        """Encode its messages of a block; returns their ticks."""
         picked = np.flatnonzero(ticks % self.stride == 0)
         at: Ticks = slice(0, len(ticks)) if self.stride == 1 else picked
         self.rows.fill(times[picked], self.written + 1, [run for values in self.values for run in values(at)])
@@ -117,7 +117,7 @@ class _Group:
 
 
 class Block:
-    """Room for `capacity` ticks. `channels`: those that are recorded."""
+    """Buffer for `capacity` ticks; `channels`: recorded channels."""
 
     def __init__(
         self,
@@ -149,7 +149,7 @@ class Block:
             self._groups.append(_Group(stride, rows, [values for _, _, values in mine]))
 
     def _sources(self, robot: RobotModel, scene: Scene, controllers: Sequence[Recorded]) -> list[_Source]:
-        """Every message that is recorded by the clock; makes room for what controllers put out."""
+        """All periodic messages; allocates the buffers of the controllers."""
         frames = [(joint.parent, joint.child) for joint in robot.moving_joints]
         frames += [(WORLD, body.name) for body in scene.movable]
         ids = self._ids
@@ -191,7 +191,7 @@ class Block:
         return found
 
     def add(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
-        """Copies one tick; the caller may reuse its arrays. The block must not be full."""
+        """Copy one tick; the caller can reuse its arrays. The block must not be full."""
         k = self.count
         self._ticks[k] = tick
         self._numbers[k] = state.numbers
@@ -201,7 +201,7 @@ class Block:
         self.count = k + 1
 
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:
-        """Everything in the block, and `singles` behind the tick of their time; empties the block. None when empty."""
+        """Encode and empty the block, with `singles` after the tick of their time. None if empty."""
         T, self.count = self.count, 0
         ticks = self._ticks[:T]
         times = np.rint(ticks * self._period * 1e9).astype(np.int64)
@@ -226,9 +226,9 @@ class Block:
         return of.errors(at, *self._measured(at)[:2])
 
     def _join(self, times: Times, picked: Sequence[Places], singles: Sequence[Single]) -> ChunkContent:
-        """Rows and singles in the order of time, and where each message stands.
+        """Rows and singles in time order, and the offset of each message.
 
-        A tick has the rows of its groups, the most frequent first, and then the singles up to the next tick.
+        A tick has the rows of its groups, the most frequent first, then the singles up to the next tick.
         """
         T = len(times)
         ns = np.array([single.ns for single in singles], dtype=np.int64)
@@ -247,7 +247,7 @@ class Block:
             at = before[ticks] + within[ticks]
             within[ticks] += group.rows.size
             if len(ticks):
-                # Rows that follow each other without anything between them are one part.
+                # Adjacent rows are one part.
                 breaks = np.flatnonzero(np.diff(at) != group.rows.size) + 1
                 for first, end in pairwise([0, *breaks.tolist(), len(ticks)]):
                     parts.append((int(at[first]), group.rows.bytes[first:end].data))

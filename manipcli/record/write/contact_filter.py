@@ -1,5 +1,5 @@
-"""Which contacts are worth a message: a set of pairs that changed, a knock and its end at once, other forces at most
-100 times a simulated second, small changes at most ten times, so that a force that stays is known closely soon."""
+"""Filter of contact messages: a changed set of pairs and impacts are recorded at once, other changes of force at most
+100 times per simulated second, and small changes at most ten times."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from collections.abc import Sequence
 from manipcli.model.state import Contact
 
 FORCE_PERIOD = 0.01
-"""[s] Forces alone are written no more often than this."""
+"""Shortest time between messages with changes of force only [s]."""
 
 FORCE_SHARE, FORCE_LEAST = 0.1, 0.05
-"""A force has changed when it differs by more than a tenth of what was recorded and by more than 0.05 N."""
+"""A force change is recorded if it exceeds a tenth of the recorded force and 0.05 N."""
 
 STEADY_PERIOD = 0.1
-"""[s] After so long smaller changes count, too:"""
+"""Time after which smaller changes are recorded, too [s]."""
 
 STEADY_SHARE, STEADY_LEAST = 0.01, 0.005
-"""more than a hundredth of what was recorded and more than 0.005 N."""
+"""A small change exceeds a hundredth of the recorded force and 0.005 N."""
 
 KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
-"""Of two forces, recorded and now, the larger is a knock if it is more than the lesser by half of that and 1 N besides:
-that it began, or ended, is written at once."""
+"""An impact: the larger of the recorded and the current force exceeds the smaller one by more than half of it plus 1 N.
+Its start and end are recorded at once."""
 
 DEPTH_LEAST = 2e-4
-"""[m] A pair that is deeper by more than this than what was recorded is written at once."""
+"""Increase of penetration that is recorded at once [m]."""
 
 
 class ContactFilter:
-    """Remembers what was recorded last. The first contacts are always recorded, were there none: a log without any
-    message of them lost its messages."""
+    """Compares contacts with the last recorded ones. The first message is always recorded, even without contacts, so
+    that a log without contact messages is known to be incomplete."""
 
     def __init__(self) -> None:
         self._pairs: list[tuple[str, str]] | None = None
@@ -37,8 +37,8 @@ class ContactFilter:
         self._time = 0.0
 
     def changed(self, time: float, contacts: Sequence[Contact]) -> Sequence[Contact] | None:
-        """What to record of `contacts`, which are sorted by their names, at `time` [s]: all; None when the last message
-        still holds."""
+        """The contacts to record at `time` [s]: all of `contacts`, sorted by name; None if the last message is still
+        valid."""
         pairs = [contact[:2] for contact in contacts]
         if pairs == self._pairs and not self._differs(time, contacts):
             return None

@@ -1,4 +1,4 @@
-"""Goals of controllers as the messages of ROS's actions: which there are, how far they are, how they ended."""
+"""Action messages of the goals of controllers: status, feedback and result."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from manipcli.record.channels import ControllerChannel
 EXECUTING = 2
 _STATUS = {"active": EXECUTING, "succeeded": 4, "canceled": 5, "aborted": 6}
 KEPT_NS = 10 * NS_PER_S
-"""For how long a goal that ended stays in the list of goals."""
+"""Time that an ended goal stays in the status list."""
 _NONE = np.zeros(0)
 
 
 @dataclass(slots=True)
 class _Goal:
-    """A goal: its id, when it was accepted, its status, and when it ended."""
+    """A goal: its id, acceptance time, status, and end time."""
 
     id: bytes
     stamp_ns: int
@@ -31,25 +31,25 @@ class _Goal:
 
 @dataclass(slots=True)
 class GoalLog:
-    """The goals of one controller, numbered from 0; ids follow from its name and the number alone."""
+    """The goals of one controller, numbered from 0; ids depend only on its name and the number."""
 
     channel: ControllerChannel
     _goals: dict[int, _Goal] = field(default_factory=dict)
     _sent: int = 0
 
     def sent(self, ns: int) -> int:
-        """A new goal; its number."""
+        """Add a goal; returns its number."""
         number, self._sent = self._sent, self._sent + 1
         self._goals[number] = _Goal(goal_id(self.channel.name, number), ns)
         return number
 
     def ended(self, ns: int, number: int, result: GoalResult) -> None:
-        """A goal is over."""
+        """Set the result of a goal."""
         goal = self._goals[number]
         goal.status, goal.ended_ns = _STATUS[result.status], ns
 
     def status(self, ns: int) -> bytes:
-        """action_msgs/GoalStatusArray: the goals that are on, and those that ended lately."""
+        """action_msgs/GoalStatusArray: active goals and recently ended goals."""
         self._goals = {
             k: goal for k, goal in self._goals.items() if goal.ended_ns is None or ns - goal.ended_ns <= KEPT_NS
         }
@@ -81,7 +81,7 @@ class GoalLog:
                 writer.float64s(run)
             writer.time(elapsed)
         writer.u32(0)
-        for _ in range(3):  # of joints with several degrees of freedom there are none
+        for _ in range(3):  # no joints with several degrees of freedom
             for _ in range(3):
                 writer.u32(0)
             writer.time(0)

@@ -1,8 +1,8 @@
-"""Writes a run into an MCAP file, cheaply enough for the control loop.
+"""Recorder of a run into an MCAP file, fast enough for the control loop.
 
-`tick` only copies numbers into preallocated blocks. Twice a simulated second a block is encoded in one go: every
-message of a fixed size as rows of bytes, the few others one by one, all in the order of their time, as one compressed
-chunk, which a thread compresses and writes. What has been flushed stays readable whatever happens to the process.
+`tick` only copies numbers into preallocated blocks. Every 0.5 s of simulated time a block is encoded at once: messages
+of fixed size as rows of bytes, the others individually, in time order. A thread compresses and writes it as one chunk.
+Flushed data stays readable if the process is killed.
 
 Times are nanoseconds of simulated time: round(tick * period * 1e9); log time = publish time = header stamp.
 """
@@ -37,22 +37,22 @@ BLOCK_SECONDS = 0.5
 
 
 class Recorder:
-    """One run on its way into `<path>.partial`, which becomes `path` when it is finished.
+    """Records a run into `<path>.partial`, which is renamed to `path` when it is finished.
 
     Args:
-        path: where the recording will be.
-        robot: whose moving joints the joint vectors follow.
-        scene: whose movable bodies the body arrays follow.
-        controllers: in the order of the outputs given to `tick`; None is not recorded.
-        period: [s] of a tick.
+        path: path of the finished recording.
+        robot: robot whose moving joints define the joint vectors.
+        scene: scene whose movable bodies define the body arrays.
+        controllers: in the order of the outputs for `tick`; None is not recorded.
+        period: control period [s].
         attachments: (file name, media type, bytes), written first.
-        metadata: name -> key -> value, what is known before the run.
-        selection: what of it is recorded, and how often.
-        overwrite: replace a recording, or what a killed run left, at this path.
+        metadata: name -> key -> value, known before the run.
+        selection: recorded topics and their rates.
+        overwrite: replace a recording or partial recording at this path.
 
     Raises:
-        RecordingRefused: nothing can or may be written there; nothing was.
-        RecordingFailed: from any method: the disk refused; the partial file keeps what was flushed.
+        RecordingRefused: the path cannot or must not be written.
+        RecordingFailed: from any method, if writing fails; the partial file keeps the flushed data.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Recorder:
         robot: RobotModel,
         scene: Scene,
     ) -> None:
-        """Writes what is known before the first tick."""
+        """Write what is known before the first tick."""
         _declare(self._container, table)
         for name, media_type, data in attachments:
             self._container.attachment(name, media_type, data)
@@ -119,60 +119,60 @@ class Recorder:
 
     @property
     def partial_path(self) -> Path:
-        """The file while it is written."""
+        """Path of the file while it is written."""
         return self._container.partial
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
-        """The state of the world at `tick` and what the controllers put out; the arrays may be reused afterwards."""
+        """Record the state and the controller outputs at `tick`; the arrays can be reused afterwards."""
         if self._block.count == self._block.capacity:
             self._send()
         self._block.add(tick, state, outputs)
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
-        """Everything that touches at `tick`, until the next call; see `contact_filter.py`."""
+        """Record all contacts from `tick` until the next call; see `contact_filter.py`."""
         if self._touches:
             ns = self._ns(tick)
             self._single(topics.CONTACTS, ns, self._contact_encoder.encode(ns, contacts))
 
     def event(self, tick: int, *, kind: str, step: str, verb: str, outcome: str, text: str, place: str) -> None:
-        """Something happened in the task; also said on /rosout."""
+        """Record an event of the task, also on /rosout."""
         ns = self._ns(tick)
         event = TaskEvent(time=ns / 1e9, kind=kind, step=step, verb=verb, outcome=outcome, text=text, place=place)
         self._single(topics.EVENTS, ns, messages.event_message(ns, event))
         self._single(topics.ROSOUT, ns, messages.log_message(ns, event))
 
     def goal_sent(self, tick: int, controller: str) -> int:
-        """A controller accepted a goal before `tick`; its number, by which the log knows it from now on."""
+        """Record that a controller accepted a goal before `tick`; returns its number in the log."""
         ns, goals = self._ns(tick), self._goals[controller]
         number = goals.sent(ns)
         self._single(goals.channel.status_topic, ns, goals.status(ns))
         return number
 
     def goal_feedback(self, tick: int, controller: str, number: int, feedback: Feedback) -> None:
-        """How far a goal is; ROS's action servers tell it 20 times a second."""
+        """Record the feedback of a goal; ROS action servers publish it at 20 Hz."""
         ns, goals = self._ns(tick), self._goals[controller]
         self._single(goals.channel.feedback_topic, ns, goals.feedback(ns, number, feedback))
 
     def goal_ended(self, tick: int, controller: str, number: int, result: GoalResult, feedback: Feedback) -> None:
-        """A goal is over; `feedback`: where it left the joints."""
+        """Record the end of a goal; `feedback`: final state of the joints."""
         ns, goals = self._ns(tick), self._goals[controller]
         goals.ended(ns, number, result)
         self._single(goals.channel.status_topic, ns, goals.status(ns))
         self._single(goals.channel.result_topic, ns, goals.result(ns, result, feedback))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """More metadata behind all that was recorded so far; read back, later keys of a name replace earlier ones."""
+        """Append metadata; when read, later keys of a name replace earlier ones."""
         self.flush()
         self._container.metadata(name, values)
 
     def flush(self) -> None:
-        """Everything given so far is in the partial file when this returns."""
+        """Write everything recorded so far to the partial file."""
         self._send()
         self._written()
 
     def _send(self) -> None:
-        """Encodes what waits and hands it to the thread that compresses and writes, once that is done with what it
-        has: the control loop goes on meanwhile. What the disk refuses is met here or in the next flush."""
+        """Encode the block and hand it to the writer thread after its previous block; write errors are raised here or
+        in the next flush."""
         singles, self._singles = self._singles, []
         content = self._block.encode(singles)
         self._written()
@@ -180,7 +180,7 @@ class Recorder:
             self._writing = self._thread.submit(self._container.chunk, content)
 
     def _written(self) -> None:
-        """Waits for the thread; what it met is raised here. After an interrupted wait it still writes."""
+        """Wait for the writer thread and raise its error; after an interrupted wait it continues to write."""
         writing = self._writing
         if writing is None:
             return
@@ -191,7 +191,7 @@ class Recorder:
                 self._writing = None
 
     def finish(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
-        """Writes the last metadata (the verdict) and the summary, closes the file and gives it its name."""
+        """Write the last metadata (the verdict) and the summary, close the file and rename it."""
         self.flush()
         for name, values in metadata.items():
             self._container.metadata(name, values)
@@ -199,9 +199,9 @@ class Recorder:
         self._thread.shutdown()
 
     def close_partial(self) -> None:
-        """Stops without finishing: everything is flushed, the file keeps the name `*.partial`.
+        """Flush and stop without finishing; the file keeps the name `*.partial`.
 
-        Does nothing once the recording is finished, has stopped or has failed.
+        Does nothing if the recording is finished, stopped or failed.
         """
         if self._container.closed and self._writing is None:
             return
@@ -223,7 +223,7 @@ class Recorder:
 
 
 def _declare(container: Container, table: Sequence[Channel]) -> None:
-    """Schemas, each once, and channels."""
+    """Declare each schema once, and the channels."""
     from mcap.records import Channel as ChannelRecord
     from mcap.records import Schema
 
@@ -247,7 +247,7 @@ def _declare(container: Container, table: Sequence[Channel]) -> None:
 
 
 def _check_names(path: Path, robot: RobotModel, scene: Scene, attachments: Sequence[str]) -> None:
-    """One name is one frame in /tf, and attachments are plain file names."""
+    """Check that frame names are unique in /tf and attachments have plain file names."""
     frames = Counter([messages.WORLD, *(link.name for link in robot.links if link.name != messages.WORLD)])
     frames.update([body.name for body in scene.bodies])
     frames.update([frame.name for frame in scene.frames])
@@ -255,9 +255,9 @@ def _check_names(path: Path, robot: RobotModel, scene: Scene, attachments: Seque
         if times > 1:
             raise RecordingRefused(
                 path,
-                f"'{name}' names more than one frame of robot and scene",
-                hint="give the body or frame of the task another name",
+                f"duplicate frame name '{name}' in robot and scene",
+                hint="rename the body or frame of the task",
             )
     for name, times in Counter(attachments).items():
         if times > 1 or name in ("", "..") or name != Path(name).name or "\0" in name:
-            raise RecordingRefused(path, f"attachment '{name}' needs a plain file name of its own")
+            raise RecordingRefused(path, f"attachment '{name}' needs a unique plain file name")

@@ -1,9 +1,9 @@
-"""Fixed-size messages by the block: one row of bytes a tick, in which only the numbers change.
+"""Encoding of fixed-size messages in blocks: one row of bytes per tick, in which only the numbers change.
 
-Names are constant during a run, so every message of a channel has the same length and each number stands at the same
-place. All such messages of one tick, MCAP message records included, form one row; a block of T rows is an array
-(T, row size) of bytes that holds the constant parts once and for all, and a numpy structured view writes one field of
-all T rows at a time.
+Names are constant during a run, so every message of a channel has the same length and each number has a fixed offset.
+All such messages of one tick, with their MCAP message records, form one row. A block of T rows is an array
+(T, row size) of bytes with the constant parts already filled in; a numpy structured view writes one field of all T
+rows at once.
 
     message record:  opcode u8 | length u64 | channel u16 | sequence u32 | log time u64 | publish time u64 | CDR bytes
 """
@@ -35,7 +35,7 @@ def message_record(channel: int, sequence: int, ns: int, data: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A message with zeros for numbers. `stamps`: offsets of its times; `runs`: (offset, count) of its doubles."""
+    """A message with zeros as numbers. `stamps`: offsets of its times; `runs`: (offset, count) of its doubles."""
 
     channel: int
     data: bytes
@@ -72,7 +72,7 @@ def controller_state_template(channel: int, joints: Sequence[str], interfaces: S
     """control_msgs/JointTrajectoryControllerState.
 
     Runs: reference position, velocity, acceleration; feedback position, velocity, effort; error position, velocity;
-    output, one run an interface, in the order of their fields: position, velocity, acceleration, effort.
+    output, one run per interface, in the order of their fields: position, velocity, acceleration, effort.
     """
     n = len(joints)
     writer = CdrWriter()
@@ -104,7 +104,7 @@ def wrench_template(channel: int, frame: str) -> Template:
 
 
 SENSOR_TEMPLATES: Final[Mapping[str, Callable[[int, str], Template]]] = {schemas.WRENCH: wrench_template}
-"""By type of message: (channel, frame) -> its template, whose first run is the reading."""
+"""Message type -> function of (channel, frame) that returns its template; the first run is the measurement."""
 
 
 class RowBlock:
@@ -112,8 +112,8 @@ class RowBlock:
 
     Attributes:
         channels: channel of each message in a row.
-        starts: where each begins in a row.
-        size: of a row in bytes.
+        starts: offset of each message in a row.
+        size: size of a row [byte].
         bytes: (capacity, size) the rows.
     """
 
@@ -144,7 +144,7 @@ class RowBlock:
         return view
 
     def fill(self, times_ns: Times, first_sequence: int, values: Sequence[Array]) -> None:
-        """Writes the first T rows: times (T,), sequence numbers from `first_sequence` on, and one array (T, count)
+        """Write the first T rows: times (T,), sequence numbers from `first_sequence` on, and one array (T, count)
         for every run of every template, in order."""
         T = len(times_ns)
         sequence = np.arange(first_sequence, first_sequence + T)

@@ -1,6 +1,6 @@
 // Plays one run: draws triangles with WebGL, moves them by the joints and poses of the run, and draws its curves.
 // Everything comes from the page: a JSON head, and arrays packed behind it. Units are SI, quaternions x y z w.
-// The files of this folder are put together, in the order of their names, inside of one function.
+// The files of this folder are concatenated in the order of their names, inside one function.
 "use strict";
 const root = document.currentScript.closest(".mc-player");
 const part = (name) => root.querySelector("[data-part=" + name + "]");

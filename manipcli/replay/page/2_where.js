@@ -1,4 +1,4 @@
-// Where things are: vectors, quaternions, the kinematics of the robot.
+// Vectors, quaternions and the kinematics of the robot.
 
 const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -17,7 +17,7 @@ const turn = (q, v) => {
   return add(add(v, times(t, q[3])), cross(q, t));
 };
 
-// Number of the last time that is not after t, and how far t is on the way to the next, 0 to 1.
+// Index of the last time not after t, and the fraction from it to the next time, 0 to 1.
 function moment(t) {
   let low = 0, high = stamps.length - 1;
   while (high - low > 1) {
@@ -29,7 +29,7 @@ function moment(t) {
   return way >= 1 ? [high, 0] : [low, Math.max(way, 0)];
 }
 
-// Values of row k of a table, on the way to row k + 1.
+// Values of a table interpolated between row k and row k + 1.
 function between(table, width, column, k, way) {
   const a = table[k * width + column];
   return way === 0 ? a : a + way * (table[(k + 1) * width + column] - a);

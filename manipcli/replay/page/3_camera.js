@@ -1,4 +1,4 @@
-// The camera, and how it is moved.
+// The camera and its mouse and touch control.
 
 const camera = { target: [...run.camera.target], distance: 1, yaw: 0, pitch: 0 };
 
@@ -21,7 +21,7 @@ function projection(aspect) {
     right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
     -dot(right, eye), -dot(up, eye), -dot(back, eye), 1,
   ]);
-  // The field of view holds for the shorter side, so that a narrow window shows all, too.
+  // The field of view is that of the shorter side, so that a narrow window shows everything.
   const near = camera.distance / 50, far = camera.distance * 20 + 20;
   const f = (1 / Math.tan((run.camera.field * Math.PI) / 360)) * Math.min(1, aspect);
   const lens = new Float32Array([
@@ -48,16 +48,16 @@ function steer(canvas) {
     if (held.size === 2) spread = apart();
   });
   canvas.addEventListener("pointermove", (event) => {
-    const one = held.get(event.pointerId);
-    if (!one) return;
-    const dx = event.clientX - one.x, dy = event.clientY - one.y;
-    one.x = event.clientX;
-    one.y = event.clientY;
+    const pointer = held.get(event.pointerId);
+    if (!pointer) return;
+    const dx = event.clientX - pointer.x, dy = event.clientY - pointer.y;
+    pointer.x = event.clientX;
+    pointer.y = event.clientY;
     if (held.size === 2) {
       pan(dx / 2, dy / 2);
       camera.distance *= spread / apart();
       spread = apart();
-    } else if (one.pans) {
+    } else if (pointer.pans) {
       pan(dx, dy);
     } else {
       camera.yaw -= dx * 0.008;

@@ -1,4 +1,4 @@
-// The picture.
+// Rendering of the scene.
 
 const SOLID = [`#version 300 es
 in vec3 place; in vec3 normal;
@@ -25,10 +25,10 @@ void main() {
 const LINES = [`#version 300 es
 in vec3 a, b; uniform mat4 all; uniform vec2 window; uniform float width;
 void main() {
-  vec4 one = all * vec4(a, 1.0), other = all * vec4(b, 1.0);
-  vec2 way = (other.xy / other.w - one.xy / one.w) * window;
-  vec2 side = length(way) > 1e-6 ? normalize(vec2(-way.y, way.x)) : vec2(1.0, 0.0);
-  vec4 here = gl_VertexID < 2 ? one : other;
+  vec4 first = all * vec4(a, 1.0), second = all * vec4(b, 1.0);
+  vec2 along = (second.xy / second.w - first.xy / first.w) * window;
+  vec2 side = length(along) > 1e-6 ? normalize(vec2(-along.y, along.x)) : vec2(1.0, 0.0);
+  vec4 here = gl_VertexID < 2 ? first : second;
   here.xy += side * (gl_VertexID % 2 == 0 ? 1.0 : -1.0) * width / window * here.w;
   gl_Position = here;
 }`, `#version 300 es
@@ -110,9 +110,9 @@ function rounds(top) {
 
 function furnish(canvas) {
   gl = canvas.getContext("webgl2", { antialias: true, alpha: true, stencil: true });
-  if (!gl) throw new Error("This browser has no WebGL 2, which the picture needs.");
+  if (!gl) throw new Error("No WebGL 2 in this browser; the 3D view needs it.");
   programs = { solid: program(SOLID), lines: program(LINES), grid: program(GRID) };
-  surfaces = run.surfaces.map((one) => surface(array(one.places), array(one.normals), array(one.faces), one.low, one.size));
+  surfaces = run.surfaces.map((s) => surface(array(s.places), array(s.normals), array(s.faces), s.low, s.size));
   arrow = { shaft: rounds(1), head: rounds(0) };
   const lines = [], R = 4;
   for (let k = -10 * R; k <= 10 * R; k++) {
@@ -133,14 +133,14 @@ function furnish(canvas) {
   }
 }
 
-function solid(one, model, colour) {
+function solid(mesh, model, colour) {
   const at = programs.solid;
   gl.uniformMatrix4fv(at.model, false, model);
   gl.uniform4fv(at.colour, colour);
-  gl.uniform3fv(at.low, one.low);
-  gl.uniform3fv(at.size, one.size);
-  gl.bindVertexArray(one.vao);
-  gl.drawElements(gl.TRIANGLES, one.count, one.type, 0);
+  gl.uniform3fv(at.low, mesh.low);
+  gl.uniform3fv(at.size, mesh.size);
+  gl.bindVertexArray(mesh.vao);
+  gl.drawElements(gl.TRIANGLES, mesh.count, mesh.type, 0);
 }
 
 function pointer(pose, length, radius, colour) {
@@ -177,25 +177,25 @@ function draw(t) {
   gl.useProgram(at.made);
   gl.uniformMatrix4fv(at.all, false, all);
   gl.uniform3fv(at.eye, eye);
-  const opaque = run.drawables.filter((one) => one.rgba[3] >= 1), clear = run.drawables.filter((one) => one.rgba[3] < 1);
+  const opaque = run.drawables.filter((drawable) => drawable.rgba[3] >= 1), clear = run.drawables.filter((drawable) => drawable.rgba[3] < 1);
 
-  // Shadows: everything once more, along the light onto the ground; the stencil keeps overlaps from darkening twice.
+  // Shadows: everything projected onto the ground along the light; the stencil prevents overlaps from darkening twice.
   gl.uniform1f(at.flat_, 1);
   gl.enable(gl.STENCIL_TEST);
   gl.stencilFunc(gl.EQUAL, 0, 255);
   gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
   const [sx, sy] = [SUN[0] / SUN[2], SUN[1] / SUN[2]], g = run.ground;
   const shadow = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, -sx, -sy, 0, 0, sx * g, sy * g, g, 1]);
-  for (const one of opaque) solid(surfaces[one.surface], product(shadow, models[one.frame]), [0.1, 0.13, 0.18, 0.13]);
+  for (const drawable of opaque) solid(surfaces[drawable.surface], product(shadow, models[drawable.frame]), [0.1, 0.13, 0.18, 0.13]);
   gl.disable(gl.STENCIL_TEST);
   gl.uniform1f(at.flat_, 0);
 
   gl.depthMask(true);
-  for (const one of opaque) solid(surfaces[one.surface], models[one.frame], one.rgba);
+  for (const drawable of opaque) solid(surfaces[drawable.surface], models[drawable.frame], drawable.rgba);
   if (shows.frames) {
     const length = 0.045 * camera.distance;
-    for (const one of run.axes) {
-      const pose = axisPose(one, now);
+    for (const axes of run.axes) {
+      const pose = axisPose(axes, now);
       for (let c = 0; c < 3; c++) {
         const direction = turn(pose.q, [c === 0 ? 1 : 0, c === 1 ? 1 : 0, c === 2 ? 1 : 0]);
         pointer(along(pose.p, direction), length, length / 26, [0.85 * (c === 0), 0.65 * (c === 1), 0.95 * (c === 2), 1]);
@@ -211,17 +211,17 @@ function draw(t) {
     }
   }
   gl.depthMask(false);
-  for (const one of clear) solid(surfaces[one.surface], models[one.frame], one.rgba);
+  for (const drawable of clear) solid(surfaces[drawable.surface], models[drawable.frame], drawable.rgba);
   if (shows.ghost && wanted) {
-    const should = poses(wanted, t).map((pose) => matrix(pose)), robot = run.drawables.filter((one) => one.robot);
-    // Its nearest surface only, and behind what lies in the same place.
+    const should = poses(wanted, t).map((pose) => matrix(pose)), robot = run.drawables.filter((drawable) => drawable.robot);
+    // Only its nearest surface, and behind other surfaces at the same place.
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(2, 2);
     gl.depthMask(true);
     gl.colorMask(false, false, false, false);
-    for (const one of robot) solid(surfaces[one.surface], should[one.frame], GHOST);
+    for (const drawable of robot) solid(surfaces[drawable.surface], should[drawable.frame], GHOST);
     gl.colorMask(true, true, true, true);
-    for (const one of robot) solid(surfaces[one.surface], should[one.frame], GHOST);
+    for (const drawable of robot) solid(surfaces[drawable.surface], should[drawable.frame], GHOST);
     gl.disable(gl.POLYGON_OFFSET_FILL);
   }
   if (shows.path && path && path.count > 0) {
@@ -241,25 +241,25 @@ function draw(t) {
   label(all, now);
 }
 
-const axisPose = (one, now) => {
-  const frame = now[one.frame];
-  return one.p ? { p: add(frame.p, turn(frame.q, one.p)), q: mul(frame.q, one.q) } : frame;
+const axisPose = (axes, now) => {
+  const frame = now[axes.frame];
+  return axes.p ? { p: add(frame.p, turn(frame.q, axes.p)), q: mul(frame.q, axes.q) } : frame;
 };
 
 function label(all, now) {
   const tags = part("tags");
   if (shows.frames && !tags.childElementCount) {
-    for (const one of run.axes) {
+    for (const axes of run.axes) {
       const tag = tags.appendChild(document.createElement("div"));
       tag.className = "tag";
-      tag.textContent = one.name;
+      tag.textContent = axes.name;
     }
   }
   tags.hidden = !shows.frames;
   if (!shows.frames) return;
   const { clientWidth: wide, clientHeight: high } = gl.canvas;
-  run.axes.forEach((one, k) => {
-    const { p } = axisPose(one, now), at = [0, 1, 2, 3].map((c) => all[c] * p[0] + all[4 + c] * p[1] + all[8 + c] * p[2] + all[12 + c]);
+  run.axes.forEach((axes, k) => {
+    const { p } = axisPose(axes, now), at = [0, 1, 2, 3].map((c) => all[c] * p[0] + all[4 + c] * p[1] + all[8 + c] * p[2] + all[12 + c]);
     const tag = tags.children[k];
     tag.style.display = at[3] > 0 ? "" : "none";
     tag.style.transform = `translate(${((at[0] / at[3]) * 0.5 + 0.5) * wide + 5}px, ${(0.5 - (at[1] / at[3]) * 0.5) * high + 3}px)`;

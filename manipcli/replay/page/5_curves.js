@@ -1,25 +1,25 @@
-// The curves.
+// The curve plot.
 
 const COLOURS = ["#1769d2", "#d9480f", "#2b8a3e", "#9c36b5", "#c92a2a", "#0b7285", "#e67700", "#5f3dc4", "#495057",
   "#a61e4d", "#087f5b", "#364fc7", "#846358"];
 const plot = { table: 0, column: -1, span: 0 };
 
-// What is plotted: [name, colour, dashed, values of table, column].
+// The plotted curves: [name, colour, dashed, values of table, column].
 function curves() {
   const table = run.curves[plot.table];
   if (!table) return [];
   if (plot.column < 0) return table.columns.map((name, c) => ({ name, colour: COLOURS[c % COLOURS.length], table, c }));
   const name = table.columns[plot.column], found = [{ name, colour: COLOURS[0], table, c: plot.column }];
-  const reference = run.curves.find((one) => one.name === "joint reference");
+  const reference = run.curves.find((table) => table.name === "joint reference");
   if (table.name === "joint position" && reference && reference.columns.includes(name))
     found.push({ name: "reference", colour: COLOURS[1], dashed: true, table: reference, c: reference.columns.indexOf(name) });
   return found;
 }
 
-// Without the sign of what rounds to nothing.
+// Without a negative zero.
 const fixed = (v, digits) => v.toFixed(digits).replace(/^-(?=[0.]+$)/, "");
 
-const value = (one, k) => one.table.values[k * one.table.columns.length + one.c];
+const value = (curve, k) => curve.table.values[k * curve.table.columns.length + curve.c];
 
 function range() {
   if (!plot.span) return [run.start, run.end];
@@ -27,10 +27,10 @@ function range() {
   return [begin, Math.min(begin + plot.span, run.end)];
 }
 
-// A step of 1, 2 or 5 times a power of ten, about `count` of them in `length`.
+// A step of 1, 2 or 5 times a power of ten that divides `length` into about `count` parts.
 function stride(length, count) {
   const raw = length / count, power = 10 ** Math.floor(Math.log10(raw));
-  return power * ([1, 2, 5].find((one) => one * power >= raw) || 10);
+  return power * ([1, 2, 5].find((factor) => factor * power >= raw) || 10);
 }
 
 function drawPlot() {
@@ -43,9 +43,9 @@ function drawPlot() {
   pen.font = "11px system-ui, sans-serif";
   const first = moment(begin)[0], last = Math.min(moment(end)[0] + 1, stamps.length - 1);
   let low = Infinity, top = -Infinity;
-  for (const one of shown)
+  for (const curve of shown)
     for (let k = first; k <= last; k++) {
-      const v = value(one, k);
+      const v = value(curve, k);
       if (v < low) low = v;
       if (v > top) top = v;
     }
@@ -80,14 +80,14 @@ function drawPlot() {
     pen.fillStyle = "#1769d212";
     pen.fillRect(X(active.start), upper, X(active.end) - X(active.start), lower - upper);
   }
-  for (const one of shown) {
-    pen.strokeStyle = one.colour;
-    pen.lineWidth = one.dashed ? 1.2 : 1.5;
-    pen.setLineDash(one.dashed ? [4, 3] : []);
+  for (const curve of shown) {
+    pen.strokeStyle = curve.colour;
+    pen.lineWidth = curve.dashed ? 1.2 : 1.5;
+    pen.setLineDash(curve.dashed ? [4, 3] : []);
     pen.beginPath();
     let on = false;
     for (let k = first; k <= last; k++) {
-      const v = value(one, k);
+      const v = value(curve, k);
       if (Number.isNaN(v)) { on = false; continue; }
       if (on) pen.lineTo(X(stamps[k]), Y(v)); else pen.moveTo(X(stamps[k]), Y(v));
       on = true;
@@ -101,15 +101,15 @@ function drawPlot() {
   pen.restore();
   const legend = part("legend"), [k, fraction] = moment(time);
   while (legend.childElementCount > shown.length) legend.lastChild.remove();
-  shown.forEach((one, c) => {
+  shown.forEach((curve, c) => {
     let entry = legend.children[c];
     if (!entry) {
       entry = legend.appendChild(document.createElement("span"));
       entry.append(document.createElement("i"), document.createElement("span"));
     }
-    const v = between(one.table.values, one.table.columns.length, one.c, k, fraction);
-    entry.firstChild.style.background = one.colour;
+    const v = between(curve.table.values, curve.table.columns.length, curve.c, k, fraction);
+    entry.firstChild.style.background = curve.colour;
     const text = Number.isNaN(v) ? "–" : Math.abs(v) >= 100 ? fixed(v, 1) : fixed(v, Math.abs(v) < 0.1 ? 4 : 3);
-    entry.lastChild.textContent = `${one.name} ${text} ${one.table.units[one.c]}`;
+    entry.lastChild.textContent = `${curve.name} ${text} ${curve.table.units[curve.c]}`;
   });
 }

@@ -1,4 +1,4 @@
-// Time: what is shown when, and playing.
+// The shown time and playback.
 
 let stamps, measured, wanted, bodies, pushFirst, pushes;
 let time = run.start, playing = false, before = 0, waiting = false;
@@ -25,7 +25,7 @@ function refresh() {
     }
     if (gl) draw(time);
     drawPlot();
-    tell();
+    showStatus();
     if (playing) refresh();
   });
 }
@@ -44,8 +44,8 @@ function seek(t) {
   refresh();
 }
 
-function tell() {
-  const step = stepAt(time), phase = step && [...step.phases].reverse().find((one) => one.start <= time + 1e-9);
+function showStatus() {
+  const step = stepAt(time), phase = step && [...step.phases].reverse().find((phase) => phase.start <= time + 1e-9);
   part("now").textContent = step ? step.label : run.name;
   part("phase").textContent = phase ? phase.name : "";
   part("clock").textContent = `${time.toFixed(2)} / ${run.end.toFixed(2)} s`;
@@ -53,11 +53,11 @@ function tell() {
   part("head-line").style.left = `${(100 * (time - run.start)) / (run.end - run.start || 1)}%`;
   track.setAttribute("aria-valuenow", time.toFixed(2));
   track.setAttribute("aria-valuetext", `${time.toFixed(2)} s${step ? ", " + step.label : ""}`);
-  for (const each of root.querySelectorAll("[data-step]"))
-    each.classList.toggle("now", step !== null && run.steps[Number(each.dataset.step)] === step);
+  for (const mark of root.querySelectorAll("[data-step]"))
+    mark.classList.toggle("now", step !== null && run.steps[Number(mark.dataset.step)] === step);
   const button = step && part("steps").children[run.steps.indexOf(step)];
-  if (button && button !== tell.last) {
-    tell.last = button;
+  if (button && button !== showStatus.last) {
+    showStatus.last = button;
     const box = part("steps");
     if (button.offsetTop < box.scrollTop + box.offsetTop || button.offsetTop + button.offsetHeight > box.scrollTop + box.offsetTop + box.clientHeight)
       box.scrollTop = button.offsetTop - box.offsetTop - 4;

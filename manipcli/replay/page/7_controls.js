@@ -1,4 +1,4 @@
-// What can be clicked; and the beginning.
+// Controls, and the start of the player.
 
 function element(parent, kind, name, text = "") {
   const made = parent.appendChild(document.createElement(kind));
@@ -35,11 +35,11 @@ function build() {
     button.title = piece.title;
     element(button, "span", "mark" + (good(step) ? "" : " bad"), good(step) ? "✓" : "✗");
     element(button, "span", "label", step.label);
-    element(button, "span", "phase", step.phases.map((one) => one.name).join(" · "));
+    element(button, "span", "phase", step.phases.map((phase) => phase.name).join(" · "));
     element(button, "span", "when", `${step.start.toFixed(2)} s`);
     button.addEventListener("click", (event) => {
       seek(step.start);
-      // Of a pointer: the next key is for the time, not for this button again.
+      // After a click, keys control the time, not this button.
       if (event.detail) track.focus({ preventScroll: true });
     });
   });
@@ -107,8 +107,8 @@ async function begin() {
   }
   build();
   refresh();
-  // For scripts, and for whoever tests a page.
+  // For scripts and tests.
   root.player = { run, seek, play, poses: (t) => poses(measured, t), get time() { return time; }, get playing() { return playing; } };
 }
 
-begin().catch((error) => complain("The run cannot be shown: " + error.message));
+begin().catch((error) => complain("Cannot show the run: " + error.message));
