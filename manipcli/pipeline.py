@@ -133,7 +133,8 @@ def verify_log(
 
 def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
     task = load_task(path, **options)
-    progress.warned(task.warnings)
+    if task.warnings:
+        progress.warned(task.warnings)
     load_libraries(task)
     return task
 
@@ -141,7 +142,7 @@ def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
 def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task without a plan; and all warnings before the run."""
     try:
-        plan = plan_task(task, on_progress=progress.doing)
+        plan = plan_task(task, on_progress=progress.activity)
     except NotPlannable as refusal:
         return refused(task, refusal), task.warnings
     findings = preflight_findings(task, plan)
@@ -157,6 +158,6 @@ def _record(
     with open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder:
         end, simulating = timed(simulate, task, plan, manager, recorder, progress)
         recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
-        verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, doing=progress.doing)
+        verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))
     return verdict, Timing(plan=end.replanning, simulate=simulating - end.replanning, judge=judging)

@@ -53,44 +53,44 @@ class _Beats:
     def __init__(self, parent: Parent) -> None:
         self.warnings: tuple[Diagnostic, ...] = ()
         self._parent = parent
-        self._doing = ""
+        self._activity = ""
         self._written = ""
         self._at = 0.0
         self._next = 0.0
 
-    def doing(self, what: str) -> None:
+    def activity(self, what: str) -> None:
         """An activity outside of simulated time."""
         self._parent.send(Beat(what))
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
         self.warnings += tuple(findings)
-        self.doing("warnings reported")
+        self.activity("warnings reported")
 
     def judged(self) -> None:
         """The time limit of the run ends here."""
         self._parent.send(Beat("judged", judged=True))
 
-    def told(self, text: str, *, detail: bool) -> None:
+    def message(self, text: str, *, detail: bool) -> None:
         """A step was re-planned, which may have taken long, or is retried."""
-        self._parent.send(Beat(self._doing, self._at, written=self._written))
+        self._parent.send(Beat(self._activity, self._at, written=self._written))
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
-        self._doing = f"step {index + 1} of {total}, '{step.id}'"
+        self._activity = f"step {index + 1} of {total}, '{step.id}'"
         self._written = step.place
-        self._parent.send(Beat(self._doing, written=self._written))
+        self._parent.send(Beat(self._activity, written=self._written))
         self._next = 0.0
 
     def tick(self, simulated_time: float, wall: float) -> None:
         self._at = simulated_time
         if wall >= self._next:
             self._next = wall + BEAT_PERIOD
-            doing = self._doing or "before the first step"
-            self._parent.send(Beat(doing, simulated_time, written=self._written))
+            activity = self._activity or "before the first step"
+            self._parent.send(Beat(activity, simulated_time, written=self._written))
 
     def step_ended(self, outcome: StepOutcome) -> None:
         """The next step begins, or the run is judged."""
-        self._doing = f"after {self._doing}"
-        self._parent.send(Beat(self._doing, self._at, written=self._written))
+        self._activity = f"after {self._activity}"
+        self._parent.send(Beat(self._activity, self._at, written=self._written))
 
 
 def _end_of(job: Job, beats: _Beats) -> End:
@@ -100,7 +100,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     from manipcli.batch.telling import against_baseline, draw, troubles, write_invalid_page, write_page
     from manipcli.record.faults import RecordingFailed
 
-    beats.doing("loading")
+    beats.activity("loading")
     settings = job.settings
     job.log.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -126,14 +126,14 @@ def _end_of(job: Job, beats: _Beats) -> End:
     notes: list[str] = []
     compare = report.verdict.verdict == "passed" and job.nominal and settings.baseline
     if compare and kept_baseline(job.path).exists():
-        beats.doing("comparing with the baseline")
+        beats.activity("comparing with the baseline")
         try:
             found, better = against_baseline(job, report.verdict)
             notes += better
         except InvalidInput as invalid:
             findings, found = invalid.findings, troubles_of(invalid.findings)
     if found and report.log is not None:
-        beats.doing("drawing a picture")
+        beats.activity("drawing a picture")
         notes += _noted(
             "no picture",
             lambda: draw(
@@ -146,7 +146,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
             ),
         )
     if job.page is not None:
-        beats.doing("writing a page")
+        beats.activity("writing a page")
         notes += _noted("no page", lambda: write_page(job, report, found))
     return End(report, findings, found, beats.warnings, tuple(notes))
 

@@ -130,13 +130,13 @@ class Beat:
     """A heartbeat of a run.
 
     Attributes:
-        doing: the current activity.
+        activity: the current activity.
         at: simulated time [s].
         judged: the run has its verdict; only reports are left.
         written: place of the current step, as in the log.
     """
 
-    doing: str
+    activity: str
     at: float | None = None
     judged: bool = False
     written: str = ""
@@ -147,7 +147,7 @@ class Beat:
         return Place(file, int(line), int(column)) if int(line) > 0 else None
 
     def __str__(self) -> str:
-        return self.doing if self.at is None else f"{self.doing} at {self.at:.2f} s"
+        return self.activity if self.at is None else f"{self.activity} at {self.at:.2f} s"
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,7 +81,7 @@ def run_job(job: Job, *, observer: Callable[[Beat], None] | None = None, command
             if report is not None:
                 return report
             if observer is not None:
-                observer(process.doing)
+                observer(process.activity)
     except BaseException:
         process.forget()
         raise
@@ -93,7 +93,7 @@ class Process:
     Attributes:
         job: the job.
         connection: readable when the process has sent a message or has exited.
-        doing: its last heartbeat.
+        activity: its last heartbeat.
     """
 
     def __init__(self, job: Job, *, command: tuple[str, ...]) -> None:
@@ -110,7 +110,7 @@ class Process:
         self.job = job
         job.output.parent.mkdir(parents=True, exist_ok=True)
         self._output = _locked(job.output)
-        self.doing = Beat("starting")
+        self.activity = Beat("starting")
         self._end: End | None = None
         self._judged: float | None = None
         self.connection: Connection[Job, Message]
@@ -160,7 +160,7 @@ class Process:
                 if isinstance(message, End):
                     self._end = message
                 else:
-                    self.doing = message
+                    self.activity = message
                     self._judged = self._heard if message.judged else self._judged
         except BlockingIOError:
             return self.give_up("it stopped in the middle of a message")
@@ -177,7 +177,7 @@ class Process:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(LAST_WORDS)
         self.end()
-        return self._report("hung", f"hung: {why or limit}; {self.doing}")
+        return self._report("hung", f"hung: {why or limit}; {self.activity}")
 
     def end(self) -> None:
         """Kills the process, without a report."""
@@ -200,7 +200,7 @@ class Process:
             if code < 0:
                 cause = f"crashed by {signal_name(-code)}"
                 hint = "; check that there is enough memory" if -code == signal.SIGKILL else ""
-                return self._report("crashed", f"{cause}; {self.doing}{hint}")
+                return self._report("crashed", f"{cause}; {self.activity}{hint}")
             return self._report("crashed", f"ended with exit code {code} before it was done: {self._last_line()}")
         if end.report is None and end.troubles:
             return self._report("error", end.troubles[0].message, end=end)
@@ -214,7 +214,7 @@ class Process:
     def _report(self, outcome: CaseWord, text: str, *, end: End | None = None, verb: str = "run") -> CaseReport:
         job, took = self.job, self.elapsed
         if end is None:
-            end = End(None, troubles=(Trouble(text, self.doing.place(job.case.file), self.doing.at),))
+            end = End(None, troubles=(Trouble(text, self.activity.place(job.case.file), self.activity.at),))
         unfinished = outcome in ("crashed", "hung") or (outcome == "error" and end.report is None)
         if outcome == "passed" and not job.settings.keep_logs:
             job.log.unlink(missing_ok=True)

@@ -45,7 +45,7 @@ class StepProgress:
         if self._live:
             console.redraw("")
 
-    def doing(self, what: str) -> None:
+    def activity(self, what: str) -> None:
         """Prints nothing: these activities are short."""
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
@@ -62,7 +62,7 @@ class StepProgress:
         if self._verbose and not self._live and not self._quiet:
             console.talk(f"{self._head}: started")
 
-    def told(self, text: str, *, detail: bool) -> None:
+    def message(self, text: str, *, detail: bool) -> None:
         """Prints an unplanned event of the current step; a `detail` only with --verbose."""
         if self._quiet or (detail and not self._verbose):
             return

@@ -25,9 +25,9 @@ class Drawn:
 
     def __str__(self) -> str:
         """`sample 17: scene.cup.at=[0.7612, 0.00312], scene.cup.mass=0.2311`, at most `MOST_SHOWN` values."""
-        return self.told(MOST_SHOWN)
+        return self.described(MOST_SHOWN)
 
-    def told(self, most: int | None = None) -> str:
+    def described(self, most: int | None = None) -> str:
         """The same with at most `most` values; None: all."""
         first = [f"{path}={value_text(value)}" for path, value in self.values[:most]]
         rest = len(self.values) - len(first)

@@ -13,19 +13,19 @@ from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span
 
 
-def judge_log(path: Path, *, being_written: bool = False, doing: Callable[[str], None] = lambda _: None) -> Verdict:
+def judge_log(path: Path, *, being_written: bool = False, activity: Callable[[str], None] = lambda _: None) -> Verdict:
     """The verdict on a log, from the log alone; a stored verdict is ignored.
 
     Args:
         path: the log, or the partial log of a killed run.
         being_written: the run that writes the log has just flushed it, so its missing end is not a loss.
-        doing: called with `"judging"` for each span.
+        activity: called with `"judging"` for each span.
 
     Raises:
         InvalidInput: the file is not a log of manipcli, is damaged, or lacks attachments.
     """
     recording = open_recording(path, being_written=being_written)
-    return judge_recording(replace(recording, spans=_Watched(recording.spans, doing)), path)
+    return judge_recording(replace(recording, spans=_Watched(recording.spans, activity)), path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,11 @@ class _Watched:
     """Spans with a callback for each one read."""
 
     spans: Iterable[Span]
-    doing: Callable[[str], None]
+    activity: Callable[[str], None]
 
     def __iter__(self) -> Iterator[Span]:
         for span in self.spans:
-            self.doing("judging")
+            self.activity("judging")
             yield span
 
 

@@ -86,28 +86,31 @@ def open_log(
         (SCENE, JSON, scene_to_json(task.true.scene)),
         (PLAN_FILE, JSON, plan.outline.to_json()),
     ]
-    recorder = Recorder(
-        path,
-        robot=task.robot,
-        scene=task.true.scene,
-        controllers=[recorded(controller) for controller in manager.controllers],
-        period=task.spec.simulation.control_period,
-        attachments=[
-            *attachments,
-            *((file.attachment, BYTES, file.path.read_bytes()) for file in embedded),
-        ],
-        metadata={
-            "run": run_metadata(task),
-            **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
-            "versions": {"manipcli": __version__, engine.name: engine.version()},
-            "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},
-            "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
-            **({EMBEDDED: {file.uri: file.attachment for file in embedded}} if embedded else {}),
-        },
-        selection=Selection(task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out),
-        overwrite=overwrite,
-    )
+    recorder = None
     try:
+        recorder = Recorder(
+            path,
+            robot=task.robot,
+            scene=task.true.scene,
+            controllers=[recorded(controller) for controller in manager.controllers],
+            period=task.spec.simulation.control_period,
+            attachments=[
+                *attachments,
+                *((file.attachment, BYTES, file.path.read_bytes()) for file in embedded),
+            ],
+            metadata={
+                "run": run_metadata(task),
+                **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
+                "versions": {"manipcli": __version__, engine.name: engine.version()},
+                "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},
+                "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
+                **({EMBEDDED: {file.uri: file.attachment for file in embedded}} if embedded else {}),
+            },
+            selection=Selection(
+                task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out
+            ),
+            overwrite=overwrite,
+        )
         yield recorder
     except RecordingFailed as failure:
         simulation = task.spec.simulation
@@ -119,7 +122,8 @@ def open_log(
         }
         raise
     finally:
-        recorder.close_partial()
+        if recorder is not None:
+            recorder.close_partial()
 
 
 def run_metadata(task: Task, **end: str) -> dict[str, str]:

@@ -328,7 +328,7 @@ class StepLoop:
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
 
     def _report(self, text: str, *, detail: bool) -> None:
-        self._progress.told(text, detail=detail)
+        self._progress.message(text, detail=detail)
 
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
         self._recorder.event(

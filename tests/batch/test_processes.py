@@ -250,8 +250,8 @@ def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     seen: list[str] = []
 
     def interrupt(beat: Beat) -> None:
-        seen.append(beat.doing)
-        if beat.doing.isdecimal():
+        seen.append(beat.activity)
+        if beat.activity.isdecimal():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

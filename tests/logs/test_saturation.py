@@ -26,7 +26,7 @@ class Listener:
     def __init__(self) -> None:
         self.doubts: list[Diagnostic] = []
 
-    def doing(self, what: str) -> None: ...
+    def activity(self, what: str) -> None: ...
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
         self.doubts += findings

@@ -169,14 +169,14 @@ class Stopping:
         self._at, self._error = at, error
         self.heard: list[str] = []
 
-    def doing(self, what: str) -> None:
+    def activity(self, what: str) -> None:
         self.heard.append(what)
 
     def warned(self, findings: object) -> None: ...
 
     def step_started(self, step: object, index: int, total: int) -> None: ...
 
-    def told(self, text: str, *, detail: bool) -> None: ...
+    def message(self, text: str, *, detail: bool) -> None: ...
 
     def tick(self, simulated_time: float, wall: float) -> None:
         if simulated_time >= self._at:

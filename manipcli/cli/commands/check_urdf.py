@@ -94,7 +94,7 @@ def check_urdf(
     inspection = inspect(path)
     if fix:
         inspection = _mended(inspection, inspect, in_place=in_place, force=force)
-    findings = inspection.told(codes)
+    findings = inspection.reported(codes)
     failing = ("error", "warning") if strict else ("error",)
     passed = not any(finding.severity in failing for finding in findings)
     console.result(_rendered(inspection, findings, codes, format_, passed=passed, tree=tree))

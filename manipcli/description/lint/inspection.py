@@ -32,7 +32,7 @@ class Inspection:
     summary: Summary | None
     tree: tuple[str, ...]
 
-    def told(self, codes: Collection[str]) -> tuple[Diagnostic, ...]:
+    def reported(self, codes: Collection[str]) -> tuple[Diagnostic, ...]:
         """The findings with these codes; all findings if the file could not be read."""
         findings = self.examination.findings
         if self.examination.parts is None:

@@ -55,7 +55,7 @@ def head(page: RunPage) -> Markup:
         "header",
         element("div", element("h1", verdict.task), word, class_="title"),
         element("p", verdict.text, class_="subtitle") if good or not page.causes else None,
-        element("p", verdict.drawn.told()) if verdict.drawn is not None else None,
+        element("p", verdict.drawn.described()) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),
     )

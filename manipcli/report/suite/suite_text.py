@@ -69,7 +69,7 @@ def beforehand(report: CaseReport, *, whole: bool = False) -> list[str]:
     warned = [line for warning in report.warnings for line in describe(warning).split("\n")]
     if report.drawn is None:
         return warned
-    return [report.drawn.told() if whole else str(report.drawn), *warned]
+    return [report.drawn.described() if whole else str(report.drawn), *warned]
 
 
 def judged_lines(report: CaseReport) -> list[str]:
