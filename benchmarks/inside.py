@@ -25,7 +25,7 @@ from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.pipeline import run_task
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import joint_path
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime

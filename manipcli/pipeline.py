@@ -30,9 +30,9 @@ from manipcli.run.observer import SILENT, Progress
 from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, verdict_metadata
 from manipcli.task.controller_rows import controllers_of
 from manipcli.task.load_task import LoadOptions, load_task
+from manipcli.task.load_view import load_sight
 from manipcli.task.plan_task import Plan, plan_task, refused
 from manipcli.task.task import Task
-from manipcli.task.viewed import load_sight
 from manipcli.task.vocabulary import meanings
 
 __all__ = [

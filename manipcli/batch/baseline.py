@@ -19,7 +19,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
-from manipcli.report.quantity import quantity
+from manipcli.report.display_quantity import quantity
 from manipcli.spec.baseline import ToleranceSpec
 
 DIGITS: Final = 6

@@ -97,7 +97,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     """Runs a job; writes its log and, where requested, its picture and page."""
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
-    from manipcli.batch.telling import against_baseline, draw, troubles, write_invalid_page, write_page
+    from manipcli.batch.failure_report import against_baseline, draw, troubles, write_invalid_page, write_page
     from manipcli.record.faults import RecordingFailed
 
     beats.activity("loading")

@@ -38,7 +38,7 @@ DRAWING = """
 import json, sys
 sys.path[:], log, picture, packages, outside = json.loads(sys.argv[1])
 from pathlib import Path
-from manipcli.batch.telling import draw
+from manipcli.batch.failure_report import draw
 draw(Path(log), Path(picture), package_path=[Path(path) for path in packages], allow_outside=outside)
 """
 """Draws the partial log of a run that did not end."""
@@ -283,7 +283,7 @@ def _no_process(job: Job, why: str) -> CaseReport:
 
 
 def _unreadable(job: Job) -> CaseReport:
-    from manipcli.batch.telling import write_invalid_page
+    from manipcli.batch.failure_report import write_invalid_page
 
     findings = job.case.findings
     notes: tuple[str, ...] = ()

@@ -141,7 +141,7 @@ class Outputs:
         file = task or log
         if file is None or not self.wanted:
             return
-        from manipcli.logs.invalid import invalid_page, invalid_verdict
+        from manipcli.logs.invalid_input import invalid_page, invalid_verdict
         from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
 

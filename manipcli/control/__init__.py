@@ -10,8 +10,8 @@ from manipcli.control.controllers.gripper import GripperController
 from manipcli.control.controllers.joint_state_broadcaster import JointStateBroadcaster
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.controllers.pid import PidController
+from manipcli.control.limit_laws import limit_acceleration, limit_effort, limit_position, limit_velocity
 from manipcli.control.limiter import JointLimiter, NotFinite
-from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Pid
 from manipcli.control.trajectory_goal import JointTolerance, TrajectoryGoal

@@ -15,13 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
-from manipcli.control.limits import (
-    LimitArrays,
-    limit_acceleration,
-    limit_effort,
-    limit_position,
-    limit_velocity,
-)
+from manipcli.control.limit_laws import LimitArrays, limit_acceleration, limit_effort, limit_position, limit_velocity
 from manipcli.control.saturation import (
     ACCELERATION,
     EFFORT,

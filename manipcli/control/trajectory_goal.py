@@ -10,7 +10,7 @@ from typing import Final, get_args
 import numpy as np
 
 from manipcli.control.action import ErrorCode, GoalRejected
-from manipcli.control.limits import limit_array
+from manipcli.control.limit_laws import limit_array
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, told_apart
 from manipcli.description.elements import JointLimits, JointType

@@ -38,7 +38,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class SoftLimits:
-    """Soft limits of a joint (URDF's safety_controller); `control/limits.py` implements them.
+    """Soft limits of a joint (URDF's safety_controller); `control/limit_laws.py` implements them.
 
     Attributes:
         lower, upper: [rad or m]; None: no soft limit on this side.

@@ -9,7 +9,7 @@ from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
 from manipcli.judge.drawn import SAMPLE, Drawn
-from manipcli.judge.examine import examine
+from manipcli.judge.evaluate import examine
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at

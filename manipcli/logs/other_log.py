@@ -15,8 +15,8 @@ import numpy as np
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
 from manipcli.core.text import did_you_mean, listed
-from manipcli.description.description import unread_description
 from manipcli.description.elements import Joint
+from manipcli.description.expanded import unread_description
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.model.build_robot import bare_robot

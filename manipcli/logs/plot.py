@@ -18,11 +18,11 @@ from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.foreign.fields import FieldName, Part, UnknownField, Way, numbers, parse_field, short, ways
+from manipcli.record.foreign.field_units import JointUnits, joint_units, unit_of
 from manipcli.record.foreign.namespaces import meant
 from manipcli.record.foreign.series import Series, Wanted, read_series
+from manipcli.record.foreign.topic_fields import FieldName, Part, UnknownField, Way, numbers, parse_field, short, ways
 from manipcli.record.foreign.topics import Topic, Topics, open_topics
-from manipcli.record.foreign.units import JointUnits, joint_units, unit_of
 from manipcli.record.read.reading import open_recording
 from manipcli.record.schemas import CONTROLLER_STATE
 from manipcli.replay.curves import Chart, Curve, Interval, Panel

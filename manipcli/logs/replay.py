@@ -21,8 +21,8 @@ from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.foreign.origin import is_own
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import TaskEvent
+from manipcli.replay.display_sampling import sampled
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
-from manipcli.replay.sampling import sampled
 
 
 def open_playback(

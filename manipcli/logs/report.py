@@ -23,7 +23,7 @@ from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import RATE, Playback
-from manipcli.report.quantity import quantity
+from manipcli.report.display_quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
 from manipcli.spec.base import Model

@@ -20,9 +20,9 @@ from manipcli.record.attachments import URDF
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned
+from manipcli.record.foreign.field_units import joint_units
 from manipcli.record.foreign.snapshot import snapshot
 from manipcli.record.foreign.topics import Topics, open_topics
-from manipcli.record.foreign.units import joint_units
 from manipcli.record.messages import WORLD
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent

@@ -9,8 +9,8 @@ from pathlib import Path
 from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
-from manipcli.description.description import unread_description
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
+from manipcli.description.expanded import unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages

@@ -94,9 +94,9 @@ def _behind(hand: Array, body: Array, travel: float) -> bool:
 class Grasp:
     """Tracks the object in the hand to decide whether the hand carries it.
 
-    The point that is followed is fixed to the object: the one that was at the tool when the hand closed. An object that
-    pivots between the fingers is carried; `slip` measures how far it slips or rotates there. Its motion counts since the
-    hand closed, and since the step began.
+    It follows the point of the object that was at the tool when the hand closed, so that an object that pivots between
+    the fingers is carried; `slip` measures how far it slips or rotates there. The motion counts since the hand closed,
+    and since the step began.
 
     Args:
         kinematics, scene: of the world that is measured.

@@ -12,8 +12,8 @@ from manipcli.core.units import describe
 from manipcli.description.elements import Joint
 from manipcli.model.robot import Group
 from manipcli.spec.base import Model
+from manipcli.spec.block_fields import Held, children, unit_of
 from manipcli.spec.expression import quantity_of
-from manipcli.spec.fields import Held, children, unit_of
 from manipcli.spec.located import Source
 from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode, child, shown
 

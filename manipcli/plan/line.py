@@ -10,10 +10,10 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.limit_check import overshoot, verify
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.retimer import retime
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.plan.verify import overshoot, verify
 
 Walk = Callable[[InverseKinematics], Array]
 """The joint path (k, n) along a line, as this solver finds it."""

@@ -18,17 +18,17 @@ from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.sampling import LONGEST
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
-from manipcli.plan.verify import verify
+from manipcli.plan.trajectory_sampling import LONGEST
 
 GRAZE = 1e-4
 """[m] How much nearer than before a withdrawing finger may come: rounding, and the arm's own curve."""

@@ -15,7 +15,7 @@ from manipcli.core.geometry import Transform
 from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, CollisionQuery, Pair, pairs
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import arm_joints
+from manipcli.plan.claimed_joints import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.motion import PlanningState

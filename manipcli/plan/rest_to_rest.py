@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.plan.limits import MotionLimits
-from manipcli.plan.sampling import on_ticks, refuse_endless
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import on_ticks, refuse_endless
 
 
 def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits, *, period: float) -> JointTrajectory:

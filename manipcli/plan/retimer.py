@@ -24,10 +24,10 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.sampling import on_ticks, refuse_endless
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import on_ticks, refuse_endless
 
 _GRID = 300, 500  # fewest and most grid points: 300 cost 0.12 % of time against 1000 (100: 0.7 %), at 7 ms
 _PER_WAYPOINT = 4  # grid points between two waypoints, up to the most

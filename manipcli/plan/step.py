@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 from manipcli.conditions.condition import Problem
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims
+from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.motion import PlanningState, StepPlan, Switch
 from manipcli.plan.planner import Planner
 from manipcli.scene.scene import Scene

@@ -11,8 +11,8 @@ from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import ramp
 from manipcli.plan.motion import Grip, PlanningState
 from manipcli.plan.planner import Planner
-from manipcli.plan.sampling import LONGEST
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import LONGEST
 
 
 def grip_time(planner: Planner, state: PlanningState, grip: Grip) -> float:

@@ -13,7 +13,7 @@ from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.inspection import DESCRIPTIONS, inspect
 from manipcli.plan.steps import STEPS
 from manipcli.preflight.findings import preflight_findings
-from manipcli.preflight.named_poses import pose_findings
+from manipcli.preflight.pose_overlaps import pose_findings
 from manipcli.scene.build_scene import SHAPES
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load

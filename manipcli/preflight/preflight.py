@@ -19,7 +19,7 @@ from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import Array
 from manipcli.model.configuration import named_configurations, with_mimics
 from manipcli.model.kinematics import Kinematics
-from manipcli.plan.claims import Claims
+from manipcli.plan.claimed_joints import Claims
 from manipcli.spec.controllers import GainsSpec, Interface
 from manipcli.task.plan_task import Plan, start_position
 from manipcli.task.switches import active_in

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from manipcli.core.text import escape
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report.quantity import quantity
+from manipcli.report.display_quantity import quantity
 from manipcli.report.run_page import Written
 from manipcli.report.text import how_wrong
 

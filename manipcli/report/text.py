@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, one_line
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report.quantity import quantity
+from manipcli.report.display_quantity import quantity
 from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 

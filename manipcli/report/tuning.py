@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 
-from manipcli.control.tuning import MARGIN, StepAnswer, Tuned, Wish
+from manipcli.control.gain_design import MARGIN, StepAnswer, Tuned, Wish
 from manipcli.report.table import table
 
 

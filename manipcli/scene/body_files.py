@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Transform, frozen
-from manipcli.description.description import read_description
 from manipcli.description.elements import Inertial
+from manipcli.description.expanded import read_description
 from manipcli.description.lint.rigid import box_about
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import read_parts

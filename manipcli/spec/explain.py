@@ -37,7 +37,7 @@ from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.core.units import ANGLE, readable
 from manipcli.spec import hints
-from manipcli.spec.fields import unit_of
+from manipcli.spec.block_fields import unit_of
 from manipcli.spec.quantity import Unit
 from manipcli.spec.source import shape
 from manipcli.spec.source.tree import (

@@ -15,10 +15,10 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, no_hand
-from manipcli.plan.names import UnknownPosture
+from manipcli.plan.claimed_joints import Claims, no_hand
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.move import MoveSpec
+from manipcli.plan.unknown_names import UnknownPosture
 from manipcli.scene.scene import Scene
 from manipcli.scene.scene_names import RESERVED
 from manipcli.simulate.engines import ENGINES

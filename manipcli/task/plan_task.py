@@ -13,7 +13,7 @@ from manipcli.core.geometry import Array
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.configuration import configuration
-from manipcli.plan.claims import Claims
+from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.grasp_backtracking import GraspBacktracking
 from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.motion import PlanningState, StepPlan

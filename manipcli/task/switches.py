@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from manipcli.conditions.condition import Problem
 from manipcli.control.lifecycle import ControllerState, decided
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claim, Claims
+from manipcli.plan.claimed_joints import Claim, Claims
 from manipcli.plan.motion import Switch
 from manipcli.plan.steps import STEPS
 from manipcli.spec.task import StepSpec

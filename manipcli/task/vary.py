@@ -24,9 +24,9 @@ from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
 from manipcli.judge.drawn import Drawn, Number
+from manipcli.spec.block_fields import bounds_of, children, unit_of
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import quantity_of
-from manipcli.spec.fields import bounds_of, children, unit_of
 from manipcli.spec.located import Area, Located
 from manipcli.spec.quantity import Unit
 from manipcli.spec.robot import RobotSpec

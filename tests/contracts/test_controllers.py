@@ -19,7 +19,7 @@ from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
-from manipcli.plan.claims import Claims, unfollowed
+from manipcli.plan.claimed_joints import Claims, unfollowed
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from manipcli.control.gain_design import step_answer
 from manipcli.control.stability import Loop, transition
-from manipcli.control.tuning import step_answer
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.2, 9.0, 11.0, 50.0])

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.description.description import read_description
 from manipcli.description.elements import JointLimits, SoftLimits
+from manipcli.description.expanded import read_description
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_robot import bare_robot, build_robot

@@ -8,7 +8,7 @@ import pytest
 from manipcli.core.geometry import Transform
 from manipcli.description.elements import Mimic
 from manipcli.model.robot import RobotModel, Tool
-from manipcli.plan.claims import arm_joints
+from manipcli.plan.claimed_joints import arm_joints
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))
 FINGERS = ("finger_left_joint", "finger_right_joint")

@@ -12,8 +12,8 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.limits import MotionLimits
 from manipcli.plan.line import timed_line
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import joint_path, linear_path
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from manipcli.conditions.condition import unknown_body
-from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
+from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
 
 Make = Callable[..., Any]  # fixture of conftest.py: a Bench of a robot and a scene
 

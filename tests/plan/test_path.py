@@ -11,10 +11,10 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.limit_check import verify
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import follow_poses, interpolate, joint_path, linear_path
 from manipcli.plan.retimer import retime
-from manipcli.plan.verify import verify
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))
 

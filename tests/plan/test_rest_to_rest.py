@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from manipcli.core.errors import NotPlannable
 from manipcli.model.robot import RobotModel
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.limit_check import verify
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.verify import verify
 
 PERIOD = 1e-3
 

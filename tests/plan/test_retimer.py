@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.limit_check import verify
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import joint_path
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
-from manipcli.plan.verify import verify
 
 PERIOD = 1e-3
 JOINTS = ("a", "b", "c")
@@ -123,7 +123,7 @@ def test_two_waypoints_are_the_straight_move_and_one_is_a_rest(make_arm7: Callab
 def test_matplotlib_is_not_imported_for_it_and_stays_importable(after: str) -> None:
     program = (
         "import sys, numpy as np\n"
-        "from manipcli.plan.limits import MotionLimits\n"
+        "from manipcli.plan.motion_limits import MotionLimits\n"
         "from manipcli.plan.path import joint_path\n"
         "from manipcli.plan.retimer import retime\n"
         "one = np.ones(1)\n"

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import joint_path
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
-from manipcli.plan.sampling import LONGEST
+from manipcli.plan.trajectory_sampling import LONGEST
 
 JOINTS = ("a", "b", "c")
 CURVED = np.array([[0.0, 0.0, 0.0], [0.5, -0.4, 0.3], [0.2, 0.6, -0.2], [1.0, 0.3, 0.4]])

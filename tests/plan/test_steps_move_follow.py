@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from manipcli.model.collision import CollisionHit
 from manipcli.plan.hand import pressing
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.follow import FollowSpec
 from manipcli.plan.steps.move import MoveSpec

@@ -11,7 +11,7 @@ from manipcli.description.elements import Link
 from manipcli.model.robot import RobotModel
 from manipcli.replay.drawing import bones, draw
 from manipcli.shapes.primitives import Geometry, Mesh
-from manipcli.task.viewed import load_sight
+from manipcli.task.load_view import load_sight
 
 ROOT = Path(__file__).parents[2]
 GONE = Mesh("package://gone/link.stl", Path("/nowhere/link.stl"))

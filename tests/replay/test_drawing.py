@@ -16,7 +16,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.replay.drawing import COLLISION, PLAIN, draw, inertia_box, shape_surfaces
 from manipcli.replay.placing import Placing
 from manipcli.shapes.primitives import Box, Mesh
-from manipcli.task.viewed import Sight, load_sight
+from manipcli.task.load_view import Sight, load_sight
 
 ROOT = Path(__file__).parents[2]
 

@@ -11,7 +11,7 @@ from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report.quantity import quantity
+from manipcli.report.display_quantity import quantity
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.table import table
 from manipcli.report.text import describe, render_findings, render_run, render_verdict

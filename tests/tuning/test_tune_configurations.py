@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipcli.control.gain_design import MARGIN, Wish, tune_efforts
 from manipcli.control.joint_space_load import JointSpaceLoad
-from manipcli.control.tuning import MARGIN, Wish, tune_efforts
 from manipcli.core.errors import InvalidInput
 from manipcli.model.kinematics import Kinematics
 from manipcli.task.load_task import load_task
-from manipcli.tuning.extremes import climbed
-from manipcli.tuning.tune import tune
+from manipcli.tuning.extreme_configurations import climbed
+from manipcli.tuning.propose_gains import tune
 
 ROOT = Path(__file__).parents[2]
 H = 1e-3
@@ -60,7 +60,7 @@ def test_the_top_of_a_hill_is_found() -> None:
 def test_gains_without_their_margin_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """After one round the iiwa's are not calm where they are tightest."""
     files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
-    monkeypatch.setattr("manipcli.tuning.tune.ROUNDS", 1)
+    monkeypatch.setattr("manipcli.tuning.propose_gains.ROUNDS", 1)
     (note,) = (one for one in tune(*files, Wish(20.0, 1.0, H)).notes if "Gain margin" in one)
     found = re.fullmatch(r"Gain margin ([\d.]+) of all loops together is below 2[.0]* in the last config.*", note)
     assert found is not None
@@ -69,8 +69,8 @@ def test_gains_without_their_margin_say_so(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_gains_that_are_unstable_somewhere_are_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
     files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
-    monkeypatch.setattr("manipcli.tuning.tune.ROUNDS", 1)
-    monkeypatch.setattr("manipcli.control.tuning.MARGIN", 0.9)
+    monkeypatch.setattr("manipcli.tuning.propose_gains.ROUNDS", 1)
+    monkeypatch.setattr("manipcli.control.gain_design.MARGIN", 0.9)
     with pytest.raises(InvalidInput, match="they are unstable in the last configuration found"):
         tune(*files, Wish(20.0, 1.0, H))
 

@@ -93,7 +93,7 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     )
     from manipcli.batch.discovery import shown_path
     from manipcli.core.errors import InvalidInput
-    from manipcli.report.quantity import quantity
+    from manipcli.report.display_quantity import quantity
     from manipcli.report.text import PASS
     from manipcli.spec.baseline import ToleranceSpec
 

@@ -76,7 +76,7 @@ def tune(
         raise InvalidInput([Diagnostic("USE071", f"--period {period}: expected 1 us to 1 s")])
     from manipcli.core.whole_file import write_whole
     from manipcli.report.tuning import render_json, render_text
-    from manipcli.tuning import tune as gains
+    from manipcli.tuning import propose_gains as gains
 
     tuning = gains.tune(
         robot,

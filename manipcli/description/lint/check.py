@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from manipcli.core.errors import Diagnostic, Severity
-from manipcli.description.description import Description
+from manipcli.description.expanded import Description
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import Parts
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place, Severity
-from manipcli.description.description import Description, read_description
+from manipcli.description.expanded import Description, read_description
 from manipcli.description.lint.check import Check, Subject
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.located_xml import shown_path

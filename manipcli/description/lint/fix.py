@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import shorten
-from manipcli.description.description import Description
+from manipcli.description.expanded import Description
 from manipcli.description.located_xml import Element
 from manipcli.description.packages import NotFound, Packages
 from manipcli.description.urdf.numbers import finite

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.description.description import Description
 from manipcli.description.elements import Joint
+from manipcli.description.expanded import Description
 from manipcli.description.lint.guess_groups import GuessedGroup, guess_groups
 from manipcli.description.packages import NotFound
 from manipcli.description.urdf.urdf import Parts

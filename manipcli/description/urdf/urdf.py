@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.errors import Diagnostic, Place
-from manipcli.description.description import Description
 from manipcli.description.elements import Joint, Link, TransmissionTag
+from manipcli.description.expanded import Description
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.control_limits import with_control_limits
 from manipcli.description.urdf.joint import read_joint, read_transmissions

@@ -18,15 +18,15 @@ from pydantic import Field, model_validator
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import NotPlannable
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unfollowed
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.claimed_joints import Claims, unfollowed
+from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.names import unknown_joint
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember
 from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
-from manipcli.plan.verify import verify_written
+from manipcli.plan.unknown_names import unknown_joint
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointAcceleration, JointValue, JointVelocity, Time

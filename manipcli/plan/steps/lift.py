@@ -13,7 +13,7 @@ from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unmoved_tool
+from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner

@@ -21,15 +21,15 @@ from pydantic import Field, field_validator, model_validator
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
+from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.inverse_kinematics import Open, pointed
+from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import StepMember
-from manipcli.plan.verify import verify_written
+from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue, Share

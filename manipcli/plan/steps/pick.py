@@ -18,16 +18,16 @@ from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, too_wide
+from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn

@@ -26,7 +26,7 @@ from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unmoved_tool
+from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner

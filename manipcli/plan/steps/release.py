@@ -9,12 +9,12 @@ from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unmoved_hand
+from manipcli.plan.claimed_joints import Claims, unmoved_hand
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember
+from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 

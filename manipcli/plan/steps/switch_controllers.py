@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema
 
 from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims, unknown_controller
+from manipcli.plan.claimed_joints import Claims, unknown_controller
 from manipcli.plan.motion import Motion, PlanningState, StepPlan, Strictness, Switch
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember

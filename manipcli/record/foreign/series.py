@@ -15,7 +15,7 @@ from manipcli.record.cdr import CdrError
 from manipcli.record.decode import Int, Layouts, Run, runs
 from manipcli.record.definition import Message
 from manipcli.record.faults import BadRecording
-from manipcli.record.foreign.fields import Key, Way
+from manipcli.record.foreign.topic_fields import Key, Way
 from manipcli.record.foreign.topics import Topics
 from manipcli.record.read.chunk import Places, every
 from manipcli.record.schemas import CONTACTS

@@ -8,9 +8,9 @@ from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.judge.measures.facts import JointFacts, RunFacts, Use
 from manipcli.judge.measures.grasp_intervals import GraspFacts, Slip, Spread
+from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
 from manipcli.report.html.page_parts import heading, meter, number, of_limit, percent, seek, table
-from manipcli.report.quantity import quantity
 
 AT_LIMIT = 1e-6
 """[rad, m] A joint within this distance of its limit is shown as at the limit."""

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable, Sequence
 
 from manipcli.core.units import readable
+from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
-from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Picture, Written
 
 

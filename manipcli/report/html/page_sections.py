@@ -7,6 +7,7 @@ from manipcli.judge.drawn import value_text
 from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.replay.playback import Phase
+from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
 from manipcli.report.html.page_parts import (
     anchor,
@@ -21,7 +22,6 @@ from manipcli.report.html.page_parts import (
     signed,
     table,
 )
-from manipcli.report.quantity import quantity
 from manipcli.report.run_page import RunPage, Source, Written
 
 SHORT_HASH = 16

@@ -11,6 +11,7 @@ from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.record.channels import JOINT_STATES, TF
 from manipcli.record.foreign.compare import Comparison
 from manipcli.record.read.compare_entries import EntryDifference
+from manipcli.report.display_quantity import quantity
 from manipcli.report.json import Json, dumps, number, plain
 from manipcli.report.logs.comparison import (
     Names,
@@ -20,7 +21,6 @@ from manipcli.report.logs.comparison import (
     messages_object,
     topics_table,
 )
-from manipcli.report.quantity import quantity
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
 

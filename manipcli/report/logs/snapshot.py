@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from manipcli.core.geometry import Transform
 from manipcli.model.state import Contact
+from manipcli.report.display_quantity import CUSTOMARY
 from manipcli.report.json import Json, dumps, number
-from manipcli.report.quantity import CUSTOMARY
 from manipcli.report.table import table
 
 _HUGE = 1e9

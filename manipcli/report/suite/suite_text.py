@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, shorten
-from manipcli.report.quantity import quantity
+from manipcli.report.display_quantity import quantity
 from manipcli.report.suite.suite import Case, CaseReport, Suite
 from manipcli.report.text import FAIL, PASS, describe
 

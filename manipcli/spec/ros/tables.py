@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from manipcli.spec.fields import bounds_of
+from manipcli.spec.block_fields import bounds_of
 from manipcli.spec.quantity import JointTolerance
 from manipcli.spec.ros.reshape import joint_trajectory, one_joint, pid
 from manipcli.spec.ros.table import Block, Table

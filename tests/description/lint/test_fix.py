@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.description.description import read_description
+from manipcli.description.expanded import read_description
 from manipcli.description.lint.fix import mended
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import read_parts

@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from manipcli.core.errors import Diagnostic, InvalidInput
-from manipcli.description.description import read_description
 from manipcli.description.elements import Mimic
+from manipcli.description.expanded import read_description
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.shapes.primitives import Box, Cylinder, Mesh, Sphere

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from manipcli.core.errors import InvalidInput
-from manipcli.description.description import Description, read_description
+from manipcli.description.expanded import Description, read_description
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import Packages
 from manipcli.description.xacro import expand as xacro

@@ -16,11 +16,11 @@ from manipcli.record.cdr import CdrError
 from manipcli.record.decode import runs
 from manipcli.record.definition import read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.foreign.fields import FieldName, UnknownField, parse_field, ways
+from manipcli.record.foreign.field_units import unit_of
 from manipcli.record.foreign.repair import repair
 from manipcli.record.foreign.series import Series, Wanted, leaves, read_series
+from manipcli.record.foreign.topic_fields import FieldName, UnknownField, parse_field, ways
 from manipcli.record.foreign.topics import open_topics
-from manipcli.record.foreign.units import unit_of
 from manipcli.record.read.scan import Scan
 from manipcli.record.records import CHUNK, MESSAGE_INDEX
 

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from manipcli.replay.view.view import View
-from manipcli.task.viewed import load_sight
+from manipcli.task.load_view import load_sight
 
 ROOT = Path(__file__).parents[3]
 CLICK = """(label => {

@@ -19,7 +19,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.description.elements import Joint, JointLimits
 from manipcli.replay.view.view import View, pose_text, slider_range
-from manipcli.task.viewed import load_sight
+from manipcli.task.load_view import load_sight
 
 ROOT = Path(__file__).parents[3]
 ROBOT = """<robot name="two">

@@ -11,13 +11,15 @@ from manipcli.description.lint.checks import (
     collisions,
     control,
     control_numbers,
-    elements,
     joints,
     masses,
     materials,
     meshes,
     names,
     transmissions,
+)
+from manipcli.description.lint.checks import (
+    unknown_elements as elements,
 )
 from manipcli.description.lint.checks.reading_meshes import READING_MESHES
 from manipcli.description.lint.checks.reading_text import READING_TEXT

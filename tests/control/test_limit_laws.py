@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manipcli.control import limit_acceleration, limit_effort, limit_position, limit_velocity
-from manipcli.control.limits import refuse_limits
+from manipcli.control.limit_laws import refuse_limits
 from manipcli.core.errors import InvalidArgument
 
 PI = math.pi

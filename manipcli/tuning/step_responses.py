@@ -10,9 +10,9 @@ import numpy as np
 
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState
 from manipcli.control.feed_forward import ModelFeedForward
+from manipcli.control.gain_design import StepAnswer, Tuned, Wish
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Pid
-from manipcli.control.tuning import StepAnswer, Tuned, Wish
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.units import EARTH_GRAVITY

@@ -7,9 +7,9 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.limit_check import verify
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.plan.verify import verify
 
 T = np.arange(1001) * 1e-3
 

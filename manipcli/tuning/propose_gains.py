@@ -12,8 +12,8 @@ import numpy as np
 
 from manipcli.control.control_loop import InverseDynamicsLoop, NoLoop, PidLoop
 from manipcli.control.controllers import CONTROLLERS
+from manipcli.control.gain_design import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
-from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, listed, told_apart
@@ -27,8 +27,8 @@ from manipcli.spec.located import Located
 from manipcli.spec.resolved import as_written
 from manipcli.task.robot_file import read_robot
 from manipcli.task.vocabulary import controllers_spec
-from manipcli.tuning.extremes import climbed
-from manipcli.tuning.simulated_steps import simulated_answers
+from manipcli.tuning.extreme_configurations import climbed
+from manipcli.tuning.step_responses import simulated_answers
 
 if TYPE_CHECKING:
     from manipcli.replay.curves import Chart

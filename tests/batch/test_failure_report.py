@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from manipcli.batch.baseline import Measure, baseline_path, write_baseline
+from manipcli.batch.failure_report import against_baseline, draw, troubles
 from manipcli.batch.job import Job, Settings
 from manipcli.batch.process import run_job
-from manipcli.batch.telling import against_baseline, draw, troubles
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.suite.suite import Case
 
@@ -78,7 +78,7 @@ def test_why_a_run_ended_before_its_first_step_comes_first(tmp_path: Path) -> No
 def test_a_watch_that_is_worse_than_it_was_is_told_at_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one = job(tmp_path)
     old, new = ({("duration",): Measure(1.0, "s"), ("margins", "tracking"): Measure(at, "rad")} for at in (0.3, 0.1))
-    monkeypatch.setattr("manipcli.batch.telling.measured", lambda *_: new)
+    monkeypatch.setattr("manipcli.batch.failure_report.measured", lambda *_: new)
     assert against_baseline(one, VERDICT) == ((), [])
     write_baseline(baseline_path(one.path), old)
     ((trouble,), notes) = against_baseline(one, VERDICT)
@@ -89,7 +89,7 @@ def test_a_yml_is_compared_with_a_baseline_of_the_earlier_name(tmp_path: Path, m
     one = job(tmp_path)
     one = replace(one, path=one.path.rename(tmp_path / "nod.yml"))
     write_baseline(tmp_path / "nod.baseline.json", {("duration",): Measure(1.0, "s")})
-    monkeypatch.setattr("manipcli.batch.telling.measured", lambda *_: {("duration",): Measure(2.0, "s")})
+    monkeypatch.setattr("manipcli.batch.failure_report.measured", lambda *_: {("duration",): Measure(2.0, "s")})
     ((trouble,), _) = against_baseline(one, VERDICT)
     assert "the task takes 2.00 s; its baseline is 1.00 s" in trouble.message
 

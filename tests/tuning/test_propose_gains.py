@@ -10,8 +10,8 @@ import pytest
 
 from manipcli.control.command import JointCommand
 from manipcli.control.controllers.joint_trajectory import JointTrajectorySpec
+from manipcli.control.gain_design import MARGIN, Tuned, Wish
 from manipcli.control.stability import Loop, largest_damping
-from manipcli.control.tuning import MARGIN, Tuned, Wish
 from manipcli.core.errors import InvalidInput
 from manipcli.model.build_robot import build_robot
 from manipcli.pipeline import run_task
@@ -23,7 +23,7 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_controllers, load_robot
 from manipcli.task.load_task import load_task
 from manipcli.task.vocabulary import controllers_spec
-from manipcli.tuning.tune import Tuning, chart_of, tune, written
+from manipcli.tuning.propose_gains import Tuning, chart_of, tune, written
 
 ROOT = Path(__file__).parents[2]
 INERTIA = 0.004 + 0.5 * 0.2**2

@@ -11,7 +11,7 @@ from manipcli.core.errors import Loc, NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.core.text import told_apart
 from manipcli.model.robot import RobotModel
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
 
 TOLERANCE = 0.005

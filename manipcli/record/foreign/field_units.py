@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from manipcli.core.errors import InvalidInput
 from manipcli.description.located_xml import parse_document
-from manipcli.record.foreign.fields import Way
+from manipcli.record.foreign.topic_fields import Way
 
 JointUnits = Mapping[str, str]
 """Position unit of each joint of known type: rad or m."""

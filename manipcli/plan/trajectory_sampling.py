@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
-from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
 
 Curve = Callable[[Array], tuple[Array, Array, Array]]

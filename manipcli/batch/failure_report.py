@@ -11,7 +11,7 @@ from manipcli.batch.job import Job
 from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
-from manipcli.logs.invalid import invalid_page, invalid_verdict
+from manipcli.logs.invalid_input import invalid_page, invalid_verdict
 from manipcli.logs.replay import open_playback
 from manipcli.logs.report import log_page, refused_page
 from manipcli.pipeline import load_task
