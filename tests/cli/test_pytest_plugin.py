@@ -29,8 +29,12 @@ PLUGIN = "manipcli.cli.pytest_plugin"
 INSTALLED = any(point.value == PLUGIN for point in entry_points(group="pytest11"))
 LOADED = () if INSTALLED else ("-p", PLUGIN)
 """Where manipcli runs from its source, and is not installed, the plugin is named."""
-ALONE = ("-p", "no:hypothesispytest", "-p", "no:xdist", "-p", "no:randomly")
-"""Without the plugins of others, whose loading takes longer than these tests, or which change the order of tests."""
+ALONE = tuple(
+    word
+    for plugin in ("hypothesispytest", "xdist", "randomly", "unraisableexception", "threadexception")
+    for word in ("-p", f"no:{plugin}")
+)
+"""Without plugins that take longer than these tests, or that change the order of tests."""
 
 TASK = f"""\
 task: {{name}}

@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import parse
@@ -17,7 +19,6 @@ from xml.etree.ElementTree import parse
 import pytest
 
 from manipcli.batch.job import Job
-from manipcli.cli import task_session
 from manipcli.cli.app import main
 from manipcli.report.suite import Case, CaseReport
 
@@ -113,7 +114,7 @@ def test_a_result_that_cannot_be_written_takes_nothing_from_what_is_told(
     assert (folder / "pages" / "index.html").exists()
     write(folder, "b")
     done = CaseReport(Case("b.yaml", "b"), "passed", 1.0, "")
-    monkeypatch.setattr("manipcli.batch.process.run_job", lambda _, **__: done)
+    monkeypatch.setattr("manipcli.batch.process.run_jobs", lambda *_, **__: (done for _ in range(1)))
     assert main(["test", "--junit", "/dev/full"]) == 3  # all passed, and who waits for the file does not know it
 
 
@@ -137,26 +138,33 @@ def test_logs_go_where_something_can_be_written(folder: Path, capsys: pytest.Cap
     assert main(["test"]) == 4
     told = capsys.readouterr()
     assert (told.out, "error[USE086]: --logs 'runs/test': " in told.err) == ("", True)
-    assert "hint: --logs DIR names another place" in told.err
+    assert "hint: name another folder with --logs DIR" in told.err
     assert main(["test", "--logs", "else/where"]) == 4
     assert "✗ 1 invalid" in capsys.readouterr().out
     assert (folder / "else" / "where" / ".cache").is_dir()
 
 
+@dataclass
+class Given(list[Job]):
+    """What is run: nothing is. What `c` is called fails. `at_once`: of each call."""
+
+    at_once: list[int] = field(default_factory=list)
+
+    def run(self, jobs: Iterable[Job], *, at_once: int, **_: object) -> Iterator[CaseReport]:
+        self.at_once.append(at_once)
+        for job in jobs:
+            self.append(job)
+            yield CaseReport(job.case, "failed" if job.case.task == "c" else "passed", 1.0, "")
+
+
 @pytest.fixture
-def given(monkeypatch: pytest.MonkeyPatch) -> list[Job]:
-    """What is run: nothing is. What `c` is called fails."""
-    jobs: list[Job] = []
-
-    def run(job: Job, **_: object) -> CaseReport:
-        jobs.append(job)
-        return CaseReport(job.case, "failed" if job.case.task == "c" else "passed", 1.0, "")
-
-    monkeypatch.setattr("manipcli.batch.process.run_job", run)
+def given(monkeypatch: pytest.MonkeyPatch) -> Given:
+    jobs = Given()
+    monkeypatch.setattr("manipcli.batch.process.run_jobs", jobs.run)
     return jobs
 
 
-def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, given: list[Job]) -> None:
+def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, given: Given) -> None:
     write(folder, "a")
     assert main(["test", "--silence", "0", "--timeout", "0 s"]) == 0
     assert (given[0].settings.silence, given[0].settings.timeout) == (math.inf, math.inf)
@@ -166,24 +174,17 @@ def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, given: list[Job])
     ("words", "cores", "at_once"), [([], 2, 2), ([], 8, 3), (["-n", "1"], 2, 1), (["-n", "9"], 2, 3)]
 )
 def test_as_many_run_at_once_as_this_process_may_use_cores(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], cores: int, at_once: int
+    folder: Path, given: Given, monkeypatch: pytest.MonkeyPatch, words: list[str], cores: int, at_once: int
 ) -> None:
     for name in "abc":
         write(folder, name)
-    given: list[list[str]] = []
-    real = task_session._pytest
-    monkeypatch.setattr(
-        task_session, "_pytest", lambda words, plugin: given.append(words) or real([*words, "--collect-only"], plugin)
-    )
-    monkeypatch.setattr(task_session.TaskSession, "junit", b"")
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
     main(["test", *words])
     monkeypatch.delattr(os, "sched_getaffinity")  # as elsewhere than on Linux
     monkeypatch.setattr(sys, "platform", "darwin")
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     main(["test", *words])
-    workers = [words[words.index("-n") + 1] if "-n" in words else "1" for words in given]
-    assert workers == ["1", str(at_once)] * 2  # each time they are collected, then run
+    assert given.at_once == [at_once, at_once]
 
 
 @pytest.mark.parametrize(
@@ -195,7 +196,7 @@ def test_as_many_run_at_once_as_this_process_may_use_cores(
     ],
 )
 def test_the_first_failure_stops_only_what_is_left(
-    folder: Path, given: list[Job], capsys: pytest.CaptureFixture[str], names: str, words: list[str], told: str,
+    folder: Path, given: Given, capsys: pytest.CaptureFixture[str], names: str, words: list[str], told: str,
     summary: str,
 ) -> None:  # fmt: skip
     """The one in `c` fails."""
@@ -221,7 +222,7 @@ def test_the_first_failure_stops_only_what_is_left(
     ],
 )
 def test_samples_are_chosen_by_their_ids_and_by_having_failed_last(
-    folder: Path, given: list[Job], words: list[str], ids: list[str]
+    folder: Path, given: Given, words: list[str], ids: list[str]
 ) -> None:
     write(folder, "a")
     write(folder, "c")
@@ -234,7 +235,7 @@ def test_samples_are_chosen_by_their_ids_and_by_having_failed_last(
 
 
 def test_nothing_of_the_users_own_pytest_is_picked_up(
-    folder: Path, given: list[Job], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    folder: Path, given: Given, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     write(folder, "a")
     (folder / "conftest.py").write_text("raise SystemExit(3)")
@@ -251,7 +252,7 @@ def test_nothing_of_the_users_own_pytest_is_picked_up(
 
 
 def test_tasks_outside_of_the_working_directory_have_ids_of_their_own(
-    folder: Path, given: list[Job], monkeypatch: pytest.MonkeyPatch
+    folder: Path, given: Given, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "here").mkdir()
     for place in ("x", "y"):
