@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from xml.etree.ElementTree import parse
 import pytest
 
 from manipcli.batch.job import Job
+from manipcli.batch.process import Process
 from manipcli.cli.app import main
 from manipcli.report.suite import Case, CaseReport
 
@@ -276,11 +277,11 @@ def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.Captu
 
 
 @pytest.mark.slow
-def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) -> None:
+def test_good_and_bad_tasks_with_everything_written(folder: Path, call_cli: Any) -> None:
     write(folder, "good")
     write(folder, "late", below="0.1 s")
     words = ["--junit", "out.xml", "--report", "pages", "--github", "-n", "2"]
-    ran = run_cli("test", *words, cwd=folder)
+    ran = call_cli("test", *words, cwd=folder)
     assert ran.code == 1, ran
     assert re.search(r"✓ passed   good.yaml::good +\d+\.\d\d s  duration: \d+\.\d s to spare", ran.out)
     assert re.search(r"✗ failed   late.yaml::late +\d+\.\d\d s  duration: fails by", ran.out)
@@ -304,33 +305,33 @@ def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) 
     assert {file: case.get("line") for file, case in cases.items()} == {"good.yaml": "1", "late.yaml": "8"}
     assert [file for file, case in cases.items() if case.find("failure") is not None] == ["late.yaml"]
 
-    again = run_cli("test", "--last-failed", "--format", "json", cwd=folder)
+    again = call_cli("test", "--last-failed", "--format", "json", cwd=folder)
     answer = json.loads(again.out)
     assert again.code == 1
     assert [case["id"] for case in answer["cases"]] == ["late.yaml::late"]
     assert answer["cases"][0]["troubles"][0]["line"] == 8
-    mended = run_cli("test", "--last-failed", "-q", "--set", "expect.0.duration.below=9 s", cwd=folder)
+    mended = call_cli("test", "--last-failed", "-q", "--set", "expect.0.duration.below=9 s", cwd=folder)
     assert mended.code == 0, mended
     assert mended.out.startswith("✓ 1 passed")
     assert not (folder / "runs" / "test" / "late.mcap").exists()
 
 
 @pytest.mark.slow
-def test_a_step_that_cannot_be_planned_is_told_at_its_line(folder: Path, run_cli: Any) -> None:
+def test_a_step_that_cannot_be_planned_is_told_at_its_line(folder: Path, call_cli: Any) -> None:
     write(folder, "far")
     path = folder / "far.yaml"
     path.write_text(path.read_text().replace("  - wait: 0.2 s", "  - move: {pose: {xyz: [9, 0, 0]}}"))
-    ran = run_cli("test", "--github", cwd=folder)
+    ran = call_cli("test", "--github", cwd=folder)
     assert ran.code == 1, ran
     assert "::error file=far.yaml,line=6,col=5,title=far failed::move_1: failed: cannot be planned" in ran.out
     assert "log:" not in ran.out
 
 
 @pytest.mark.slow
-def test_the_first_failure_stops_where_that_is_asked(folder: Path, run_cli: Any) -> None:
+def test_the_first_failure_stops_where_that_is_asked(folder: Path, call_cli: Any) -> None:
     write(folder, "a", below="0.1 s")
     write(folder, "b", wait="500 s")
-    ran = run_cli("test", "-x", "-n", "2", cwd=folder)
+    ran = call_cli("test", "-x", "-n", "2", cwd=folder)
     assert ran.code == 1
     assert "1 not run" in ran.out
     assert "stopped at the first failure" in ran.out
@@ -365,13 +366,40 @@ class Started:
         return self.process.returncode, out
 
 
+Signal = Callable[[signal.Signals], None]
+
+
+@pytest.fixture
+def signalled(monkeypatch: pytest.MonkeyPatch) -> Signal:
+    """Sends a signal to the process of the run `a`, once it simulates; until then no silence is too long."""
+    hear = Process.hear
+
+    def send(number: signal.Signals) -> None:
+        sent: list[int] = []
+
+        def heard(process: Process) -> CaseReport | None:
+            report = hear(process)
+            if process.job.case.task != "a" or sent:
+                return report
+            partial = process.job.partial
+            if partial.exists() and partial.stat().st_size > 300_000:
+                sent.append(process._process.pid)
+                os.kill(process._process.pid, number)
+            process._heard = time.monotonic()
+            return report
+
+        monkeypatch.setattr(Process, "hear", heard)
+
+    return send
+
+
 @pytest.mark.slow
-def test_a_crash_of_native_code_costs_one_test(folder: Path) -> None:
+def test_a_crash_of_native_code_costs_one_test(folder: Path, signalled: Signal, call_cli: Any) -> None:
     write(folder, "a", wait="500 s")
     write(folder, "b")
-    started = Started(folder, "-n", "1", "--junit", "out.xml")
-    os.kill(started.child(), signal.SIGSEGV)
-    code, out = started.end()
+    signalled(signal.SIGSEGV)
+    ran = call_cli("test", "-n", "1", "--junit", "out.xml", cwd=folder)
+    code, out = ran.code, ran.out
     assert code == 1
     assert re.search(r"✗ crashed  a.yaml::a .* crashed by signal 11 \(SIGSEGV\); step 1 of 1, 'wait_1' at \d+\.", out)
     assert "✓ passed   b.yaml::b" in out
@@ -384,19 +412,18 @@ def test_a_crash_of_native_code_costs_one_test(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_hang_is_ended_and_named(folder: Path) -> None:
+def test_a_hang_is_ended_and_named(folder: Path, signalled: Signal, call_cli: Any) -> None:
     write(folder, "a", wait="500 s")
-    started = Started(folder, "--silence", "3 s")
-    os.kill(started.child(), signal.SIGSTOP)
-    code, out = started.end()
-    assert code == 1
-    assert re.search(r"✗ hung     a.yaml::a .* hung: no progress for 3 s; step 1 of 1, 'wait_1' at \d+\.", out)
+    signalled(signal.SIGSTOP)
+    ran = call_cli("test", "--silence", "1 s", cwd=folder)
+    assert ran.code == 1
+    assert re.search(r"✗ hung     a.yaml::a .* hung: no progress for 1 s; step 1 of 1, 'wait_1' at \d+\.", ran.out)
 
 
 @pytest.mark.slow
-def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, run_cli: Any) -> None:
+def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, call_cli: Any) -> None:
     write(folder, "a", wait="3600 s")
-    ran = run_cli("test", "--timeout", "1 s", cwd=folder)
+    ran = call_cli("test", "--timeout", "1 s", cwd=folder)
     assert ran.code == 1
     assert "hung: timeout after 1 s; " in ran.out
 
