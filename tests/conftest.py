@@ -8,9 +8,12 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
 from typing import Any
 
 import hypothesis
@@ -19,6 +22,7 @@ from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.writer import Writer
 
+from manipcli.batch.child import _Beats, _end_of
 from manipcli.cli.app import main
 
 ROOT = Path(__file__).parents[1]
@@ -75,6 +79,34 @@ def run_cli() -> RunCli:
         return Ran(done.returncode, done.stdout, done.stderr)
 
     return run
+
+
+class _Thread:
+    """A thread that takes the place of the process of a run, with the same messages to its parent."""
+
+    returncode = 0
+
+    def __init__(self, command: Sequence[str], **_: object) -> None:
+        connection = Connection(os.dup(int(command[-1])))
+        self.pid = os.getpid()
+        self._thread = Thread(target=self._run, args=(connection,), daemon=True)
+        self._thread.start()
+
+    def _run(self, connection: Connection) -> None:
+        with connection:
+            connection.send(_end_of(connection.recv(), _Beats(connection)))
+
+    def wait(self, timeout: float | None = None) -> None:
+        self._thread.join(timeout)
+
+    def kill(self) -> None: ...
+
+
+@pytest.fixture
+def runs_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of tests and baselines are in threads, which take a second less than processes."""
+    names = SimpleNamespace(Popen=_Thread, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
+    monkeypatch.setattr("manipcli.batch.process.subprocess", names)
 
 
 @dataclass(frozen=True)

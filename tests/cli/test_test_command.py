@@ -317,6 +317,7 @@ def test_good_and_bad_tasks_with_everything_written(folder: Path, call_cli: Any)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_a_step_that_cannot_be_planned_is_told_at_its_line(folder: Path, call_cli: Any) -> None:
     write(folder, "far")
     path = folder / "far.yaml"
