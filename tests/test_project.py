@@ -91,12 +91,13 @@ def test_reading_a_file_loads_no_arrays_and_no_physics() -> None:
         ("plan", "from manipcli.simulate import engine"),
         ("record", "from manipcli.simulate import engine"),
         ("report", "import manipcli.cli.app"),
+        ("cli", "from manipcli.plan import step"),
     ],
 )
-def test_an_import_that_points_down_fails_the_lint(tmp_path: Path, layer: str, line: str) -> None:
+def test_a_forbidden_import_fails_the_lint(tmp_path: Path, layer: str, line: str) -> None:
     shutil.copytree(PACKAGE, tmp_path / "manipcli", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    (tmp_path / "manipcli" / layer / "poison.py").write_text(f'"""Points down."""\n\n{line}\n')
+    (tmp_path / "manipcli" / layer / "poison.py").write_text(f'"""Forbidden."""\n\n{line}\n')
     broken = _lint(tmp_path)
     assert broken.returncode == 1, broken.stdout + broken.stderr
     assert f"manipcli.{layer}.poison" in broken.stdout

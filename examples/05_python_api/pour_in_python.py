@@ -1,4 +1,4 @@
-"""The pour from Python: planned, run with another cup, and its log looked at with numpy."""
+"""The pour from Python: plan it, run it with another cup, and evaluate its log with numpy."""
 
 from pathlib import Path
 

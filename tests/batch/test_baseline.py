@@ -203,7 +203,7 @@ def test_bless_then_test_passes_until_something_is_worse(
     assert "1 margin; written: nod.baseline.json" in capsys.readouterr().out
     blessed = baseline_path(task).read_bytes()
     assert main(["bless"]) == 0
-    assert "as before" in capsys.readouterr().out
+    assert "unchanged within 0.05 s, " in capsys.readouterr().out
     assert main(["bless", "--format", "json"]) == 0
     (case,) = json.loads(capsys.readouterr().out)["cases"]
     assert (case["id"], case["outcome"], case["log"]) == ("nod.yaml::nod", "passed", None)

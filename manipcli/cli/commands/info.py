@@ -8,7 +8,7 @@ from manipcli.core.errors import ExitCode
 
 
 def info(log: LogFile, *, format_: Format = "text") -> ExitCode:
-    """Show the contents of a log: verdict, steps, topics, rates, sizes.
+    """Show the verdict, steps, topics, rates and sizes of a log.
 
     Works with any MCAP file, also a truncated or damaged one; missing parts are shown first.
     """
