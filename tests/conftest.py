@@ -2,19 +2,39 @@
 
 from __future__ import annotations
 
+import fcntl
+import gc
+import os
+import pickle
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
 from typing import Any
 
+import hypothesis
 import pytest
 from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.writer import Writer
 
+from manipcli.batch.child import _Beats, _end_of
+from manipcli.cli.app import main
+
 ROOT = Path(__file__).parents[1]
+
+hypothesis.settings.register_profile("any machine", deadline=None)
+hypothesis.settings.load_profile("any machine")
+
+
+def pytest_collection_finish() -> None:
+    """What is there before the first test stays: no search for garbage looks at it."""
+    gc.collect()
+    gc.freeze()
 
 
 @dataclass(frozen=True)
@@ -27,6 +47,19 @@ class Ran:
 
 
 RunCli = Callable[..., Ran]
+
+
+@pytest.fixture
+def call_cli(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> RunCli:
+    """Calls the command line in this process, which takes a second less."""
+
+    def run(*words: str | Path, cwd: Path) -> Ran:
+        monkeypatch.chdir(cwd)
+        capfd.readouterr()
+        code = main([*map(str, words)])
+        return Ran(code, *capfd.readouterr())
+
+    return run
 
 
 @pytest.fixture(scope="session")
@@ -48,6 +81,34 @@ def run_cli() -> RunCli:
     return run
 
 
+class _Thread:
+    """A thread that takes the place of the process of a run, with the same messages to its parent."""
+
+    returncode = 0
+
+    def __init__(self, command: Sequence[str], **_: object) -> None:
+        connection = Connection(os.dup(int(command[-1])))
+        self.pid = os.getpid()
+        self._thread = Thread(target=self._run, args=(connection,), daemon=True)
+        self._thread.start()
+
+    def _run(self, connection: Connection) -> None:
+        with connection:
+            connection.send(_end_of(connection.recv(), _Beats(connection)))
+
+    def wait(self, timeout: float | None = None) -> None:
+        self._thread.join(timeout)
+
+    def kill(self) -> None: ...
+
+
+@pytest.fixture
+def runs_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of tests and baselines are in threads, which take a second less than processes."""
+    names = SimpleNamespace(Popen=_Thread, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
+    monkeypatch.setattr("manipcli.batch.process.subprocess", names)
+
+
 @dataclass(frozen=True)
 class PourRun:
     """`ran`: `manipcli run tasks/pour.yaml --format json`; `log`: where it recorded."""
@@ -58,10 +119,18 @@ class PourRun:
 
 @pytest.fixture(scope="session")
 def pour_run(run_cli: RunCli, tmp_path_factory: pytest.TempPathFactory) -> PourRun:
-    """The pour, run once."""
-    folder = tmp_path_factory.mktemp("pour")
-    ran = run_cli("run", ROOT / "tasks" / "pour.yaml", "--format", "json", cwd=folder)
-    return PourRun(ran, folder / "runs" / "pour.mcap")
+    """The pour, run once, whatever the number of workers of pytest-xdist: the first that needs it runs it."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    folder, kept = folder / "pour", folder / "pour.pickle"
+    with folder.with_suffix(".lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        if not kept.exists():
+            folder.mkdir()
+            ran = run_cli("run", ROOT / "tasks" / "pour.yaml", "--format", "json", cwd=folder)
+            kept.write_bytes(pickle.dumps((ran.code, ran.out, ran.err)))
+    return PourRun(Ran(*pickle.loads(kept.read_bytes())), folder / "runs" / "pour.mcap")
 
 
 Pendulum = Callable[..., Path]

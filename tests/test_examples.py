@@ -6,7 +6,9 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,12 +19,13 @@ FAILS = {"06_failure": 1}
 
 
 def command(example: Path) -> list[str]:
-    """The one command of an example's README, with this interpreter's programs."""
+    """The one command of an example's README."""
     readme = (example / "README.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```bash\n(.*?)\n```", readme, flags=re.DOTALL)
     program, *words = shlex.split(block)
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
-    return [sys.executable, *({"manipcli": ["-m", "manipcli"], "python": []}[program]), *words]
+    assert program in ("manipcli", "python")
+    return [program, *words]
 
 
 def shown(example: Path) -> str:
@@ -46,14 +49,20 @@ def test_an_example_is_small_and_says_what_to_change(example: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
-def test_an_example_does_what_its_readme_says(example: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        command(example), cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600,
-        env={"PYTHONPATH": str(ROOT), "PATH": "", "PYTHONIOENCODING": "utf-8"},
-    )  # fmt: skip
-    assert done.returncode == FAILS.get(example.name, 0), done.stdout + done.stderr
+def test_an_example_does_what_its_readme_says(example: Path, tmp_path: Path, call_cli: Callable[..., Any]) -> None:
+    program, *arguments = command(example)
+    if program == "manipcli":
+        ran = call_cli(*arguments, cwd=tmp_path)
+        code, out, err = ran.code, ran.out, ran.err
+    else:
+        done = subprocess.run(
+            [sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600,
+            env={"PYTHONPATH": str(ROOT), "PATH": "", "PYTHONIOENCODING": "utf-8"},
+        )  # fmt: skip
+        code, out, err = done.returncode, done.stdout, done.stderr
+    assert code == FAILS.get(example.name, 0), out + err
     expected = words(shown(example))
-    assert expected == words(done.stdout)[: len(expected)]
+    assert expected == words(out)[: len(expected)]
 
 
 def words(text: str) -> list[str]:

@@ -20,9 +20,9 @@ def test_the_picture_of_the_readme_is_there_and_small() -> None:
 
 
 @pytest.mark.slow
-def test_the_pour_is_drawn_from_its_log_as_the_readme_shows_it(pour_run, run_cli, tmp_path: Path) -> None:
+def test_the_pour_is_drawn_from_its_log_as_the_readme_shows_it(pour_run, call_cli, tmp_path: Path) -> None:
     drawn = tmp_path / "pour.png"
-    ran = run_cli("replay", pour_run.log, "--sheet", drawn, "--size", SIZE, cwd=ROOT)
+    ran = call_cli("replay", pour_run.log, "--sheet", drawn, "--size", SIZE, cwd=ROOT)
     assert (ran.code, ran.err) == (0, "")
     with Image.open(drawn) as picture, Image.open(ROOT / "docs" / "pour.png") as shown:
         assert picture.size == shown.size

@@ -8,7 +8,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
@@ -55,36 +56,68 @@ LONGEST_WAIT = 60.0
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
 
 
-def run_job(job: Job, *, observer: Callable[[Beat], None] | None = None, command: tuple[str, ...] = ()) -> CaseReport:
-    """Runs a job and returns its report. An exception (an interrupt) kills the process and removes its files.
+def run_job(job: Job, *, command: tuple[str, ...] = ()) -> CaseReport:
+    """Runs a job and returns its report; see `run_jobs`."""
+    (report,) = run_jobs([job], command=command)
+    return report
+
+
+def run_jobs(
+    jobs: Iterable[Job],
+    *,
+    at_once: int = 1,
+    observer: Callable[[Job, Beat], None] | None = None,
+    command: tuple[str, ...] = (),
+) -> Generator[CaseReport, None, None]:
+    """Runs jobs and yields their reports, in the order in which they end.
+
+    An exception (an interrupt) and `close` kill what is running and remove its files.
 
     Args:
-        job: the run.
-        observer: callback for each heartbeat.
+        jobs: the runs, in the order in which they start.
+        at_once: number of parallel runs.
+        observer: callback for each start and each heartbeat.
         command: another program instead of `batch/child.py`.
     """
+    waiting = deque(jobs)
+    running: list[Process] = []
+    try:
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                started = _started(waiting.popleft(), command)
+                if isinstance(started, CaseReport):
+                    yield started
+                    continue
+                running.append(started)
+                if observer is not None:
+                    observer(started.job, started.activity)
+            patience = min((process.patience for process in running), default=0.0)
+            wait([process.connection for process in running], max(0.0, min(LONGEST_WAIT, patience)))
+            for process in [*running]:
+                report = process.hear()
+                if report is None and process.patience <= 0.0:
+                    report = process.give_up()
+                if report is not None:
+                    running.remove(process)
+                    yield report
+                elif observer is not None:
+                    observer(process.job, process.activity)
+    finally:
+        for process in running:
+            process.forget()
+
+
+def _started(job: Job, command: tuple[str, ...]) -> Process | CaseReport:
+    """The process of a job, or why there is none."""
     if job.case.findings:
         return _unreadable(job)
     try:
-        process = Process(job, command=command)
+        return Process(job, command=command)
     except Taken:
         where = f"writes to '{job.settings.folder}'"
         return _no_process(job, f"another process is running this task and {where}; nothing was run")
     except OSError as error:
         return _no_process(job, f"the task cannot be run: {error}")
-    try:
-        while True:
-            wait([process.connection], max(0.0, min(LONGEST_WAIT, process.patience)))
-            report = process.hear()
-            if report is None and process.patience <= 0.0:
-                report = process.give_up()
-            if report is not None:
-                return report
-            if observer is not None:
-                observer(process.activity)
-    except BaseException:
-        process.forget()
-        raise
 
 
 class Process:

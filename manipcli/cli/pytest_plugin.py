@@ -7,10 +7,7 @@ a task to run.
 from __future__ import annotations
 
 import math
-import os
-import pickle
-import signal
-from argparse import SUPPRESS, ArgumentTypeError
+from argparse import ArgumentTypeError
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -18,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import pytest
 
 if TYPE_CHECKING:
-    from manipcli.batch.job import Beat, Job, Settings
+    from manipcli.batch.job import Job, Settings
     from manipcli.report.run_report import JudgedRun
     from manipcli.report.suite.suite import Case, CaseReport
 
@@ -29,11 +26,8 @@ MARKS_OF_PYTEST = frozenset(
 )
 """Marks with a meaning in pytest itself: a tag with such a name is only a word for `-k`."""
 
-SETTINGS, PROGRESS = "settings", ".progress"
-"""Files in the folder of a session of `manipcli test`: settings of all runs, and the current test of each process."""
-REPORT = "manipcli_report"
-"""Attribute of pytest's report that carries a pickled `CaseReport` from a worker to the session."""
-
+SETTINGS = pytest.StashKey["Settings"]()
+"""Settings of all runs, from `manipcli test`."""
 _SEEN = pytest.StashKey[dict[Path, Path]]()
 """Collected task files, by their resolved paths."""
 _TORN = pytest.StashKey[dict[Path, str]]()
@@ -62,7 +56,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="S",
         help="stop a task after S seconds without progress; 0: never [default: 60]",
     )
-    group.addoption("--manipcli-session", type=Path, help=SUPPRESS)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -70,42 +63,18 @@ def pytest_configure(config: pytest.Config) -> None:
     _register(config, "engine_NAME", "a task for the engine NAME, as engine_pybullet")
 
 
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Announces a worker of `manipcli test`, and lets SIGINT interrupt it once, even where a shell that starts the
-    command in the background makes it ignore the signal."""
-    folder = session.config.getoption("manipcli_session")
-    if folder is not None and hasattr(session.config, "workerinput"):
-        _progress(folder).touch()
-        signal.signal(signal.SIGINT, _interrupt)
-
-
-def _interrupt(number: int, frame: object) -> None:
-    signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
-
-
-def _progress(folder: Path) -> Path:
-    return folder / f"{os.getpid()}{PROGRESS}"
-
-
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Passes the report of a test to `manipcli test`, with the line and the time of the task."""
+    """Gives the report of a test of `manipcli test` the line and the time of the task, for JUnit."""
     report = yield
-    if isinstance(item, TaskItem) and item.report is not None and call.when == "call":
+    if isinstance(item, TaskItem) and item.report is not None and call.when == "call" and SETTINGS in item.config.stash:
         done = item.report
-        if item.config.getoption("manipcli_session") is not None:
-            setattr(report, REPORT, pickle.dumps(done))
-            report.duration = done.duration
-            places = (trouble.place for trouble in done.troubles)
-            lines = (place.line for place in places if place is not None and place.file == done.case.file)
-            report.location = (
-                report.location[0],
-                next((line for line in lines if line), done.case.line),
-                item.name,
-            )
+        report.duration = done.duration
+        places = (trouble.place for trouble in done.troubles)
+        lines = (place.line for place in places if place is not None and place.file == done.case.file)
+        report.location = (report.location[0], next((line for line in lines if line), done.case.line), item.name)
     return report
 
 
@@ -173,7 +142,11 @@ class TaskFile(pytest.File):
 
 
 class TaskItem(pytest.Item):
-    """One run of a task, in its own process."""
+    """One run of a task, in its own process.
+
+    Attributes:
+        report: of the run; where it is known before the test starts, nothing is run.
+    """
 
     def __init__(self, *, name: str, parent: TaskFile, case: Case) -> None:
         # A complete node id: pytest reads `[N]` of a sample as parameters, in its cache, too.
@@ -193,16 +166,8 @@ class TaskItem(pytest.Item):
         from manipcli.batch.process import run_job
         from manipcli.report.suite.suite_text import judged_lines
 
-        folder = self.config.getoption("manipcli_session")
-        progress = None if folder is None else _progress(folder)
-
-        def show(beat: Beat) -> None:
-            if progress is not None:
-                progress.write_text(f"{self._case.id}\n{beat}", "utf-8")
-
-        self.report = run_job(self.job, observer=show)
-        if progress is not None:
-            progress.write_text("")
+        if self.report is None:
+            self.report = run_job(self.job)
         if not self.report.passed:
             raise TaskFailed(self.report)
         self.add_report_section("call", "margins", "\n".join(judged_lines(self.report)))
@@ -212,10 +177,8 @@ class TaskItem(pytest.Item):
         from manipcli.batch.discovery import shown_path
         from manipcli.batch.job import FOLDER, Job
 
-        session = self.config.getoption("manipcli_session")
-        if session is not None:
-            settings: Settings = pickle.loads((session / SETTINGS).read_bytes())
-        else:
+        settings = self.config.stash.get(SETTINGS, None)
+        if settings is None:
             chosen = self.config.getoption("manipcli_logs") or FOLDER
             settings = _settings(self.config, Path(shown_path(self.config.invocation_params.dir / chosen)))
         return Job(self._case, Path(shown_path(self.path)), settings)

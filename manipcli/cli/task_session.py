@@ -1,46 +1,54 @@
 """A pytest session over task files, for `manipcli test` and `bless`.
 
-pytest finds, selects and runs the tests through `cli/pytest_plugin.py`, pytest-xdist runs them in parallel. The user's
-own pytest configuration, conftest files, plugins and environment variables are ignored. pytest prints nothing; a report
-of each test arrives here as a `CaseReport`.
+pytest collects, selects and reports the tests through `cli/pytest_plugin.py`; their processes run in parallel
+(`batch/process.py`), and each is reported when it ends. The user's own pytest configuration, conftest files, plugins
+and environment variables are ignored, and pytest prints nothing.
 """
 
 from __future__ import annotations
 
 import io
 import os
-import pickle
-import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, suppress
+from contextlib import closing, contextmanager, redirect_stderr, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal, Self
 
 import pytest
 
+from manipcli.batch import process
 from manipcli.batch.baseline import is_baseline, kept_baseline
 from manipcli.batch.discovery import refused_path, shown_path
 from manipcli.batch.first_look import NOT_ENTERED
-from manipcli.batch.job import Settings
+from manipcli.batch.job import Beat, Job, Settings
 from manipcli.cli import console, pytest_plugin
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import number_of
-from manipcli.report.suite.suite import CaseReport, Suite, Trouble
+from manipcli.report.suite.suite import CaseReport, Suite
 
 BLOCKED = (
     "terminal", "python", "doctest", "unittest", "faulthandler", "logging", "warnings", "stepwise", "pastebin",
+    "unraisableexception", "threadexception",
 )  # fmt: skip
-"""Plugins of pytest itself that would print, collect other files than tasks, or change signal handlers."""
+"""Plugins of pytest itself that would print, collect other files than tasks, change signal handlers, or collect garbage
+several times."""
 CACHE = ".cache"
 """Folder below the logs in which pytest remembers which tests failed."""
+_INTERNAL_ERROR = pytest.ExitCode.INTERNAL_ERROR
 VARIABLES = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DISABLE_PLUGIN_AUTOLOAD")
-JUNIT = "junit.xml"
 
 
 class TaskSession:
     """The tests below some paths. A context manager: the constructor collects them, `run` runs them.
+
+    Attributes:
+        jobs: the runs by the ids of their tests, in the order of collection.
+        files: the task files.
+        notes: about baselines and unreadable files.
+        running: the last heartbeat of each test that is running, by its id.
+        junit: the JUnit XML of the last `run`.
 
     Args:
         paths: files, folders, and ids such as `tasks/pour.yaml::pour[3]`.
@@ -68,9 +76,8 @@ class TaskSession:
         if refused:
             raise InvalidInput(refused)
         self._settings = settings
-        self._temporary = TemporaryDirectory(prefix="manipcli-test-")
-        self.folder = Path(self._temporary.name)
-        (self.folder / pytest_plugin.SETTINGS).write_bytes(pickle.dumps(settings))
+        self.running: dict[str, Beat] = {}
+        self.junit = b""
         cwd = Path.cwd()
         self._words = [
             "-c", os.devnull, f"--rootdir={cwd}", "--noconftest", "--capture=no", "--continue-on-collection-errors",
@@ -78,13 +85,12 @@ class TaskSession:
             "-o", f"norecursedirs=.* {' '.join(sorted(NOT_ENTERED))}",
             "-o", f"cache_dir={cwd / settings.folder / CACHE}",
             "-o", "junit_family=xunit1", "-o", "junit_suite_name=manipcli",
-            f"--manipcli-session={self.folder}",
             *([f"--manipcli-samples={samples}"] if samples else []),
             *(["-k", keyword] if keyword else []),
             *(["--last-failed"] if last_failed else []),
             *(str(cwd / path) for path in named),
         ]  # fmt: skip
-        found = _Collected()
+        found = _Collected(settings)
         messages = io.StringIO()
         with redirect_stderr(messages):
             code = _pytest([*self._words, "--collect-only"], found)
@@ -92,7 +98,7 @@ class TaskSession:
             message = messages.getvalue().strip().removeprefix("ERROR: ")
             hint = "write, for example, -k 'pour and not (slow or kinematic)'" if "'-k'" in message else None
             raise InvalidInput([Diagnostic("USE085", message, hint=hint)])
-        if code == pytest.ExitCode.INTERNAL_ERROR:
+        if code == _INTERNAL_ERROR:
             raise RuntimeError(messages.getvalue())
         if found.interrupted:
             raise KeyboardInterrupt
@@ -106,19 +112,7 @@ class TaskSession:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        self._temporary.cleanup()
         remove_empty(self._settings.folder)
-
-    @property
-    def running(self) -> list[tuple[str, str]]:
-        """Id and progress of each test that is running."""
-        texts = [file.read_text("utf-8") for file in self.folder.glob(f"*{pytest_plugin.PROGRESS}")]
-        return [(id_, activity) for id_, found, activity in (text.partition("\n") for text in texts) if found]
-
-    @property
-    def junit(self) -> bytes:
-        """The JUnit XML of the run."""
-        return (self.folder / JUNIT).read_bytes()
 
     def run(self, *, at_once: int, ended: Callable[[CaseReport], None], first: bool = False) -> Suite:
         """Runs the tests.
@@ -129,14 +123,13 @@ class TaskSession:
             first: stop at the first failure.
         """
         began = time.monotonic()
-        run = _Run(self, ended, first=first)
         at_once = min(at_once, max(1, len(self.jobs)))
-        words = [*self._words, f"--junitxml={self.folder / JUNIT}", *(["-x"] if first else [])]
-        if at_once > 1:  # a worker that ends because of `-x` is not replaced
-            words += ["-p", "xdist.plugin", "-n", str(at_once), "--maxschedchunk=1"]
-            words += ["--max-worker-restart=0"] if first else []
-        if _pytest(words, run) == pytest.ExitCode.INTERNAL_ERROR:
-            raise RuntimeError("pytest ended with an internal error")
+        run = _Run(self._settings, at_once, self.running, ended)
+        with TemporaryDirectory(prefix="manipcli-test-") as folder:
+            junit = Path(folder, "junit.xml")
+            if _pytest([*self._words, f"--junitxml={junit}", *(["-x"] if first else [])], run) == _INTERNAL_ERROR:
+                raise RuntimeError("pytest ended with an internal error")
+            self.junit = junit.read_bytes()
         reports = tuple(run.reports[id_] for id_ in self.jobs if id_ in run.reports)
         undone = tuple(job.case for id_, job in self.jobs.items() if id_ not in run.reports)
         stopped: Literal["", "interrupted", "first failure"] = ""
@@ -144,7 +137,8 @@ class TaskSession:
             stopped = "interrupted"
         elif undone and first:
             stopped = "first failure"
-        notes = (*run.notes, *self.notes)
+        interrupted = (f"interrupted: {id_}: {beat}" for id_, beat in self.running.items())
+        notes = (*interrupted, *self.notes) if run.interrupted else self.notes
         return Suite(reports, len(self.jobs), at_once, time.monotonic() - began, stopped, notes, undone)
 
     def _notes(self, found: _Collected, keyword: str) -> Iterator[str]:
@@ -162,17 +156,31 @@ class TaskSession:
             yield f"{number_of(uncompared, 'test')} not compared with the baseline: {reason}"
 
 
-class _Collected:
+class _Plugin:
+    """A plugin that gives the settings of all runs to the tests, and records an interrupt."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.interrupted = False
+        self._settings = settings
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        config.stash[pytest_plugin.SETTINGS] = self._settings
+
+    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+        self.interrupted = excinfo.type is KeyboardInterrupt
+
+
+class _Collected(_Plugin):
     """A plugin that records what pytest collects."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings)
         self.chosen: list[pytest_plugin.TaskItem] = []
         self.total = 0
         self.files: list[Path] = []
         self.baselines: list[Path] = []
         self.errors: list[str] = []
         self.left_out: list[str] = []
-        self.interrupted = False
 
     def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> None:
         if file_path.name.endswith(".baseline.json") and any(map(parent.session.isinitpath, file_path.parents)):
@@ -193,53 +201,33 @@ class _Collected:
         self.chosen = [item for item in session.items if isinstance(item, pytest_plugin.TaskItem)]
         self.left_out = pytest_plugin.pytest_report_collectionfinish(session.config)
 
-    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        self.interrupted = excinfo.type is KeyboardInterrupt
 
+class _Run(_Plugin):
+    """A plugin that runs the processes of the tests in parallel, and reports each test when its process ends."""
 
-class _Run:
-    """A plugin that records the reports of the tests."""
-
-    def __init__(self, session: TaskSession, ended: Callable[[CaseReport], None], *, first: bool) -> None:
+    def __init__(
+        self, settings: Settings, at_once: int, running: dict[str, Beat], ended: Callable[[CaseReport], None]
+    ) -> None:
+        super().__init__(settings)
         self.reports: dict[str, CaseReport] = {}
-        self.notes: list[str] = []
-        self.interrupted = False
-        self._session, self._ended, self._first = session, ended, first
-        self._stopped = False
+        self._at_once, self._running, self._ended = at_once, running, ended
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        known = getattr(report, pytest_plugin.REPORT, None)
-        if self._stopped or (known is None and not report.failed):
-            return
-        if known is not None:
-            done: CaseReport = pickle.loads(known)
-        else:  # the worker died, or has a bug
-            job = self._session.jobs[report.nodeid]
-            text = report.longreprtext
-            done = CaseReport(job.case, "error", report.duration, job.command(), text, troubles=(Trouble(text),))
-        self.reports[report.nodeid] = done
-        self._ended(done)
-        if self._first and not done.passed:
-            self._stop()
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        items = {item.nodeid: item for item in session.items if isinstance(item, pytest_plugin.TaskItem)}
+        jobs = [item.job for item in items.values()]
+        with closing(process.run_jobs(jobs, at_once=self._at_once, observer=self._observe)) as reports:
+            for report in reports:
+                item = items[report.case.id]
+                self._running.pop(item.nodeid, None)
+                item.report = self.reports[item.nodeid] = report
+                session.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+                self._ended(report)
+                if session.shouldfail:
+                    raise session.Failed(session.shouldfail)
+        return True
 
-    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        if excinfo.type is KeyboardInterrupt:
-            self.interrupted = True
-            self.notes += [f"interrupted: {id_}: {activity}" for id_, activity in self._session.running]
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_sessionfinish(self) -> None:
-        if self.interrupted:
-            self._stop()
-
-    def _stop(self) -> None:
-        """Interrupts the workers; each removes the files of its run."""
-        self._stopped = True
-        for file in self._session.folder.glob(f"*{pytest_plugin.PROGRESS}"):
-            worker = int(file.stem)
-            if worker != os.getpid():
-                with suppress(ProcessLookupError):
-                    os.kill(worker, signal.SIGINT)
+    def _observe(self, job: Job, beat: Beat) -> None:
+        self._running[job.case.id] = beat
 
 
 def _pytest(words: Sequence[str], plugin: object) -> int:
@@ -249,7 +237,7 @@ def _pytest(words: Sequence[str], plugin: object) -> int:
 
 @contextmanager
 def _own_environment() -> Iterator[None]:
-    """Hides pytest options and plugins of the user's environment, here and in the workers."""
+    """Hides pytest options and plugins of the user's environment."""
     before = {name: os.environ.pop(name) for name in VARIABLES if name in os.environ}
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     try:

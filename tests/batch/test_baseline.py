@@ -192,6 +192,7 @@ def test_what_a_run_took_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_bless_then_test_passes_until_something_is_worse(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

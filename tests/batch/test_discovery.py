@@ -212,7 +212,7 @@ def test_a_baseline_whose_task_was_renamed_is_found(folder: Path) -> None:
 
 def test_a_pipe_is_no_task_and_holds_nobody_up(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "x.yaml")
-    hung = threading.Timer(5.0, lambda: os.close(os.open(tmp_path / "x.yaml", os.O_WRONLY | os.O_NONBLOCK)))
+    hung = threading.Timer(60.0, lambda: os.close(os.open(tmp_path / "x.yaml", os.O_WRONLY | os.O_NONBLOCK)))
     hung.start()  # ends a wait for who writes, so that this fails and does not hang
     assert task_files([tmp_path]) == ()
     with pytest.raises(InvalidInput, match="not a regular file"):

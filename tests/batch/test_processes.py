@@ -8,7 +8,7 @@ import pickle
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from manipcli.batch.child import _Beats, _end_of
 from manipcli.batch.job import Beat, End, Job, Settings, limit
-from manipcli.batch.process import Process, run_job
+from manipcli.batch.process import Process, run_job, run_jobs
 from manipcli.cli.task_session import remove_empty
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
@@ -40,6 +40,8 @@ from manipcli.batch.job import Beat, End
 parent = Connection(int(sys.argv[-1]))
 job = parent.recv()
 parent.send(Beat("step 1 of 1, 'lift_1'", 2.5))
+def begin():
+    open(job.settings.folder.parent / "began", "w").close()
 exec(job.case.task)
 """
 """Speaks with its parent as the real one does, and does what the name of the task says."""
@@ -51,8 +53,53 @@ def jobs(tmp_path: Path, *codes: str, **settings: float) -> list[Job]:
     return [Job(Case(f"t{k}.yaml", code), tmp_path / f"t{k}.yaml", chosen) for k, code in enumerate(codes)]
 
 
-def run(todo: Sequence[Job]) -> list[CaseReport]:
-    return [run_job(job, command=(sys.executable, "-c", CHILD)) for job in todo]
+def run(
+    todo: Sequence[Job], *, at_once: int = 1, observer: Callable[[Job, Beat], None] | None = None
+) -> list[CaseReport]:
+    return [*run_jobs(todo, at_once=at_once, observer=observer, command=(sys.executable, "-c", CHILD))]
+
+
+@pytest.fixture
+def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clock of processes stops until a child has called `begin()`: however slow its start is, it takes no time."""
+    began: list[float] = []
+
+    def monotonic() -> float:
+        if not began and (tmp_path / "began").exists():
+            began.append(time.monotonic())
+        return time.monotonic() - began[0] if began else 0.0
+
+    monkeypatch.setattr("manipcli.batch.process.time", SimpleNamespace(monotonic=monotonic))
+
+
+def test_jobs_run_in_parallel_and_are_reported_in_the_order_in_which_they_end(tmp_path: Path) -> None:
+    """The first one waits for a file of the third, which starts when the second one has ended."""
+    late = f"while not os.path.exists({str(tmp_path / 'x')!r}): time.sleep(0.01)\n{END}"
+    starts: list[str] = []
+
+    def observe(job: Job, beat: Beat) -> None:
+        if beat.activity == "starting" and job.case.id not in starts:
+            starts.append(job.case.id)
+
+    todo = jobs(tmp_path, late, END, f"open({str(tmp_path / 'x')!r}, 'w').close(); {END}")
+    reports = run(todo, at_once=2, observer=observe)
+    assert starts == [job.case.id for job in todo]
+    assert reports[0].case.file == "t1.yaml"
+    assert {report.outcome for report in reports} == {"invalid"}
+    assert len(reports) == 3
+
+
+def test_closing_ends_what_is_running_and_removes_its_files(tmp_path: Path) -> None:
+    pid = tmp_path / "pid"
+    stays = f"open({str(tmp_path / 'new')!r}, 'w').write(str(os.getpid())); "
+    stays += f"os.rename({str(tmp_path / 'new')!r}, {str(pid)!r}); time.sleep(100)"
+    ends = f"while not os.path.exists({str(pid)!r}): time.sleep(0.01)\n{END}"
+    reports = run_jobs(jobs(tmp_path, stays, ends), at_once=2, command=(sys.executable, "-c", CHILD))
+    assert next(reports).case.file == "t1.yaml"
+    reports.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text()), 0)
+    assert not list((tmp_path / "runs").iterdir())
 
 
 @pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
@@ -169,16 +216,17 @@ def test_half_a_message_and_what_stays_after_the_end_hold_nobody_up(
     assert (other.outcome, other.text) == ("invalid", "the task cannot be run")
 
 
-@pytest.mark.slow
-def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("clock")
+def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stuck = (
         "import faulthandler; faulthandler.register(signal.SIGUSR1)\n"
-        "def stuck_here():\n while True: time.sleep(1)\nstuck_here()"
+        "def stuck_here():\n begin()\n while True: time.sleep(1)\nstuck_here()"
     )
-    todo = [replace(job, settings=replace(job.settings, silence=1.0)) for job in jobs(tmp_path, stuck)]
+    monkeypatch.setattr("manipcli.batch.process.LAST_WORDS", 2.0)
+    todo = [replace(job, settings=replace(job.settings, silence=0.5)) for job in jobs(tmp_path, stuck)]
     (report,) = run(todo)
     assert report.outcome == "hung"
-    assert report.text == "hung: no progress for 1 s; step 1 of 1, 'lift_1' at 2.50 s"
+    assert report.text == "hung: no progress for 0.5 s; step 1 of 1, 'lift_1' at 2.50 s"
     assert report.output is not None
     assert "stuck_here" in Path(report.output).read_text()
 
@@ -188,8 +236,8 @@ def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path) -> None:
 def test_no_limit_is_none(tmp_path: Path, forever: float, watched: bool) -> None:
     (job,) = jobs(tmp_path, f"time.sleep(0.3); {END}", timeout=forever)
     job = replace(job, settings=replace(job.settings, silence=forever))
-    observer = (lambda _: None) if watched else None
-    report = run_job(job, observer=observer, command=(sys.executable, "-c", CHILD))
+    observer = (lambda _, __: None) if watched else None
+    (report,) = run([job], observer=observer)
     assert report.outcome == "invalid"
 
 
@@ -209,8 +257,9 @@ def test_a_step_that_is_planned_again_and_the_end_of_one_are_signs_of_life() -> 
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("clock")
 def test_signs_of_life_are_no_silence_but_do_not_stop_the_clock(tmp_path: Path) -> None:
-    busy = "while True: time.sleep(0.02); parent.send(Beat('busy'))"
+    busy = "begin()\nwhile True: time.sleep(0.02); parent.send(Beat('busy'))"
     todo = [replace(job, settings=replace(job.settings, silence=1.0)) for job in jobs(tmp_path, busy, timeout=2.2)]
     began = time.monotonic()
     (report,) = run(todo)
@@ -219,8 +268,9 @@ def test_signs_of_life_are_no_silence_but_do_not_stop_the_clock(tmp_path: Path) 
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("clock")
 def test_what_is_made_of_a_run_that_is_over_is_not_its_time(tmp_path: Path) -> None:
-    code = f"parent.send(Beat('judged', judged=True)); time.sleep(2.5); {END}"
+    code = f"begin(); parent.send(Beat('judged', judged=True)); time.sleep(2.5); {END}"
     (job,) = jobs(tmp_path, code, timeout=2.0)
     (report,) = run([replace(job, settings=replace(job.settings, silence=2.0))])
     assert report.outcome == "invalid"
@@ -238,10 +288,10 @@ def test_warnings_arrive_with_the_end(tmp_path: Path) -> None:
     assert beats.warnings == (doubt,)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("clock")
 def test_a_process_that_takes_no_signal_is_ended_too(tmp_path: Path) -> None:
-    (job,) = jobs(tmp_path, "os.kill(os.getpid(), signal.SIGSTOP)")
-    (report,) = run([replace(job, settings=replace(job.settings, silence=1.0))])
+    (job,) = jobs(tmp_path, "begin(); os.kill(os.getpid(), signal.SIGSTOP)")
+    (report,) = run([replace(job, settings=replace(job.settings, silence=0.2))])
     assert report.outcome == "hung"
 
 
@@ -249,13 +299,13 @@ def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     code = "open(job.partial, 'w').close(); parent.send(Beat(f'{os.getpid()}')); time.sleep(100)"
     seen: list[str] = []
 
-    def interrupt(beat: Beat) -> None:
+    def interrupt(_: Job, beat: Beat) -> None:
         seen.append(beat.activity)
         if beat.activity.isdecimal():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_job(jobs(tmp_path, code)[0], observer=interrupt, command=(sys.executable, "-c", CHILD))
+        run(jobs(tmp_path, code), observer=interrupt)
     assert not list((tmp_path / "runs").iterdir())
     with pytest.raises(ProcessLookupError):
         os.kill(int(seen[-1]), 0)

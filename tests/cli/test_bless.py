@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -24,13 +25,14 @@ steps: [{{{{wait: 1 s}}}}]
 def test_an_interruption_keeps_what_was_told_of_the_tasks_before(
     format_: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(job: Job, **_: object) -> CaseReport:
-        if job.case.task == "b":
-            raise KeyboardInterrupt
-        return CaseReport(job.case, "failed", 1.0, job.command(), "late")
+    def interrupted(jobs: Iterable[Job], **_: object) -> Iterator[CaseReport]:
+        for job in jobs:
+            if job.case.task == "b":
+                raise KeyboardInterrupt
+            yield CaseReport(job.case, "failed", 1.0, job.command(), "late")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("manipcli.batch.process.run_job", interrupted)
+    monkeypatch.setattr("manipcli.batch.process.run_jobs", interrupted)
     for name in ("a", "b"):
         (tmp_path / f"{name}.yaml").write_text(TASK.format(name=name))
     assert main(["bless", "--format", format_]) == 2

@@ -29,8 +29,12 @@ PLUGIN = "manipcli.cli.pytest_plugin"
 INSTALLED = any(point.value == PLUGIN for point in entry_points(group="pytest11"))
 LOADED = () if INSTALLED else ("-p", PLUGIN)
 """Where manipcli runs from its source, and is not installed, the plugin is named."""
-ALONE = ("-p", "no:hypothesispytest", "-p", "no:xdist", "-p", "no:randomly")
-"""Without the plugins of others, whose loading takes longer than these tests, or which change the order of tests."""
+ALONE = tuple(
+    word
+    for plugin in ("hypothesispytest", "xdist", "randomly", "unraisableexception", "threadexception")
+    for word in ("-p", f"no:{plugin}")
+)
+"""Without plugins that take longer than these tests, or that change the order of tests."""
 
 TASK = f"""\
 task: {{name}}
@@ -252,8 +256,9 @@ def test_foreign_yaml_loads_nothing_but_the_first_look(pytester: pytest.Pytester
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pytest.Pytester) -> None:
-    result = project.runpytest_subprocess(*LOADED, "-v", "-rP", "--junit-xml=out.xml", "--strict-markers")
+    result = project.runpytest_inprocess(*LOADED, *ALONE, "-v", "-rP", "--junit-xml=out.xml", "--strict-markers")
     result.assert_outcomes(passed=1, failed=2)
     told = result.stdout.str()
     assert re.search(r"failed: duration: fails by \d+ ms|failed: duration: fails by 0\.\d+ s", told)
@@ -272,6 +277,7 @@ def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pyte
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytester) -> None:
     project.makepyfile(
         """
@@ -299,7 +305,7 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
                 run_task("tasks/broken.yaml")
         """
     )
-    result = project.runpytest_subprocess(*LOADED, "test_a_python_test_runs_a_task_and_looks_at_its_report.py")
+    result = project.runpytest_inprocess(*LOADED, *ALONE, "test_a_python_test_runs_a_task_and_looks_at_its_report.py")
     result.assert_outcomes(passed=3, failed=1)
     told = result.stdout.str()
     for line in ("tasks/late.yaml:9:5: duration: fails by", "✓ at_pose: 2.9 deg to spare", "log: /", "picture: /"):
@@ -308,6 +314,7 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
 
 @pytest.mark.slow
 def test_two_workers_share_the_tasks(project: pytest.Pytester) -> None:
+    (project.path / "tasks" / "late.yaml").unlink()
     result = project.runpytest_subprocess(*LOADED, "-n", "2", "-v")
-    result.assert_outcomes(passed=1, failed=2)
-    assert "reproduce: manipcli run tasks/late.yaml" in result.stdout.str()
+    result.assert_outcomes(passed=1, failed=1)
+    assert "reproduce: manipcli run tasks/broken.yaml" in result.stdout.str()

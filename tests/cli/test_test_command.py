@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import parse
@@ -17,7 +19,7 @@ from xml.etree.ElementTree import parse
 import pytest
 
 from manipcli.batch.job import Job
-from manipcli.cli import task_session
+from manipcli.batch.process import Process
 from manipcli.cli.app import main
 from manipcli.report.suite.suite import Case, CaseReport
 
@@ -113,7 +115,7 @@ def test_a_result_that_cannot_be_written_takes_nothing_from_what_is_told(
     assert (folder / "pages" / "index.html").exists()
     write(folder, "b")
     done = CaseReport(Case("b.yaml", "b"), "passed", 1.0, "")
-    monkeypatch.setattr("manipcli.batch.process.run_job", lambda _, **__: done)
+    monkeypatch.setattr("manipcli.batch.process.run_jobs", lambda *_, **__: (done for _ in range(1)))
     assert main(["test", "--junit", "/dev/full"]) == 3  # all passed, and who waits for the file does not know it
 
 
@@ -143,20 +145,27 @@ def test_logs_go_where_something_can_be_written(folder: Path, capsys: pytest.Cap
     assert (folder / "else" / "where" / ".cache").is_dir()
 
 
+@dataclass
+class Given(list[Job]):
+    """What is run: nothing is. What `c` is called fails. `at_once`: of each call."""
+
+    at_once: list[int] = field(default_factory=list)
+
+    def run(self, jobs: Iterable[Job], *, at_once: int, **_: object) -> Iterator[CaseReport]:
+        self.at_once.append(at_once)
+        for job in jobs:
+            self.append(job)
+            yield CaseReport(job.case, "failed" if job.case.task == "c" else "passed", 1.0, "")
+
+
 @pytest.fixture
-def given(monkeypatch: pytest.MonkeyPatch) -> list[Job]:
-    """What is run: nothing is. What `c` is called fails."""
-    jobs: list[Job] = []
-
-    def run(job: Job, **_: object) -> CaseReport:
-        jobs.append(job)
-        return CaseReport(job.case, "failed" if job.case.task == "c" else "passed", 1.0, "")
-
-    monkeypatch.setattr("manipcli.batch.process.run_job", run)
+def given(monkeypatch: pytest.MonkeyPatch) -> Given:
+    jobs = Given()
+    monkeypatch.setattr("manipcli.batch.process.run_jobs", jobs.run)
     return jobs
 
 
-def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, given: list[Job]) -> None:
+def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, given: Given) -> None:
     write(folder, "a")
     assert main(["test", "--silence", "0", "--timeout", "0 s"]) == 0
     assert (given[0].settings.silence, given[0].settings.timeout) == (math.inf, math.inf)
@@ -166,24 +175,17 @@ def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, given: list[Job])
     ("words", "cores", "at_once"), [([], 2, 2), ([], 8, 3), (["-n", "1"], 2, 1), (["-n", "9"], 2, 3)]
 )
 def test_as_many_run_at_once_as_this_process_may_use_cores(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], cores: int, at_once: int
+    folder: Path, given: Given, monkeypatch: pytest.MonkeyPatch, words: list[str], cores: int, at_once: int
 ) -> None:
     for name in "abc":
         write(folder, name)
-    given: list[list[str]] = []
-    real = task_session._pytest
-    monkeypatch.setattr(
-        task_session, "_pytest", lambda words, plugin: given.append(words) or real([*words, "--collect-only"], plugin)
-    )
-    monkeypatch.setattr(task_session.TaskSession, "junit", b"")
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
     main(["test", *words])
     monkeypatch.delattr(os, "sched_getaffinity")  # as elsewhere than on Linux
     monkeypatch.setattr(sys, "platform", "darwin")
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     main(["test", *words])
-    workers = [words[words.index("-n") + 1] if "-n" in words else "1" for words in given]
-    assert workers == ["1", str(at_once)] * 2  # each time they are collected, then run
+    assert given.at_once == [at_once, at_once]
 
 
 @pytest.mark.parametrize(
@@ -195,7 +197,7 @@ def test_as_many_run_at_once_as_this_process_may_use_cores(
     ],
 )
 def test_the_first_failure_stops_only_what_is_left(
-    folder: Path, given: list[Job], capsys: pytest.CaptureFixture[str], names: str, words: list[str], told: str,
+    folder: Path, given: Given, capsys: pytest.CaptureFixture[str], names: str, words: list[str], told: str,
     summary: str,
 ) -> None:  # fmt: skip
     """The one in `c` fails."""
@@ -221,7 +223,7 @@ def test_the_first_failure_stops_only_what_is_left(
     ],
 )
 def test_samples_are_chosen_by_their_ids_and_by_having_failed_last(
-    folder: Path, given: list[Job], words: list[str], ids: list[str]
+    folder: Path, given: Given, words: list[str], ids: list[str]
 ) -> None:
     write(folder, "a")
     write(folder, "c")
@@ -234,7 +236,7 @@ def test_samples_are_chosen_by_their_ids_and_by_having_failed_last(
 
 
 def test_nothing_of_the_users_own_pytest_is_picked_up(
-    folder: Path, given: list[Job], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    folder: Path, given: Given, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     write(folder, "a")
     (folder / "conftest.py").write_text("raise SystemExit(3)")
@@ -251,7 +253,7 @@ def test_nothing_of_the_users_own_pytest_is_picked_up(
 
 
 def test_tasks_outside_of_the_working_directory_have_ids_of_their_own(
-    folder: Path, given: list[Job], monkeypatch: pytest.MonkeyPatch
+    folder: Path, given: Given, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "here").mkdir()
     for place in ("x", "y"):
@@ -275,11 +277,11 @@ def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.Captu
 
 
 @pytest.mark.slow
-def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) -> None:
+def test_good_and_bad_tasks_with_everything_written(folder: Path, call_cli: Any) -> None:
     write(folder, "good")
     write(folder, "late", below="0.1 s")
     words = ["--junit", "out.xml", "--report", "pages", "--github", "-n", "2"]
-    ran = run_cli("test", *words, cwd=folder)
+    ran = call_cli("test", *words, cwd=folder)
     assert ran.code == 1, ran
     assert re.search(r"✓ passed   good.yaml::good +\d+\.\d\d s  duration: \d+\.\d s to spare", ran.out)
     assert re.search(r"✗ failed   late.yaml::late +\d+\.\d\d s  duration: fails by", ran.out)
@@ -303,33 +305,34 @@ def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) 
     assert {file: case.get("line") for file, case in cases.items()} == {"good.yaml": "1", "late.yaml": "8"}
     assert [file for file, case in cases.items() if case.find("failure") is not None] == ["late.yaml"]
 
-    again = run_cli("test", "--last-failed", "--format", "json", cwd=folder)
+    again = call_cli("test", "--last-failed", "--format", "json", cwd=folder)
     answer = json.loads(again.out)
     assert again.code == 1
     assert [case["id"] for case in answer["cases"]] == ["late.yaml::late"]
     assert answer["cases"][0]["troubles"][0]["line"] == 8
-    mended = run_cli("test", "--last-failed", "-q", "--set", "expect.0.duration.below=9 s", cwd=folder)
+    mended = call_cli("test", "--last-failed", "-q", "--set", "expect.0.duration.below=9 s", cwd=folder)
     assert mended.code == 0, mended
     assert mended.out.startswith("✓ 1 passed")
     assert not (folder / "runs" / "test" / "late.mcap").exists()
 
 
 @pytest.mark.slow
-def test_a_step_that_cannot_be_planned_is_told_at_its_line(folder: Path, run_cli: Any) -> None:
+@pytest.mark.usefixtures("runs_in_threads")
+def test_a_step_that_cannot_be_planned_is_told_at_its_line(folder: Path, call_cli: Any) -> None:
     write(folder, "far")
     path = folder / "far.yaml"
     path.write_text(path.read_text().replace("  - wait: 0.2 s", "  - move: {pose: {xyz: [9, 0, 0]}}"))
-    ran = run_cli("test", "--github", cwd=folder)
+    ran = call_cli("test", "--github", cwd=folder)
     assert ran.code == 1, ran
     assert "::error file=far.yaml,line=6,col=5,title=far failed::move_1: failed: cannot be planned" in ran.out
     assert "log:" not in ran.out
 
 
 @pytest.mark.slow
-def test_the_first_failure_stops_where_that_is_asked(folder: Path, run_cli: Any) -> None:
+def test_the_first_failure_stops_where_that_is_asked(folder: Path, call_cli: Any) -> None:
     write(folder, "a", below="0.1 s")
     write(folder, "b", wait="500 s")
-    ran = run_cli("test", "-x", "-n", "2", cwd=folder)
+    ran = call_cli("test", "-x", "-n", "2", cwd=folder)
     assert ran.code == 1
     assert "1 not run" in ran.out
     assert "stopped at the first failure" in ran.out
@@ -364,13 +367,40 @@ class Started:
         return self.process.returncode, out
 
 
+Signal = Callable[[signal.Signals], None]
+
+
+@pytest.fixture
+def signalled(monkeypatch: pytest.MonkeyPatch) -> Signal:
+    """Sends a signal to the process of the run `a`, once it simulates; until then no silence is too long."""
+    hear = Process.hear
+
+    def send(number: signal.Signals) -> None:
+        sent: list[int] = []
+
+        def heard(process: Process) -> CaseReport | None:
+            report = hear(process)
+            if process.job.case.task != "a" or sent:
+                return report
+            partial = process.job.partial
+            if partial.exists() and partial.stat().st_size > 300_000:
+                sent.append(process._process.pid)
+                os.kill(process._process.pid, number)
+            process._heard = time.monotonic()
+            return report
+
+        monkeypatch.setattr(Process, "hear", heard)
+
+    return send
+
+
 @pytest.mark.slow
-def test_a_crash_of_native_code_costs_one_test(folder: Path) -> None:
+def test_a_crash_of_native_code_costs_one_test(folder: Path, signalled: Signal, call_cli: Any) -> None:
     write(folder, "a", wait="500 s")
     write(folder, "b")
-    started = Started(folder, "-n", "1", "--junit", "out.xml")
-    os.kill(started.child(), signal.SIGSEGV)
-    code, out = started.end()
+    signalled(signal.SIGSEGV)
+    ran = call_cli("test", "-n", "1", "--junit", "out.xml", cwd=folder)
+    code, out = ran.code, ran.out
     assert code == 1
     assert re.search(r"✗ crashed  a.yaml::a .* crashed by signal 11 \(SIGSEGV\); step 1 of 1, 'wait_1' at \d+\.", out)
     assert "✓ passed   b.yaml::b" in out
@@ -383,19 +413,18 @@ def test_a_crash_of_native_code_costs_one_test(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_hang_is_ended_and_named(folder: Path) -> None:
+def test_a_hang_is_ended_and_named(folder: Path, signalled: Signal, call_cli: Any) -> None:
     write(folder, "a", wait="500 s")
-    started = Started(folder, "--silence", "3 s")
-    os.kill(started.child(), signal.SIGSTOP)
-    code, out = started.end()
-    assert code == 1
-    assert re.search(r"✗ hung     a.yaml::a .* hung: no progress for 3 s; step 1 of 1, 'wait_1' at \d+\.", out)
+    signalled(signal.SIGSTOP)
+    ran = call_cli("test", "--silence", "1 s", cwd=folder)
+    assert ran.code == 1
+    assert re.search(r"✗ hung     a.yaml::a .* hung: no progress for 1 s; step 1 of 1, 'wait_1' at \d+\.", ran.out)
 
 
 @pytest.mark.slow
-def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, run_cli: Any) -> None:
+def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, call_cli: Any) -> None:
     write(folder, "a", wait="3600 s")
-    ran = run_cli("test", "--timeout", "1 s", cwd=folder)
+    ran = call_cli("test", "--timeout", "1 s", cwd=folder)
     assert ran.code == 1
     assert "hung: timeout after 1 s; " in ran.out
 

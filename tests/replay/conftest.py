@@ -54,7 +54,7 @@ class Page:
         self._number += 1
         self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
         while True:
-            message = json.loads(self._socket.recv(timeout=60))
+            message = json.loads(self._socket.recv(timeout=120))
             if message.get("id") == self._number:
                 assert "error" not in message, message
                 return message["result"]
@@ -79,7 +79,7 @@ class Page:
         answer = self.ask("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         return answer["result"].get("value")  # type: ignore[attr-defined]
 
-    def wait_for(self, script: str, seconds: float = 30.0) -> None:
+    def wait_for(self, script: str, seconds: float = 120.0) -> None:
         """Until an expression is true."""
         end = time.monotonic() + seconds
         while not self.evaluate(script):
@@ -112,7 +112,7 @@ def _started(program: str, folder: Path) -> Iterator[Page]:
             assert process.poll() is None and time.monotonic() < end, "the browser does not start"
             time.sleep(0.1)
         port = int(written.read_text().splitlines()[0])
-        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=10) as answer:
+        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=60) as answer:
             target = next(one for one in json.loads(answer.read()) if one["type"] == "page")
         with Page(connect(target["webSocketDebuggerUrl"], max_size=None)) as page:
             yield page

@@ -21,7 +21,7 @@ PAGE = "<!DOCTYPE html><title>a – b</title>"
 
 
 def _answer(port: int, path: str = "/", headers: dict[str, str] | None = None) -> tuple[int, str]:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
         connection.request("GET", path, headers=headers or {})
         response = connection.getresponse()

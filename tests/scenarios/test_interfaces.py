@@ -37,7 +37,7 @@ def tracking(log: Path) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWERS)
-def test_the_ball_is_poured_out(name: str, tmp_path: Path, run_cli: Any) -> None:
+def test_the_ball_is_poured_out(name: str, tmp_path: Path, call_cli: Any) -> None:
     law, bound = FOLLOWERS[name]
     own = (ROOT / "controllers" / "arm7_hand3.yaml").read_text(encoding="utf-8")
     hand = own[own.index("  hand_controller:") :]
@@ -47,7 +47,7 @@ def test_the_ball_is_poured_out(name: str, tmp_path: Path, run_cli: Any) -> None
     task += "expect:\n  - inside: {object: ball, of: tray}\n  - tracking: {group: arm, within: 0.05 rad}\n"
     task = task.replace("../robots", str(ROOT / "robots")).replace("../controllers/arm7_hand3.yaml", "controllers.yaml")
     (tmp_path / "pour.yaml").write_text(task, encoding="utf-8")
-    ran = run_cli("run", tmp_path / "pour.yaml", cwd=tmp_path)
+    ran = call_cli("run", tmp_path / "pour.yaml", cwd=tmp_path)
     assert ran.code == 0, ran.out + ran.err
     assert tracking(tmp_path / "runs" / "pour.mcap") < bound
 

@@ -1,4 +1,4 @@
-"""The tasks of the repository as a user runs them: one command in a process of its own, and its log judged again."""
+"""The tasks of the repository as a user runs them: one command, and its log judged again."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def without_places(answer: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("task", sorted(path.stem for path in TASKS.glob("*.yaml") if path.stem != "pour"))
-def test_every_task_passes(run_cli: Any, tmp_path: Path, task: str) -> None:
-    ran = run_cli("run", TASKS / f"{task}.yaml", cwd=tmp_path)
+def test_every_task_passes(call_cli: Any, tmp_path: Path, task: str) -> None:
+    ran = call_cli("run", TASKS / f"{task}.yaml", cwd=tmp_path)
     assert ran.code == 0, ran
     assert f"✓ {task} passed" in ran.out
     assert (tmp_path / "runs" / f"{task}.mcap").is_file()
@@ -73,10 +73,10 @@ def test_progress_goes_to_stderr_and_no_banner_anywhere(pour_run: Any) -> None:
     ]  # fmt: skip
 
 
-def test_two_runs_give_the_same_bytes(pour_run: Any, run_cli: Any, tmp_path: Path) -> None:
+def test_two_runs_give_the_same_bytes(pour_run: Any, call_cli: Any, tmp_path: Path) -> None:
     """Also from another working directory, and to a log of another name."""
     again = tmp_path / "again.mcap"
-    ran = run_cli("run", TASKS / "pour.yaml", "-q", "--log", again, cwd=tmp_path)
+    ran = call_cli("run", TASKS / "pour.yaml", "-q", "--log", again, cwd=tmp_path)
     assert ran.code == 0
     assert ran.err == ""
     assert hashlib.sha256(again.read_bytes()).hexdigest() == hashlib.sha256(pour_run.log.read_bytes()).hexdigest()
@@ -96,30 +96,30 @@ def test_no_name_of_this_machine_is_in_the_log(pour_run: Any) -> None:
             assert word.encode() not in text
 
 
-def test_the_log_alone_gives_the_same_verdict(pour_run: Any, run_cli: Any, tmp_path: Path) -> None:
+def test_the_log_alone_gives_the_same_verdict(pour_run: Any, call_cli: Any, tmp_path: Path) -> None:
     moved = tmp_path / "elsewhere" / "x.mcap"
     moved.parent.mkdir()
     shutil.copy(pour_run.log, moved)
-    ran = run_cli("judge", moved, "--format", "json", cwd=moved.parent)
+    ran = call_cli("judge", moved, "--format", "json", cwd=moved.parent)
     assert ran.code == 0
     assert without_places(one_object(ran.out)) == without_places(one_object(pour_run.ran.out))
 
 
-def test_a_log_is_judged_when_its_sources_are_gone(run_cli: Any, tmp_path: Path) -> None:
+def test_a_log_is_judged_when_its_sources_are_gone(call_cli: Any, tmp_path: Path) -> None:
     project = tmp_path / "project"
     for folder in ("tasks", "robots", "controllers"):
         shutil.copytree(ROOT / folder, project / folder)
     log = tmp_path / "home.mcap"
-    ran = run_cli("run", project / "tasks" / "home.yaml", "--format", "json", "--log", log, cwd=tmp_path)
+    ran = call_cli("run", project / "tasks" / "home.yaml", "--format", "json", "--log", log, cwd=tmp_path)
     shutil.rmtree(project)
-    judged = run_cli("judge", log, "--format", "json", cwd=tmp_path)
+    judged = call_cli("judge", log, "--format", "json", cwd=tmp_path)
     assert (ran.code, judged.code) == (0, 0)
     assert without_places(one_object(judged.out)) == without_places(one_object(ran.out))
 
 
-def test_without_physics_the_steps_are_done_and_objects_not_judged(run_cli: Any, tmp_path: Path) -> None:
+def test_without_physics_the_steps_are_done_and_objects_not_judged(call_cli: Any, tmp_path: Path) -> None:
     words = ("--set", "simulation.engine=kinematic", "--format", "json", "-q")
-    ran = run_cli("run", TASKS / "pour.yaml", *words, cwd=tmp_path)
+    ran = call_cli("run", TASKS / "pour.yaml", *words, cwd=tmp_path)
     answer = one_object(ran.out)
     assert (ran.code, answer["verdict"], answer["engine"]) == (1, "failed", "kinematic")
     assert {step["outcome"] for step in answer["steps"]} == {"done"}
@@ -134,7 +134,9 @@ def test_without_physics_the_steps_are_done_and_objects_not_judged(run_cli: Any,
     "overrides",
     [("scene.cup.mass='60 g'", "scene.cup.at=[0.76, -0.015]"), ("scene.cup.friction=0.6", "params.tilt=120 deg")],
 )
-def test_the_pour_can_be_varied_from_the_command_line(run_cli: Any, tmp_path: Path, overrides: tuple[str, ...]) -> None:
+def test_the_pour_can_be_varied_from_the_command_line(
+    call_cli: Any, tmp_path: Path, overrides: tuple[str, ...]
+) -> None:
     words = [word for override in overrides for word in ("--set", override)]
-    ran = run_cli("run", TASKS / "pour.yaml", "-q", *words, cwd=tmp_path)
+    ran = call_cli("run", TASKS / "pour.yaml", "-q", *words, cwd=tmp_path)
     assert ran.code == 0, ran

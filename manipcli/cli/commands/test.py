@@ -143,7 +143,7 @@ class _Lines:
 
     def _watch(self) -> None:
         while not self._over.wait(PERIOD):
-            running = (f"{id_.partition('::')[2]}: {activity}" for id_, activity in self._session.running)
+            running = (f"{id_.partition('::')[2]}: {activity}" for id_, activity in [*self._session.running.items()])
             with self._lock:
                 console.redraw(f"[{self._done}/{len(self._session.jobs)}] {'   '.join(running)}")
 

@@ -16,6 +16,8 @@ from manipcli.replay.view.view import View
 from manipcli.task.load_view import load_sight
 
 ROOT = Path(__file__).parents[3]
+SCALE = 0.5
+"""Pixels of the screen for one of the page."""
 CLICK = """(label => {
   const found = [...document.querySelectorAll("label, button")].find(e => e.textContent.trim() === label);
   if (found) found.click();
@@ -31,17 +33,18 @@ class Page(Protocol):
 
     def open(self, url: str) -> None: ...
     def evaluate(self, script: str) -> object: ...
-    def wait_for(self, script: str, seconds: float = 30.0) -> None: ...
+    def wait_for(self, script: str, seconds: float = 120.0) -> None: ...
     def screenshot(self) -> bytes: ...
+    def ask(self, method: str, **parameters: object) -> dict[str, object]: ...
 
 
 def _pixels(page: Page) -> np.ndarray:
     """The left part of the page, which the panel does not cover and the notice of slow rendering neither."""
     image = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
-    return image[160:, :900]
+    return image[int(160 * SCALE) :, : int(900 * SCALE)]
 
 
-def _until(page: Page, condition: Callable[[np.ndarray], bool], seconds: float = 90.0) -> np.ndarray:
+def _until(page: Page, condition: Callable[[np.ndarray], bool], seconds: float = 300.0) -> np.ndarray:
     end = time.monotonic() + seconds
     while not condition(seen := _pixels(page)):
         assert time.monotonic() < end, "the picture did not become what it should"
@@ -52,17 +55,19 @@ def _until(page: Page, condition: Callable[[np.ndarray], bool], seconds: float =
 def _is_orange(image: np.ndarray) -> bool:
     """The collision shapes, all but transparent over the arm."""
     r, g, b = (image[..., k] for k in range(3))
-    return bool(((r > 150) & (r - b > 60) & (r > g)).sum() > 10_000)
+    return bool(((r > 150) & (r - b > 60) & (r > g)).sum() > 10_000 * SCALE**2)
 
 
 @pytest.mark.slow
 def test_the_page_shows_the_robot_and_obeys_its_panel(browser: Page) -> None:
     sight = load_sight(ROOT / "robots" / "arm7_hand3" / "robot.yaml")
     with View(sight.robot, port=0) as view:
+        # A quarter of the pixels: they are drawn in software.
+        browser.ask("Emulation.setDeviceMetricsOverride", width=1280, height=800, deviceScaleFactor=SCALE, mobile=False)
         browser.open(view.url)
         browser.wait_for("document.querySelector('canvas') !== null")
         # Something dark (hand and joints) on a light ground, once the page has faded in.
-        home = _until(browser, lambda image: (image.max(axis=2) < 60).sum() > 2_000)
+        home = _until(browser, lambda image: (image.max(axis=2) < 60).sum() > 2_000 * SCALE**2)
         assert not _is_orange(home)
         names = [joint.name for joint in sight.robot.joints if joint.independent]
         shown = str(browser.evaluate("document.body.innerText"))

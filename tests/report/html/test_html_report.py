@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from manipcli.cli.app import main
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import frozen
 from manipcli.judge.drawn import Drawn
@@ -28,6 +28,7 @@ from manipcli.report.html.render_page import render_page
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 
 ROOT = Path(__file__).parents[3]
+RunCli = Callable[..., Any]
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)> & 'x' \"y\" \x1b[31m {{7*7}}"
 VOID = {"br", "img", "input", "line", "link", "meta", "rect", "polygon"}
 
@@ -222,29 +223,8 @@ def test_how_numbers_are_written(shown: str, text: str) -> None:
     assert shown == text
 
 
-@dataclass(frozen=True)
-class Ran:
-    """What the fixture `run_cli` gives, and `run_here`."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run_here(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
-    """The command line in this process."""
-
-    def run(*words: str | Path, cwd: Path) -> Ran:
-        monkeypatch.chdir(cwd)
-        code = main([*map(str, words)])
-        return Ran(code, *capfd.readouterr())
-
-    return run
-
-
 @pytest.mark.slow
-def test_a_task_that_was_refused_has_a_page_and_junit(run_here: Callable[..., Ran], tmp_path: Path) -> None:
+def test_a_task_that_was_refused_has_a_page_and_junit(call_cli: RunCli, tmp_path: Path) -> None:
     task = ROOT / "tasks" / "home.yaml"
     page, junit = tmp_path / "r.html", tmp_path / "j.xml"
     spec = load_task(task).spec
@@ -258,7 +238,7 @@ def test_a_task_that_was_refused_has_a_page_and_junit(run_here: Callable[..., Ra
         "--format",
         "json",
     ]
-    ran = run_here("run", task, *words, cwd=tmp_path)
+    ran = call_cli("run", task, *words, cwd=tmp_path)
     assert ran.code == 1 and json.loads(ran.out)["log"] is None
     shown = _Page(page.read_text("utf-8"))
     step = spec.steps[0].id
@@ -272,12 +252,12 @@ def test_a_task_that_was_refused_has_a_page_and_junit(run_here: Callable[..., Ra
     ("text", "place"), [("task: [\n", "bad.yaml:2:1"), ("task: pour\nrobt: x.yaml\nsteps: []\n", "bad.yaml:2:1")]
 )
 def test_an_invalid_task_has_a_page_and_junit_in_place_of_those_of_an_earlier_run(
-    run_here: Callable[..., Ran], tmp_path: Path, text: str, place: str
+    call_cli: RunCli, tmp_path: Path, text: str, place: str
 ) -> None:
     (tmp_path / "bad.yaml").write_text(text)
     for name in ("r.html", "j.xml"):
         (tmp_path / name).write_text("passed")
-    ran = run_here("run", "bad.yaml", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
+    ran = call_cli("run", "bad.yaml", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
     assert ran.code == 4
     shown = _Page((tmp_path / "r.html").read_text("utf-8"))
     assert "✗ error" in shown.words and place in shown.words and text.split("\n")[0] in shown.words
@@ -293,12 +273,12 @@ def test_an_invalid_task_has_a_page_and_junit_in_place_of_those_of_an_earlier_ru
 
 @pytest.mark.parametrize("data", [None, b"", b"no log"])
 def test_a_log_that_cannot_be_read_has_a_page_and_junit_in_place_of_those_of_an_earlier_one(
-    run_here: Callable[..., Ran], tmp_path: Path, data: bytes | None
+    call_cli: RunCli, tmp_path: Path, data: bytes | None
 ) -> None:
     if data is not None:
         (tmp_path / "run.mcap").write_bytes(data)
     (tmp_path / "r.html").write_text("passed")
-    ran = run_here("judge", "run.mcap", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
+    ran = call_cli("judge", "run.mcap", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
     assert ran.code == 4
     words = _Page((tmp_path / "r.html").read_text("utf-8")).words
     (error,) = ElementTree.parse(tmp_path / "j.xml").getroot().iter("error")
@@ -306,18 +286,16 @@ def test_a_log_that_cannot_be_read_has_a_page_and_junit_in_place_of_those_of_an_
 
 
 @pytest.mark.parametrize("option", ["--report", "--junit"])
-def test_where_nothing_can_be_written_is_told_before_the_run(
-    run_here: Callable[..., Ran], tmp_path: Path, option: str
-) -> None:
+def test_where_nothing_can_be_written_is_told_before_the_run(call_cli: RunCli, tmp_path: Path, option: str) -> None:
     task = ROOT / "tasks" / "home.yaml"
-    ran = run_here("run", task, option, tmp_path / "nowhere" / "file", cwd=tmp_path)
+    ran = call_cli("run", task, option, tmp_path / "nowhere" / "file", cwd=tmp_path)
     assert ran.code == 4 and "' does not exist" in ran.err
     assert not (tmp_path / "runs").exists()
-    assert "the command already uses this file" in run_here("run", task, option, task, cwd=tmp_path).err
+    assert "the command already uses this file" in call_cli("run", task, option, task, cwd=tmp_path).err
 
 
 @pytest.fixture(scope="module")
-def failed(run_cli: Callable[..., Ran], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def failed(run_cli: RunCli, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a pick that a slippery block makes fail, unwarned: its log, its page and its JUnit file."""
     folder = tmp_path_factory.mktemp("run")
     task = next((ROOT / "examples" / "02_pick_a_block").glob("task*.yaml"))
@@ -329,9 +307,9 @@ def failed(run_cli: Callable[..., Ran], tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.mark.slow
-def test_judge_makes_the_page_that_run_made(run_here: Callable[..., Ran], failed: Path, tmp_path: Path) -> None:
+def test_judge_makes_the_page_that_run_made(call_cli: RunCli, failed: Path, tmp_path: Path) -> None:
     words = ["--report", "j.html", "--junit", "j.xml", "--package-path", ROOT / "robots"]
-    assert run_here("judge", failed / "run.mcap", *words, cwd=tmp_path).code == 1
+    assert call_cli("judge", failed / "run.mcap", *words, cwd=tmp_path).code == 1
     page = (failed / "r.html").read_bytes()
     assert page == (tmp_path / "j.html").read_bytes()
     assert len(page) < 3_000_000
@@ -340,12 +318,10 @@ def test_judge_makes_the_page_that_run_made(run_here: Callable[..., Ran], failed
 
 
 @pytest.mark.slow
-def test_what_a_killed_run_left_has_a_page_that_says_so(
-    run_here: Callable[..., Ran], failed: Path, tmp_path: Path
-) -> None:
+def test_what_a_killed_run_left_has_a_page_that_says_so(call_cli: RunCli, failed: Path, tmp_path: Path) -> None:
     data = (failed / "run.mcap").read_bytes()
     (tmp_path / "run.mcap.partial").write_bytes(data[: len(data) * 6 // 10])
-    ran = run_here("judge", "run.mcap.partial", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
+    ran = call_cli("judge", "run.mcap.partial", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
     assert ran.code == 3
     words = _Page((tmp_path / "r.html").read_text("utf-8")).words
     assert "✗ error" in words and "The log is incomplete" in words and "What went wrong" in words
@@ -355,7 +331,7 @@ def test_what_a_killed_run_left_has_a_page_that_says_so(
 @pytest.mark.slow
 @pytest.mark.parametrize("plan", [b'{"steps": [{"id": "pick_1", "ve', b'{"steps": [{"id": 1}]}', b"[]"])
 def test_a_log_whose_plan_is_spoilt_has_a_page_and_junit_of_the_steps_that_began(
-    run_here: Callable[..., Ran], failed: Path, tmp_path: Path, rewrite_log: Callable[..., Path], plan: bytes
+    call_cli: RunCli, failed: Path, tmp_path: Path, rewrite_log: Callable[..., Path], plan: bytes
 ) -> None:
     rewrite_log(
         failed / "run.mcap",
@@ -363,7 +339,7 @@ def test_a_log_whose_plan_is_spoilt_has_a_page_and_junit_of_the_steps_that_began
         attachment=lambda name, data: plan if name == "plan.json" else data,
     )
     words = ["--report", "j.html", "--junit", "j.xml", "--package-path", ROOT / "robots", "--format", "json"]
-    ran = run_here("judge", "run.mcap", *words, cwd=tmp_path)
+    ran = call_cli("judge", "run.mcap", *words, cwd=tmp_path)
     assert ran.code == 1, ran.err
     begun = [step["id"] for step in json.loads(ran.out)["steps"]]
     whole = (failed / "r.html").read_text("utf-8")

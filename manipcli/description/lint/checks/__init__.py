@@ -18,9 +18,7 @@ from manipcli.description.lint.checks import (
     names,
     transmissions,
 )
-from manipcli.description.lint.checks import (
-    unknown_elements as elements,
-)
+from manipcli.description.lint.checks import unknown_elements as elements
 from manipcli.description.lint.checks.reading_meshes import READING_MESHES
 from manipcli.description.lint.checks.reading_text import READING_TEXT
 from manipcli.description.lint.checks.reading_tree import READING_TREE
