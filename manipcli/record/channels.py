@@ -77,14 +77,18 @@ class SensorChannel:
     Attributes:
         name: name of the controller.
         sensor: name of the sensor, the last word of the topic.
-        message: ROS type of the messages, one of `rows.SENSOR_TEMPLATES`.
+        message: ROS type of the messages: a header and `width` float64 fields.
         frame: link frame of the measurements.
+        width: numbers in a measurement.
+        definition: ros2msg text of the type; "" for a type of `record/schemas.py`.
     """
 
     name: str
     sensor: str
     message: str
     frame: str
+    width: int
+    definition: str = ""
 
     @property
     def topic(self) -> str:
@@ -97,12 +101,13 @@ Recorded = ControllerChannel | SensorChannel | None
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One row of the table; `id` counts from 1."""
+    """One row of the table; `id` counts from 1. `definition`: ros2msg text of a type that `schemas.py` does not have."""
 
     id: int
     topic: str
     type: str
     latched: bool = False
+    definition: str = ""
 
 
 def channel_table(controllers: Sequence[Recorded]) -> tuple[Channel, ...]:
@@ -135,4 +140,7 @@ def channel_table(controllers: Sequence[Recorded]) -> tuple[Channel, ...]:
                 (controller.status_topic, schemas.GOAL_STATUS_ARRAY, True),
                 (controller.result_topic, result, False),
             ]
-    return tuple(Channel(k, topic, kind, latched) for k, (topic, kind, latched) in enumerate(rows, start=1))
+    own = {sensor.topic: sensor.definition for sensor in controllers if isinstance(sensor, SensorChannel)}
+    return tuple(
+        Channel(k, topic, kind, latched, own.get(topic, "")) for k, (topic, kind, latched) in enumerate(rows, start=1)
+    )

@@ -148,7 +148,7 @@ def recorded(controller: Controller) -> Recorded:
         return None
     (request,) = controller.sensors
     sensor = SENSORS[request.type]
-    return SensorChannel(controller.name, sensor.name, sensor.message, request.frame)
+    return SensorChannel(controller.name, sensor.name, sensor.message, request.frame, sensor.width, sensor.definition)
 
 
 def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:

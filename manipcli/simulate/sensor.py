@@ -37,12 +37,14 @@ class SensorMember:
 
     Attributes:
         name: of the sensor, in requests; a broadcaster publishes it in the log as `/CONTROLLER/<name>`.
-        message: ROS type of that topic, one for which `record/write/rows.py` has a template.
+        message: ROS type of that topic: a header and `width` float64 fields.
         width: numbers in a reading, in the order of the message.
         open: (engine, request) -> the sensor, which may register with the engine.
+        definition: ros2msg text of the type; "" for a type that `record/schemas.py` has.
     """
 
     name: str
     message: str
     width: int
     open: Callable[[Engine, SensorRequest], Sensor]
+    definition: str = ""

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.control.controller import SensorRequest
 from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
-from manipcli.record.write.rows import SENSOR_TEMPLATES
+from manipcli.record.schemas import schema_text
+from manipcli.record.write.rows import sensor_template
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
@@ -61,6 +63,23 @@ def test_it_writes_one_array_and_its_randomness_is_that_of_the_generator(
 
 
 @every_sensor
-def test_the_log_can_write_its_readings(member: SensorMember) -> None:
-    ((_, count), *_) = SENSOR_TEMPLATES[member.message](1, "link").runs
+def test_its_message_is_a_header_and_one_number_for_each_of_its_reading(member: SensorMember) -> None:
+    """As another library decodes it: ones in, as many ones out, and nothing left."""
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(member.definition or schema_text(member.message), member.message))
+    template = sensor_template(1, "link", member.width)
+    data = bytearray(template.data)
+    ((offset, count),) = template.runs
     assert count == member.width
+    data[offset : offset + 8 * count] = np.ones(count).tobytes()
+    message = store.deserialize_cdr(bytes(data), member.message)
+    assert message.header.frame_id == "link"
+    assert _numbers(message) == [1.0] * member.width
+
+
+def _numbers(message: object) -> list[float]:
+    """Every float of a message, depth first."""
+    if isinstance(message, float):
+        return [message]
+    fields = vars(message).values() if hasattr(message, "__dict__") else ()
+    return [number for field in fields for number in _numbers(field)]

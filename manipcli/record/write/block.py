@@ -22,12 +22,12 @@ from manipcli.record.channels import Channel, ControllerChannel, Recorded, Senso
 from manipcli.record.messages import WORLD
 from manipcli.record.selection import Selection
 from manipcli.record.write.rows import (
-    SENSOR_TEMPLATES,
     RowBlock,
     Template,
     Times,
     controller_state_template,
     joint_state_template,
+    sensor_template,
     tf_template,
 )
 from manipcli.scene.scene import Scene
@@ -171,8 +171,8 @@ class Block:
                     if topic in ids:
                         plots.append((topic, joint_state_template(ids[topic], c.joints, effort=False), values))
             elif isinstance(c, SensorChannel):
-                template = SENSOR_TEMPLATES[c.message](ids.get(c.topic, 0), c.frame)
-                room = np.zeros((self.capacity, 1, template.runs[0][1]))
+                template = sensor_template(ids.get(c.topic, 0), c.frame, c.width)
+                room = np.zeros((self.capacity, 1, c.width))
                 self._rows.append(room)
                 if c.topic in ids:
                     readings.append((c.topic, template, partial(_reading, room)))

@@ -227,11 +227,11 @@ def _declare(container: Container, table: Sequence[Channel]) -> None:
     from mcap.records import Channel as ChannelRecord
     from mcap.records import Schema
 
-    types = list(dict.fromkeys(channel.type for channel in table))
+    types = {channel.type: channel.definition or schema_text(channel.type) for channel in table}
     container.begin(
         [
-            Schema(id=k, name=name, encoding="ros2msg", data=schema_text(name).encode())
-            for k, name in enumerate(types, start=1)
+            Schema(id=k, name=name, encoding="ros2msg", data=text.encode())
+            for k, (name, text) in enumerate(types.items(), start=1)
         ],
         [
             ChannelRecord(
@@ -239,7 +239,7 @@ def _declare(container: Container, table: Sequence[Channel]) -> None:
                 topic=channel.topic,
                 message_encoding="cdr",
                 metadata={"offered_qos_profiles": TRANSIENT_LOCAL} if channel.latched else {},
-                schema_id=types.index(channel.type) + 1,
+                schema_id=list(types).index(channel.type) + 1,
             )
             for channel in table
         ],

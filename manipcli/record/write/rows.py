@@ -10,16 +10,14 @@ rows at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array
-from manipcli.record import schemas
 from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.records import MESSAGE, MESSAGE_HEAD
 from manipcli.spec.controllers import Interface
@@ -95,16 +93,12 @@ def controller_state_template(channel: int, joints: Sequence[str], interfaces: S
     return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=tuple(runs))
 
 
-def wrench_template(channel: int, frame: str) -> Template:
-    """geometry_msgs/WrenchStamped; a run of 6: force, torque."""
+def sensor_template(channel: int, frame: str, width: int) -> Template:
+    """A message of a header and `width` float64 fields, such as geometry_msgs/WrenchStamped: one run of them."""
     writer = CdrWriter()
     stamp = writer.header(0, frame)
-    offset = writer.f64s([0.0] * 6)
-    return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=((offset, 6),))
-
-
-SENSOR_TEMPLATES: Final[Mapping[str, Callable[[int, str], Template]]] = {schemas.WRENCH: wrench_template}
-"""Message type -> function of (channel, frame) that returns its template; the first run is the measurement."""
+    offset = writer.f64s([0.0] * width)
+    return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=((offset, width),))
 
 
 class RowBlock:

@@ -24,7 +24,7 @@ T = 605
 def test_wrenches_stand_among_the_controllers(tmp_path: Path, make_run: Callable[[int], Any]) -> None:
     run = make_run(T)
     path = tmp_path / "run.mcap"
-    recorder = run.recorder(path, controllers=(ARM, None, SensorChannel("sensor", "wrench", WRENCH, "wheel"), HAND))
+    recorder = run.recorder(path, controllers=(ARM, None, SensorChannel("sensor", "wrench", WRENCH, "wheel", 6), HAND))
     wrenches = np.random.default_rng(1).normal(size=(T, 6))
     s = run.states
     for k in range(T):
