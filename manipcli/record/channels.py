@@ -101,7 +101,10 @@ Recorded = ControllerChannel | SensorChannel | None
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One row of the table; `id` counts from 1. `definition`: ros2msg text of a type that `schemas.py` does not have."""
+    """One row of the table; `id` counts from 1.
+
+    `definition`: ros2msg text of a type that `schemas.py` does not have.
+    """
 
     id: int
     topic: str
