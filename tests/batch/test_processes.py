@@ -247,7 +247,7 @@ def test_a_step_that_is_planned_again_and_the_end_of_one_are_signs_of_life() -> 
     beats = _Beats(childs)
     beats.step_started(step, 1, 2)
     beats.tick(2.5, 1.0)
-    beats.told("planned again", detail=True)
+    beats.message("planned again", detail=True)
     beats.step_ended(StepOutcome("pick_1", "pick", "done", started=2.0, ended=2.5, planned_duration=0.5))
     heard = [cast("Beat", ours.recv()) for _ in range(4)]
     assert {beat.place("tasks/t.yaml") for beat in heard} == {Place("tasks/t.yaml", 8, 5)}
@@ -355,7 +355,7 @@ def test_what_a_crash_left_is_drawn_with_the_meshes_of_the_run(tmp_path: Path, m
     drawer.mkdir(parents=True)
     for package in (drawer.parent, drawer):
         (package / "__init__.py").touch()
-    (drawer / "telling.py").write_text("def draw(log, picture, **how): picture.write_text(f'{log.name} {how}')")
+    (drawer / "failure_report.py").write_text("def draw(log, picture, **how): picture.write_text(f'{log.name} {how}')")
     monkeypatch.syspath_prepend(tmp_path / "other")
     (job,) = jobs(tmp_path, "open(job.partial, 'w').close(); os.abort()")
     settings = replace(job.settings, package_path=(tmp_path,), allow_outside=True)

@@ -114,4 +114,4 @@ def test_a_run_whose_log_the_disk_refused_is_not_told_by_the_page_of_an_earlier_
     assert main(["run", str(TASK), "--report", "report.html", "--junit", "junit.xml"]) == 3
     for path in (folder / "report.html", folder / "junit.xml"):
         assert path.exists() == room
-        assert not room or "stopped after t = 1.500 s" in path.read_text("utf-8")
+        assert not room or "recording stopped at t = 1.500 s" in path.read_text("utf-8")

@@ -62,7 +62,7 @@ def test_no_file_is_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixtu
     [
         (["--joint", "joint_8"], "'joint_8' has no loop to propose gains for"),
         (["--bandwidth", "fast"], "'fast'"),
-        (["--bandwidth", "-3"], "no frequency above 0"),
+        (["--bandwidth", "-3"], "is not a frequency above 0"),
         (["--period", "2 m"], "'2 m' is a length"),
         (["--period", "0"], "expected 1 us to 1 s"),
         (["-o", "step.gif"], "is not a figure: use"),
