@@ -11,7 +11,7 @@ from benchmarks.table import markdown
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=inside.__doc__)
-    parser.add_argument("--rounds", type=int, default=5, help="of every measurement; its median is told (default 5)")
+    parser.add_argument("--rounds", type=int, default=5, help="of every measurement; the median is printed (default 5)")
     parser.add_argument("--quick", action="store_true", help="one round, and no whole commands")
     parser.add_argument("--long", action="store_true", help="memory over ten simulated minutes, too (minutes)")
     options = parser.parse_args()

@@ -153,8 +153,8 @@ def simulate_rows(rounds: int) -> list[Row]:
     rest = tuple(whole - 1.0 - record for whole, record in zip(ratios, records, strict=True))
     return [
         Row("simulate phase of the pour / bare stepSimulation", tuple(ratios), "x", 1.5, "same world, same commands"),
-        Row("of which recording", tuple(records), "x", 0.2, "Recorder.tick and .contacts, flushes included"),
-        Row("of which engine, control, loop", rest, "x", 0.3, "the rest above 1"),
+        Row("recording", tuple(records), "x", 0.2, "Recorder.tick and .contacts, flushes included"),
+        Row("engine, control, loop", rest, "x", 0.3, "the rest above 1"),
         Row("bare stepSimulation", tuple(steps), "us", None, "for orientation"),
     ]
 

@@ -1,7 +1,7 @@
 """What is left of runs that are killed at random moments: always a readable log, at most a simulated second short.
 
-Each run is a process of its own that tells through shared memory which tick it has recorded. After SIGKILL the file it
-leaves is opened, judged and repaired; the repaired file must pass the mcap library's reader with all checksums.
+Each run is a process of its own that reports through shared memory which tick it has recorded. After SIGKILL the file
+it leaves is opened, judged and repaired; the repaired file must pass the mcap library's reader with all checksums.
 
     python -m benchmarks.killed_runs
     python -m benchmarks.killed_runs --runs 5 --seed 3 --task tasks/pick_place.yaml

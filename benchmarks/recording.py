@@ -120,9 +120,9 @@ def recording_rows(rounds: int) -> list[Row]:
         sizes = [minute * path.stat().st_size for path in (log, thin)]
     return [
         Row("recording, in the loop / mcap.writer.Writer with the same messages", tuple(ratios), "x", 1.0),
-        Row("recording, in the loop", tuple(ticks), "us a tick", None, "encoding included"),
-        Row("recording, on the second thread", tuple(threads), "us a tick", None, "compressing, writing"),
-        Row("mcap.writer.Writer with the same messages", tuple(raws), "us a tick", None, "serialised before"),
+        Row("recording, in the loop", tuple(ticks), "us per tick", None, "encoding included"),
+        Row("recording, on the second thread", tuple(threads), "us per tick", None, "compressing, writing"),
+        Row("mcap.writer.Writer with the same messages", tuple(raws), "us per tick", None, "serialised before"),
         Row("log of the pour", (sizes[0],), "MB a minute", None, "joints, frames, controllers at 1 kHz"),
         Row("log of the pour, thinned", (sizes[1],), "MB a minute", None, "joints, controllers 200 Hz, frames 50 Hz"),
     ]

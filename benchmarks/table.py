@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """One measurement. `values`: one a round, whose median is told; `aim`: at most that, None where none is set."""
+    """One measurement. `values`: one per round; the median is printed; `aim`: at most that, None where none is set."""
 
     what: str
     values: tuple[float, ...]

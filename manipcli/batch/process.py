@@ -24,7 +24,7 @@ from manipcli.core.errors import ExitCode
 from manipcli.core.lock import Taken, lock
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
-from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, doubts_of, signal_name, troubles_of
+from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of, warnings_of
 
 CHILD = """
 import json, sys
@@ -269,7 +269,7 @@ class Process:
             run=end.report,
             findings=end.findings,
             troubles=end.troubles or troubles_of(end.findings),
-            warnings=end.warnings or doubts_of(end.findings),
+            warnings=end.warnings or warnings_of(end.findings),
             log=kept[job.log] or kept[job.partial],
             picture=kept[job.picture],
             page=str(job.page) if job.page is not None and job.page.exists() else None,
@@ -332,7 +332,7 @@ def _unreadable(job: Job) -> CaseReport:
         text="the file cannot be read",
         findings=findings,
         troubles=troubles_of(findings),
-        warnings=doubts_of(findings),
+        warnings=warnings_of(findings),
         page=None if job.page is None or notes else str(job.page),
         notes=notes,
     )

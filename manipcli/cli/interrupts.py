@@ -9,11 +9,14 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from types import FrameType
 from typing import Self
 
 from manipcli.core.errors import ExitCode
 
+SAME = 0.3
+"""[s] A second signal within this time is the same: `timeout` signals the process and its group."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -26,6 +29,7 @@ class Interrupts:
 
     def __init__(self) -> None:
         self._asked = False
+        self._first = 0.0
         self._deferred = False
         self._before: dict[signal.Signals, object] = {}
 
@@ -50,8 +54,11 @@ class Interrupts:
             raise KeyboardInterrupt
 
     def _caught(self, number: int, frame: FrameType | None) -> None:
-        if self._asked:
+        now = time.monotonic()
+        if self._asked and now - self._first > SAME:
             os._exit(ExitCode.INTERRUPTED)
-        self._asked = True
+        if self._asked:
+            return
+        self._asked, self._first = True, now
         if not self._deferred:
             raise KeyboardInterrupt

@@ -11,7 +11,7 @@ from manipcli.cli.options import OutputFormat
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError
 
 
-class LogCut(ManipcliError):
+class LogTruncated(ManipcliError):
     """The reader of the log closed the pipe before its end."""
 
     code = "LOG201"
@@ -40,7 +40,7 @@ def stdout_or(log: Path | None) -> Iterator[Path | None]:
     The log is judged from its file before it is finished, so a pipe cannot replace the file.
 
     Raises:
-        LogCut: not all of it could be copied. Typer would end without a message on the error of the pipe.
+        LogTruncated: not all of it could be copied. Typer would end without a message on the error of the pipe.
         OSError: the disk is full.
     """
     if log is None or str(log) != "-":
@@ -59,5 +59,5 @@ def stdout_or(log: Path | None) -> Iterator[Path | None]:
                     try:
                         console.result_bytes(written)
                     except BrokenPipeError:
-                        raise LogCut from None
+                        raise LogTruncated from None
                     break

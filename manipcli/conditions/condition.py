@@ -31,7 +31,7 @@ Scope = Literal["end", "always"]
 Seen = Literal["bodies", "contacts", "references"]
 """What `record:` can leave out of a log."""
 
-Gauge = Callable[[StateWindow], Robustness]
+Monitor = Callable[[StateWindow], Robustness]
 """Robustness on successive state windows; each call continues where the last one ended. Motion, slip, time and energy
 count from the first tick of the first window."""
 
@@ -122,7 +122,7 @@ class Condition(Generic[S]):
     name: str
     spec: type[S]
     units: tuple[str, ...]
-    open: Callable[[S, World], Gauge]
+    open: Callable[[S, World], Monitor]
     check: Callable[[S, CheckContext], tuple[Problem, ...]]
     absent: Callable[[S, World], str | None]
     example: str

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, Scope, World
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, Scope, World
 from manipcli.conditions.robustness import Robustness, greatest, least, named, opposite
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc
@@ -19,11 +19,11 @@ from manipcli.spec.condition import ConditionSpec
 Seams = Seam[Condition[Any]]
 
 
-def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
+def opened(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
     """The monitor of a condition or combination, from the next state window on."""
     if not spec.combines:
         member = seam[spec.name]
-        monitor: Gauge = member.open(spec.body, world)
+        monitor: Monitor = member.open(spec.body, world)
         return monitor
     members = [_named(member, opened(member, world, seam)) for member in spec.members]
 
@@ -36,7 +36,7 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
     return look
 
 
-def _named(spec: ConditionSpec, monitor: Gauge) -> Gauge:
+def _named(spec: ConditionSpec, monitor: Monitor) -> Monitor:
     """In a combination the texts of a member begin with the name of its condition."""
     return monitor if spec.combines else lambda window: named(monitor(window), spec.name)
 

@@ -1,7 +1,7 @@
 """Successive control ticks of one run, live or recorded, in one form: the input of conditions.
 
 A live run passes on its new ticks, up to half a second at once; a recording passes on half a second at a time. A
-condition gives the same margins either way.
+condition gives the same margins in both cases.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def impossible_pair(context: CheckContext, pair: tuple[str, str], loc: Loc) -> t
     if unknown:
         return unknown
     if all(name.partition("/")[0] == ROBOT for name in pair):
-        message = "the simulation has no self-collision of the robot: these parts never touch"
+        message = "two parts of the robot never touch: the simulation has no self-collision"
         return (Problem(loc, message, "remove the pair: the planner avoids self-collision"),)
     if pair[0] == pair[1]:
         return (Problem(loc, f"'{pair[0]}' cannot touch itself"),)

@@ -127,7 +127,7 @@ class Tuned:
 
 
 @dataclass(frozen=True, slots=True)
-class _Draft:
+class _Design:
     """Design of one joint, before its gains are rounded to three digits."""
 
     inertia: float
@@ -170,7 +170,7 @@ def tune_efforts(
     drafts = []
     for k in range(len(load.joints)):
         wanted = max(w, math.sqrt(float(pressing[k] / inertia[k])))
-        draft = _Draft(float(inertia[k]), float(load.damping[k]), wanted, wish.damping, bool(carried[k]))
+        draft = _Design(float(inertia[k]), float(load.damping[k]), wanted, wish.damping, bool(carried[k]))
         most = float(left[k] / steps[k])  # of p
         enough = math.sqrt(most / draft.inertia)
         if draft.friction:
@@ -203,22 +203,22 @@ def _loop(load: JointSpaceLoad, k: int, inertia: float, gains: tuple[float, floa
     )
 
 
-def _softer(draft: _Draft, limit: Limit) -> _Draft:
+def _softened(draft: _Design, limit: Limit) -> _Design:
     """Reduce the damping gain by 5 %, by the damping ratio until that is at its least."""
     if draft.damping > LEAST_DAMPING:
         return replace(draft, damping=max(0.95 * draft.damping, LEAST_DAMPING), limit=limit)
     return replace(draft, w=0.95 * draft.w, limit=limit)
 
 
-def _calmed(load: JointSpaceLoad, k: int, draft: _Draft, wish: Wish) -> _Draft:
+def _calmed(load: JointSpaceLoad, k: int, draft: _Design, wish: Wish) -> _Design:
     """The draft with the required gain margin at the least inertia."""
     least = float(load.own_inertia[:, k].min())
     while draft.w > LEAST_FREQUENCY and not is_stable(_loop(load, k, least, draft.gains, wish).scaled(MARGIN)):
-        draft = _softer(draft, "control step")
+        draft = _softened(draft, "control step")
     return draft
 
 
-def _calm_together(load: JointSpaceLoad, drafts: list[_Draft], wish: Wish) -> None:
+def _calm_together(load: JointSpaceLoad, drafts: list[_Design], wish: Wish) -> None:
     """Reduce the drafts until all loops together have the margin in every configuration, the largest shares first."""
     for mass in load.mass:
         for _ in range(400):
@@ -228,7 +228,7 @@ def _calm_together(load: JointSpaceLoad, drafts: list[_Draft], wish: Wish) -> No
                 break
             _, share = unstable_share(whole.scaled(MARGIN))
             for k in np.flatnonzero(share >= min(0.25, share.max())):
-                drafts[k] = _softer(drafts[k], "other joints")
+                drafts[k] = _softened(drafts[k], "other joints")
 
 
 def tightness(load: JointSpaceLoad, tuned: Sequence[Tuned], wish: Wish) -> Array:
@@ -249,7 +249,9 @@ def least_margin(load: JointSpaceLoad, tuned: Sequence[Tuned], wish: Wish) -> fl
     return min(gain_margin(loop) for loop in loops)
 
 
-def _tuned(load: JointSpaceLoad, k: int, controller: str, draft: _Draft, wish: Wish, step: float, left: float) -> Tuned:
+def _tuned(
+    load: JointSpaceLoad, k: int, controller: str, draft: _Design, wish: Wish, step: float, left: float
+) -> Tuned:
     least = float(load.own_inertia[:, k].min())
     p, i, d = draft.gains
     clamp = None

@@ -116,6 +116,7 @@ def idle_gains(
         own = gains.get(joint)
         if own is None or own.idle:
             loc = ("gains", joint) if own is not None else ("gains",) if gains else ()
-            message = f"the gains of joint '{joint}' are all zero; on the {interface} interface it would not move"
+            what = "has no gains" if own is None else "has gains that are all zero"
+            message = f"joint '{joint}' {what}; on the {interface} interface it would not move"
             wanted = f"give gains.{joint}.p" if gains else f"add `gains: {{{joint}: {{p: ..., d: ...}}}}`"
             yield Problem(loc, message, f"{wanted}; `manipcli tune ROBOT CONTROLLERS` proposes them", "CTRL103")

@@ -12,7 +12,7 @@ import numpy as np
 from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.control.limit_laws import limit_array
 from manipcli.core.geometry import Array
-from manipcli.core.text import did_you_mean, told_apart
+from manipcli.core.text import did_you_mean, distinguished
 from manipcli.description.elements import JointLimits, JointType
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import Interface
@@ -204,7 +204,7 @@ def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalReje
     """The rejection of a goal with a `velocity` of joint `j` beyond its limit."""
     unit = facts.units[j] + "/s"
     most = float(facts.velocity[j])
-    moves, limit = told_apart(velocity, most if velocity > 0.0 else -most, form=".6g")
+    moves, limit = distinguished(velocity, most if velocity > 0.0 else -most, form=".6g")
     return GoalRejected(
         "CTRL125",
         f"joint '{facts.joints[j]}' moves at {moves} {unit} {where}; its limit is {limit.removeprefix('-')} {unit}",
@@ -214,8 +214,8 @@ def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalReje
 def _beyond(facts: JointFacts, j: int, value: float, where: str) -> str:
     unit = facts.units[j]
     (low, there), (also, high) = (
-        told_apart(facts.lower[j], value, form=".6g"),
-        told_apart(value, facts.upper[j], form=".6g"),
+        distinguished(facts.lower[j], value, form=".6g"),
+        distinguished(value, facts.upper[j], form=".6g"),
     )
     return (
         f"joint '{facts.joints[j]}' is at {max(there, also, key=len)} {unit} at {where}; "

@@ -158,4 +158,5 @@ class SimulationFailed(ManipcliError):
     def __init__(self, cause: str, *, time: float) -> None:
         self.cause = cause
         self.time = time
-        super().__init__(f"{cause} at t = {time:.3f} s")
+        what, _, advice = cause.partition("; ")
+        super().__init__(f"{what} at t = {time:.3f} s{f'; {advice}' if advice else ''}")

@@ -119,7 +119,7 @@ def digits(value: float) -> str:
     return f"{float(f'{value:.3g}'):.5g}"
 
 
-def told_apart(value: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
+def distinguished(value: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
     """Both numbers as text, with more digits than `form` where different numbers would look the same."""
     least, kind = int(form[1:-1]), form[-1]
     for many in range(least, least + 16):

@@ -25,7 +25,7 @@ _XACRO: Final = "http://www.ros.org/wiki/xacro"
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """An element of a description, after expansion; `place`, `text_place`: position of it and of its text."""
+    """An element of a description, after expansion; `place`, `text_place`: positions of the element and of its text."""
 
     tag: str
     attributes: Mapping[str, str]

@@ -208,7 +208,8 @@ class Packages:
             if os.path.islink(path):  # noqa: PTH114  (Path.is_symlink raises where a name is too long)
                 message, near = f"'{uri}' is a broken symbolic link", False
             else:
-                message, near = f"'{uri}' is not found; searched {shown_path(path)}", True
+                where = shown_path(path)
+                message, near = f"'{uri}' is not found{f'; searched {where}' if where != uri else ''}", True
             if inside(Path(os.path.realpath(path))):
                 raise Absent(message, hint=self._near(path) if near else None) from error
             raise NotFound(message) from error

@@ -73,7 +73,7 @@ def examine(
             expected.look(every if uses_no_state else window)
     names = labels(expect)
     if successive is None:
-        missing = order if isinstance(order, NotEvaluated) else NotEvaluated("the recording has no states")
+        missing = order if isinstance(order, NotEvaluated) else NotEvaluated("no tick was recorded")
         return Examined(tuple(outcome(name, missing) for name in names), end)
     found = (outcome(name, expected.found(end)) for name, expected in zip(names, asked, strict=True))
     return Examined(tuple(found), end)

@@ -64,7 +64,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         errors=errors,
         text=text,
         drawn=_drawn(recording),
-        cuts=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
+        saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
     )
 
 
@@ -137,7 +137,7 @@ def _verdict(
         first = undone.attempts[0].text if undone.attempts else ""
         if first not in ("", undone.text):
             why += f" (first attempt: {first})"
-        return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ')}{why}"
+        return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
     if not steps:
         return "failed", "the recording has no steps"
     unmet = next((expectation for expectation in expectations if expectation.outcome != "passed"), None)

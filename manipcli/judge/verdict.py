@@ -107,7 +107,7 @@ class Verdict:
         simulated_time: [s] of the last tick.
         errors: why the recording cannot be judged: no run, an interrupted run, or an incomplete log.
         drawn: the sample of the task's `vary:`; None: the task as written.
-        cuts: saturation of joints and actuators.
+        saturations: saturation of joints and actuators.
     """
 
     task: str
@@ -120,7 +120,7 @@ class Verdict:
     errors: tuple[Diagnostic, ...] = ()
     text: str = ""
     drawn: Drawn | None = None
-    cuts: Saturations = field(default_factory=Saturations)
+    saturations: Saturations = field(default_factory=Saturations)
 
     @property
     def ended_between(self) -> bool:

@@ -17,7 +17,7 @@ from manipcli.record.recording import Recording
 from manipcli.report.logs.log_diff import LogDiff, LogSide
 
 OUTCOME = ("verdict", JOINTS, ACTUATORS, LIMITS)
-"""Metadata of the result of a run, which is judged and measured again from the messages."""
+"""Metadata of the result of a run, which is recomputed from the messages."""
 PLACES = {EVENTS: ("place",), ROSOUT: ("file", "line")}
 """Fields that are not compared: a comment in the task file changes the line of a step."""
 

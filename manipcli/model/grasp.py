@@ -35,7 +35,7 @@ FOLLOWS: Final = 0.5
 STILL: Final = 2e-4
 """[m] A hand that moved less has not moved: fingers and arm yield by so much under load."""
 DROPPED: Final = 0.02
-"""[m] A lag on the way counts from this motion of the hand on; below it, contacts are still settling."""
+"""[m] A lag on the path counts from this motion of the hand on; below it, contacts are still settling."""
 MISPLACED: Final = 0.05
 """[m] An object further than this from its planned pose in the hand is not carried."""
 
@@ -163,6 +163,18 @@ class Grasp:
         if off > MISPLACED and not lags:
             reasons.append(f"it is {_mm(off)} from its planned pose in the hand")
         return ", ".join(reasons)
+
+    def short_of(self, planned: Array, state: WorldState) -> str:
+        """Why the object did not follow the planned motion (3,) [m] of the hand in this step; "" where it did."""
+        length = float(np.linalg.norm(planned))
+        if self._carried is None or length <= STILL:
+            return ""
+        moved = self._points(state)[1] - self._motions[-1].body
+        if float(moved @ planned) >= FOLLOWS * length**2:
+            return ""
+        up = planned[2] > 0.7 * length
+        verb, along = ("rose", float(moved[2])) if up else ("moved", float(moved @ planned) / length)
+        return f"it {verb} {_mm(along)} of the planned {_mm(float(planned[2]) if up else length)}"
 
     def _points(self, state: WorldState) -> tuple[Array, Array]:
         """The point (3,) [m] at which the object is held, in the world: on the hand, and on the object."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from manipcli.core.errors import Loc
-from manipcli.core.text import did_you_mean, told_apart
+from manipcli.core.text import did_you_mean, distinguished
 from manipcli.description.elements import Joint, Link
 from manipcli.model.robot import Group, NamedPose
 from manipcli.spec.robot import GroupSpec, RobotSpec
@@ -181,7 +181,7 @@ class _Poses:
             least, most = limits.within_soft
             if not least <= limits.nearest(value) <= most:
                 word, limit = ("lower", least) if value < least else ("upper", most)
-                at, bound = told_apart(value, limit, form=".6g")
+                at, bound = distinguished(value, limit, form=".6g")
                 message = f"pose '{name}': joint '{joint}' at {at} is beyond its soft {word} limit {bound}"
                 hint = f"change the pose, `soft_{word}` or `k_position`: no arm motion starts or ends there"
                 self._reporter.warning("ROBOT324", message, locs[joint], hint=hint)

@@ -57,5 +57,5 @@ class GraspBacktracking:
 def _counted(refusal: NotPlannable, tried: int) -> NotPlannable:
     if tried < 2:
         return refusal
-    cause = f"{refusal.cause}; {tried} grasps were tried"
+    cause = f"{refusal.cause}; {tried} grasps of the object were tried"
     return NotPlannable(cause, step=refusal.step, hint=refusal.hint, place=refusal.place)

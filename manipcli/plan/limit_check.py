@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import Loc, NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.core.text import told_apart
+from manipcli.core.text import distinguished
 from manipcli.model.robot import RobotModel
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
@@ -102,7 +102,7 @@ def _beyond(
 ) -> NotPlannable:
     """The refusal of a joint that `does` something at a position, {}, beyond this limit; `change` is for the hint."""
     word = ("lower", "upper")[side]
-    there, most = told_apart(value, limit, form=".4f")
+    there, most = distinguished(value, limit, form=".4f")
     bound = f"{'soft ' if soft else ''}{word} limit {most} {unit}"
     message = f"joint '{name}' {does.format(f'{there} {unit}')}, beyond its {bound}"
     hint = f"change {change}, or `soft_{word}` or `k_position` in the robot file; plans stay within soft limits"
@@ -149,7 +149,7 @@ def _bounded(
     k, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     if ratio[k, i] > 1.0 + tolerance:
         name = limits.names[i]
-        needed, most = told_apart(abs(values[k, i]), limit[i])
+        needed, most = distinguished(abs(values[k, i]), limit[i])
         unit = limits.unit(name) + PER[word]
         longer = math.ceil(100.0 * float(ratio[k, i]) ** (1.0 / ORDER[word])) / 100.0
         raise NotPlannable(

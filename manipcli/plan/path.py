@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
-from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
+from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics, rotation_vector
 
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
@@ -87,7 +87,8 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
         walked += float(np.linalg.norm(X_WT.p - before.p))
         turned += float(np.linalg.norm(rotation_vector(before.R.T @ X_WT.R)))
         found = solver.track(X_WT, q)
-        where = f"at {walked * 1000.0:.0f} mm and {np.degrees(turned):.0f} deg along the line"
+        rotated = f" and {np.degrees(turned):.0f} deg" if turned > ANGLE_TOLERANCE else ""
+        where = f"after {walked * 1000.0:.0f} mm{rotated}"
         if not found.converged:
             raise NotPlannable(
                 f"the straight line is unreachable {where}: {found.explain()}",

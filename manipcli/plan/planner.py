@@ -157,7 +157,7 @@ class Planner:
         if carried is None:
             return
         if carried.body == body:
-            raise NotPlannable(f"'{body}' is already in the hand")
+            raise NotPlannable(f"'{body}' is already in the hand", hint="remove this step, or `place` the object first")
         raise NotPlannable(
             f"the hand cannot take '{body}': it holds '{carried.body}'", hint=f"`place` '{carried.body}' first"
         )
@@ -226,7 +226,7 @@ class Planner:
         """
         hit = self.query(state, allowed).check(state.position)
         if hit is not None:
-            raise self.refusal(state, hit, "is", "before it moves")
+            raise self.refusal(state, hit, "is", "before the motion")
 
     def outside(self, state: PlanningState) -> None:
         """Check that the robot is inside no body, where the engine would throw them apart or wedge them.
@@ -263,10 +263,12 @@ class Planner:
                 hint = f"add `touch: [{body}]` to the `move` that leaves it"
         elif move and (body := self._touchable(state, hit)):
             hint = f"{NO_WAY_AROUND}; or add `touch: [{body}]`, if the hand is to push it or press on it"
-        if begins and hit.distance < 0.0 and not held:
+        if begins and held:
+            cause = f"'{hit.a}' still touches '{hit.b}' {when}"
+        elif hit.distance < 0.0:
             cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} {when}"
         else:
-            near = f"{hit.amount} {'apart' if hit.distance >= 0.0 else 'overlap'}"
+            near = f"{hit.amount} apart"
             cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
         return NotPlannable(cause, hint=hint, reason="in_the_way" if hint == NO_WAY_AROUND else None)
 
@@ -281,7 +283,7 @@ class Planner:
         return str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {1000 * CLEARANCE:.0f} mm"
 
     def touching(self, state: PlanningState, body: str) -> Pairs:
-        """The pairs of a movable body with what it stands on or touches."""
+        """The pairs of a movable body with its support and what it touches."""
         root = self.robot.root
         X_LO = self.robot.X_WB.inverse() @ self.body_pose(state, body)
         carried = Carried(body=body, link=root, X_LO=X_LO)

@@ -46,7 +46,7 @@ def too_wide(planner: Planner, state: PlanningState, body: str, opened: str, pos
         hits = planner.grasping(there, body).every(q)
         if len({side[name] for hit in hits for name in (hit.a, hit.b) if name in side}) < 2:
             return None
-    return f"'{body}' is wider than the hand opens in its pose '{opened}'"
+    return f"open the hand further, `open: POSE`: '{body}' is wider than the hand in its pose '{opened}'"
 
 
 def _posed(planner: Planner, state: PlanningState, posture: str) -> Array:

@@ -82,7 +82,7 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
     found |= {"steps": [], "expectations": []}
     if judged is not None:
         found |= picked(judged, "task verdict text seed engine simulated_time")
-        found["saturated"] = saturated_object(judged.cuts)
+        found["saturated"] = saturated_object(judged.saturations)
         found["steps"] = [step_object(step) for step in judged.steps]
         found["expectations"] = [
             picked(expectation, "name outcome margin unit at text") for expectation in judged.expectations
@@ -92,12 +92,12 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
     return {**found, **known, "errors": plain(errors)}
 
 
-def saturated_object(cuts: Saturations) -> dict[str, Json]:
+def saturated_object(saturations: Saturations) -> dict[str, Json]:
     """Number of saturated ticks of each saturated joint and actuator."""
     return {
-        "joints": _counted(cuts.joints),
-        "actuators": _counted(cuts.actuators),
-        "limits": {kind: dict(some) for kind, of in cuts.kinds.items() if (some := _counted(of))},
+        "joints": _counted(saturations.joints),
+        "actuators": _counted(saturations.actuators),
+        "limits": {kind: dict(some) for kind, of in saturations.kinds.items() if (some := _counted(of))},
     }
 
 

@@ -81,7 +81,7 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
         lines += [_expectations(verdict.expectations), ""]
     mark = PASS if verdict.verdict == "passed" else FAIL
     lines.append(f"{mark} {verdict.task} {verdict.verdict}: {verdict.text or _summary(verdict)}")
-    if cut := str(verdict.cuts):
+    if cut := str(verdict.saturations):
         lines.append(cut)
     lines.append(f"{speed}; engine {verdict.engine}, seed {verdict.seed}")
     if verdict.drawn is not None:
@@ -115,11 +115,11 @@ def _tries(step: StepOutcome) -> str:
     return f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
 
 
-_WENT_WRONG = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
+_WENT_WRONG = {"failed": "failed", "timeout": "timed out", "interrupted": "was interrupted"}
 
 
 def how_wrong(step: StepOutcome) -> str:
-    """How a step went wrong, such as `step 'pick' ran out of time`."""
+    """How a step went wrong, such as `step 'pick' timed out`."""
     return f"step '{step.id}' {_WENT_WRONG[step.outcome]}{_tries(step)}"
 
 

@@ -17,7 +17,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
-from manipcli.run.step_loop import StepLoop, cuts_of
+from manipcli.run.step_loop import StepLoop, saturations_of
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
@@ -113,7 +113,7 @@ def _run_steps(
             try:
                 run.steps()
             finally:
-                for kind, counts in cuts_of(session).to_metadata().items():
+                for kind, counts in saturations_of(session).to_metadata().items():
                     recorder.metadata(kind, counts)
     finally:
         engine.close()
@@ -138,7 +138,12 @@ def _settle(task: Task, session: Session) -> None:
     Raises:
         SimulationFailed: names the body, and how far or how fast it moved.
     """
-    Executor(session).hold(task.spec.simulation.settle)
+    try:
+        Executor(session).hold(task.spec.simulation.settle)
+    except SimulationFailed as failed:
+        what, mark, advice = failed.cause.partition("; ")
+        cause = f"{what} while settling before the start{mark}{advice}"
+        raise SimulationFailed(cause, time=failed.time) from failed
     state = session.engine.read()
     for k, body in enumerate(task.scene.movable):
         shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))

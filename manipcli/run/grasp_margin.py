@@ -46,7 +46,7 @@ class GraspMargin:
         friction = body.friction * self._robot.friction
         weight = body.mass * float(np.linalg.norm(self._scene.gravity))
         grasp = f"grip force {readable(pressed, 'N')}: friction {friction:.3g}"
-        shares = f"({body.friction:.3g} x {self._robot.friction:.3g} of the hand)"
+        shares = f"('{name}' {body.friction:.3g} x hand {self._robot.friction:.3g})"
         text = f"{grasp} {shares} carries {readable(friction * pressed, 'N')}, its weight is {readable(weight, 'N')}"
         if friction * pressed > AMPLE * weight:
             by = ", ".join(f"{link.partition('/')[2]} ({readable(force, 'N')})" for force, link in taken)

@@ -38,7 +38,7 @@ AFTERMATH: Final = 0.6
 """[s] Simulated after the last step, so that `at_rest` can be judged."""
 
 
-def cuts_of(session: Session) -> Saturations:
+def saturations_of(session: Session) -> Saturations:
     """The saturations of joints, by limit, and of actuators so far."""
     names = session.robot.joint_names
     joints = dict(zip(names, map(int, session.saturations), strict=True))
@@ -207,7 +207,7 @@ class StepLoop:
 
     def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: PlanningState, *, retry: bool) -> MotionEnd:
         """One attempt, re-planned on `retry`, after a failed step, or if the measured state differs from the plan."""
-        before = cuts_of(self._session)
+        before = saturations_of(self._session)
         now = self._measured.situation(self._believed)
         if retry and planned_start.carried is None and planned.plan.end.carried is not None:
             now = replace(now, carried=None)  # a retried grasp may start with the hand closed on its object
@@ -285,7 +285,7 @@ class StepLoop:
             return MotionEnd("failed", held)
         if planned.plan.end.carried is None:
             self._measured.grasp.release()
-        left = self._left_behind(planned.plan.end.carried)
+        left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
@@ -315,6 +315,18 @@ class StepLoop:
         grasp = self._grasp_margin.summary(carried.body)
         text = f"the hand does not carry '{carried.body}': {why}; it slipped or was never held"
         return MotionEnd("failed", f"{text}{f'; {grasp}' if grasp else ''}")
+
+    def _short_of_plan(self, planned: PlannedStep, before: PlanningState) -> MotionEnd | None:
+        """A failure where the object in the hand did not follow the planned motion; a guarded step may end early."""
+        carried, end = before.carried, planned.plan.end
+        if carried is None or end.carried is None or not self._physics:
+            return None
+        if any(motion.guarded for motion in planned.plan.motions):
+            return None
+        planner = self._plan.planner
+        motion = planner.tool_pose(end).p - planner.tool_pose(before).p
+        why = self._measured.grasp.short_of(motion, self._session.engine.read())
+        return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
 
     def _still_held(self, before: PlanningState) -> str:
         """Which links still hold the object that was carried `before`; "" if it was released."""
@@ -355,5 +367,5 @@ def _no_longer(motion: Motion, probe: Probe | None) -> str:
 
 def _saturated_since(before: Saturations, session: Session) -> str:
     """The saturations since `before`; "" without any."""
-    saturated = str(cuts_of(session).since(before))
+    saturated = str(saturations_of(session).since(before))
     return f"; {saturated}" if saturated else ""

@@ -13,7 +13,7 @@ from manipcli.description.elements import Inertial
 from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape
-from manipcli.scene.drop_test import FORMED, landing
+from manipcli.scene.drop_test import FORMED, drop_height
 from manipcli.scene.mass_properties import union
 from manipcli.scene.scene import Body, Frame, Interior, Scene
 from manipcli.scene.scene_names import Locate, misnamed
@@ -274,7 +274,7 @@ class _Builder:
             return None
         if not formed:
             return X_WO
-        fall = landing(shape, X_WO, support, X_WB)
+        fall = drop_height(shape, X_WO, support, X_WB)
         if fall is None:
             message = f"'{name}' at [{spec.at[0]:g}, {spec.at[1]:g}] m is not above any part of '{other}'"
             self._error("TASK224", message, ("scene", name, "at"), f"choose `at` above a part of '{other}'")

@@ -19,7 +19,7 @@ LEAST: Final = 2e-4
 """[m] Least step down, and so the largest remaining gap: next to a wall all distances are small."""
 
 
-def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape, X_WU: Transform) -> float | None:
+def drop_height(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape, X_WU: Transform) -> float | None:
     """Distance [m] that a body at X_WF falls until it touches `under`; None if it falls past it.
 
     Conservative advancement: a step of the current distance cannot cause contact. The body has landed when the least

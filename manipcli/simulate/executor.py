@@ -123,7 +123,7 @@ class Executor:
                 return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
-                late = f"the step timed out before {late}"
+                late = f"limit reached at t = {session.time:.3f} s, before {late}"
                 if busy and session.ticks >= last_tick:  # it should be over by now
                     late += f"; {self._furthest()}"
                 self._cancel()
@@ -142,7 +142,7 @@ class Executor:
             looks = self._session.ticks % UNTIL_TICKS == 0 or self._session.time >= deadline
             if looks and until(state):
                 return DONE
-        return MotionEnd("timeout", "the condition under `until` did not hold in time", awaited=True)
+        return MotionEnd("timeout", f"`until` did not hold by t = {self._session.time:.3f} s", awaited=True)
 
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""

@@ -228,7 +228,7 @@ class Session:
             name = self.robot.joint_names[k]
             unit = self.robot.joint(name).unit
             raise SimulationFailed(
-                f"joint '{name}' runs away at {state.velocity[k]:.3g} {unit}/s; "
+                f"joint '{name}' diverges at {state.velocity[k]:.3g} {unit}/s, limit {self._runaway[k]:.3g} {unit}/s; "
                 "its controller may be unstable (gains too high for the control period), or too weak to hold its "
                 "weight (gains, clamps or effort too low, no gravity compensation)",
                 time=self.time,

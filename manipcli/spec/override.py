@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from types import NoneType
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
-from manipcli.core.text import did_you_mean, escape, listed, shorten
+from manipcli.core.text import did_you_mean, escape, listed, number_of, shorten
 from manipcli.spec.base import Model
 from manipcli.spec.located import Area
 from manipcli.spec.source import shape
@@ -162,7 +162,7 @@ def _index(node: SequenceNode, override: Override, done: Loc, part: str) -> int:
         return ids.index(part)
     if part.isascii() and part.isdecimal() and len(part) < 7 and int(part) < len(node.items):
         return int(part)
-    many = f"'{dotted(done)}' has {len(node.items)} items, counted from 0"
+    many = f"'{dotted(done)}' has {number_of(len(node.items), 'item')}, counted from 0"
     hint = f"steps: {listed(ids)}" if ids else None
     if ids and not part.isdecimal():
         hint = did_you_mean(part, ids, kind="steps")

@@ -320,7 +320,7 @@ class TaskSpec(Model):
     )
     vary: dict[str, VarySpec] = Field(
         {},
-        description="Values that `--sample N` draws, by path as for `--set`; `*` stands for every name: "
+        description="Values that `--sample N` draws, by path as for `--set`; `*` matches every name: "
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
     baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")

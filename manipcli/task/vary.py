@@ -68,7 +68,7 @@ class Varied:
     """A number or vector of a file that is drawn.
 
     Attributes:
-        key: the key in `vary:`, where `*` may stand for several paths.
+        key: the key in `vary:`, where `*` may match several paths.
         path: path as for `--set`.
         area, parts: the file, and the path in it.
         nominal: the value in the file, one number per component.

@@ -16,7 +16,7 @@ from manipcli.control.gain_design import MARGIN, Tuned, Wish, least_margin, tigh
 from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array
-from manipcli.core.text import did_you_mean, listed, told_apart
+from manipcli.core.text import did_you_mean, distinguished, listed
 from manipcli.model.configuration import configuration, named_configurations, with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
@@ -73,7 +73,7 @@ def tune(
         robot_path, controllers_path: the two files.
         wish: bandwidth, damping and control period.
         joints: only these joints; (): all joints with gains.
-        step: size of a step [rad] that must not saturate; a tenth of it [m] for prismatic joints.
+        step: size of a step [rad] that must not saturate; prismatic joints: a tenth [m].
         package_path, allow_outside: see `read_robot`.
         simulated: also step every joint of the whole robot in the engine, under gravity.
 
@@ -227,7 +227,7 @@ class _Tuner:
             hint = "use a shorter `--period` or a lower `--bandwidth`"
             message = f"no gains are stable in all configurations: they are unstable {there}"
             raise InvalidInput([Diagnostic("TUNE003", message, self._file.place("controllers"), hint)])
-        left, wanted = told_apart(margin, MARGIN, form=".2g")
+        left, wanted = distinguished(margin, MARGIN, form=".2g")
         self.notes += (f"Gain margin {left} of all loops together is below {wanted} {there}.",)
 
     def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:

@@ -422,9 +422,9 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
 @pytest.mark.parametrize(
     ("pair", "told"),
     [
-        (["robot", "robot"], "the simulation has no self-collision of the robot"),
-        (["robot/finger", "robot"], "the simulation has no self-collision of the robot"),
-        (["robot/finger", "robot/thumb"], "the simulation has no self-collision of the robot"),
+        (["robot", "robot"], "two parts of the robot never touch"),
+        (["robot/finger", "robot"], "two parts of the robot never touch"),
+        (["robot/finger", "robot/thumb"], "two parts of the robot never touch"),
         (["cube", "cube"], "'cube' cannot touch itself"),
         (["desk", "shelf"], "'desk' and 'shelf' are both fixed"),
         (["desk", f"robot/{ROBOT.root}"], f"'desk' and 'robot/{ROBOT.root}' are both fixed"),

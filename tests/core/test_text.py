@@ -12,6 +12,7 @@ from manipcli.core.text import (
     any_of,
     did_you_mean,
     digits,
+    distinguished,
     escape,
     listed,
     nearest,
@@ -19,7 +20,6 @@ from manipcli.core.text import (
     number_of,
     shorten,
     shorten_apart,
-    told_apart,
 )
 
 JOINTS = [f"joint_{k}" for k in range(1, 8)]
@@ -109,7 +109,7 @@ def test_three_digits_stand_without_an_exponent_while_people_would_write_none(va
     ],
 )
 def test_numbers_that_differ_look_different(one: float, other: float, form: str, told: tuple[str, str]) -> None:
-    assert told_apart(one, other, form=form) == told
+    assert distinguished(one, other, form=form) == told
 
 
 @pytest.mark.parametrize(

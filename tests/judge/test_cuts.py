@@ -47,7 +47,7 @@ def test_since_an_earlier_moment_only_what_was_added_counts() -> None:
 
 
 def test_a_verdict_tells_it_in_text_and_json() -> None:
-    verdict = Verdict("t", "passed", 0, "pybullet", 1.0, (), (), cuts=CUTS)
+    verdict = Verdict("t", "passed", 0, "pybullet", 1.0, (), (), saturations=CUTS)
     assert f"\n{CUTS}\n" in render_verdict(verdict, "x.mcap")
     assert "saturated" not in render_verdict(Verdict("t", "passed", 0, "pybullet", 1.0, (), ()), "x.mcap")
     assert saturated_object(CUTS) == {"joints": {"a": 5, "c": 70}, "actuators": {"m1": 6, "m2": 300}, "limits": {}}

@@ -308,7 +308,7 @@ def test_a_step_that_is_not_done_fails_the_run_before_any_expectation(outcome: s
     events = (*step("go", 0.0, 1.0), *step("wait_1", 1.0, 2.0, outcome, "no contact"))
     verdict = judged(recording(events=events), ("duration", {"below": 1}))
     assert verdict.verdict == "failed"
-    assert verdict.text == f"step 'wait_1' {outcome}: no contact"
+    assert verdict.text == f"step 'wait_1' {outcome.replace('timeout', 'timed out')}: no contact"
     assert [s.outcome for s in verdict.steps] == ["done", outcome]
     assert one(recording(events=events), "step_done", step="wait_1").margin == -1.0
 

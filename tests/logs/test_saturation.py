@@ -48,8 +48,8 @@ def test_a_joint_too_weak_for_gravity_is_doubted_counted_and_named(tmp_path: Pat
     (doubt,) = listener.doubts
     assert "joint_2: gravity needs up to" in doubt.message
     assert report.verdict.verdict == "failed"
-    assert report.verdict.cuts == judge_log(log).cuts
-    assert report.verdict.cuts.joints["joint_2"] > 0
+    assert report.verdict.saturations == judge_log(log).saturations
+    assert report.verdict.saturations.joints["joint_2"] > 0
     assert "joint 'joint_2' (effort) in" in render_text(log_info(log))
     counts = {k: int(v) for k, v in open_recording(log).metadata["saturated joints"].items()}
     cut = r"; saturated: joint 'joint_2' \(effort\) in (\d+) of (\d+) ticks"
@@ -78,5 +78,5 @@ def test_the_hand_that_presses_on_its_stop_is_not_told(tmp_path: Path, engine: s
     )
     verdict = run_task(task, log=log).verdict
     assert verdict.steps[0].outcome == "timeout"
-    assert str(verdict.cuts) == "" == str(judge_log(log).cuts)
+    assert str(verdict.saturations) == "" == str(judge_log(log).saturations)
     assert "saturated" not in verdict.steps[0].text

@@ -86,7 +86,7 @@ def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_pa
         for before, after in itertools.pairwise(told)
     )
     assert refused.value.step == "place_1"
-    assert refused.value.cause.endswith(f"; {picked} grasps were tried")
+    assert refused.value.cause.endswith(f"; {picked} grasps of the object were tried")
     assert refused.value.place is not None and refused.value.place.line == 13
 
 

@@ -157,7 +157,7 @@ def test_a_later_step_that_begins_in_something_is_told_what_lets_it_leave(bench:
     arm.do("move", {"pose": {**above, "xyz": [0.7, -0.2, 0.43]}, "path": "linear", "touch": ["desk"]})
     refusal = arm.refused("move", {"pose": above})
     assert "'desk' and 'robot/" in refusal.cause
-    assert "before it moves" in refusal.cause
+    assert "before the motion" in refusal.cause
     assert refusal.hint == "add `touch: [desk]` to the `move` that leaves it"
     arm.do("move", {"pose": above, "path": "linear", "touch": ["desk"]})
 
@@ -181,7 +181,7 @@ def test_links_that_overlap_are_told_of_the_robot_file(bench: Make) -> None:
     arm = bench()
     hit = CollisionHit("robot/link_7", "robot/palm", -0.002)
     for now in (arm.start, arm.start.moved(arm.start.position)):
-        hint = arm.planner.refusal(now, hit, "is", "before it moves").hint or ""
+        hint = arm.planner.refusal(now, hit, "is", "before the motion").hint or ""
         assert "`collision_ignore`" in hint
         assert "`attach`" in hint
         assert "`start: POSE`" not in hint

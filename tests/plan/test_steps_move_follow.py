@@ -303,7 +303,7 @@ def test_what_stands_must_be_lifted_before_it_is_moved(bench: Make, story: Story
     arm = bench()
     arm.now = story.steps["pick"][1].end
     refusal = arm.refused("move", {"to": "home"})
-    assert refusal.cause.startswith("'cup' comes within 4 mm of 'desk'")
+    assert refusal.cause.startswith("'cup' still touches 'desk'")
     assert refusal.hint == "`lift` 'cup' first"
 
 

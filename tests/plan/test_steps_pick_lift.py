@@ -233,7 +233,7 @@ def test_a_ball_and_what_is_too_wide_are_not_taken_higher(bench: Make) -> None:
     refusal = bench("panda", scene=scene).refused("pick", {"object": "ball", "approach": {"from": "top"}})
     assert "all 36 candidates failed" in refusal.cause
     assert "`open: ...`" in refusal.hint
-    assert "'ball' is wider than the hand opens in its pose 'open'; or move 'ball'" in refusal.hint
+    assert "'ball' is wider than the hand in its pose 'open'; or move 'ball'" in refusal.hint
 
 
 def test_a_grasp_that_the_hand_cannot_take_asks_for_another_height(bench: Make) -> None:

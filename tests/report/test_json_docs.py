@@ -27,7 +27,7 @@ NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1, relative=-0.5)
 WRONG = Diagnostic("TASK201", "unknown key", Place("a.yaml", 3, 5))
 VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
-    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), cuts=Saturations({"joint_1": 3}, {"motor_1": 2}),
+    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), saturations=Saturations({"joint_1": 3}, {"motor_1": 2}),
 )  # fmt: skip
 RUN = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
 CASE = CaseReport(

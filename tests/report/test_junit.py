@@ -86,7 +86,7 @@ def test_a_failure_tells_the_margin_and_where_it_was_written() -> None:
     failure = step.find("failure")
     assert failure is not None and near is not None
     assert (step.get("file"), step.get("line")) == ("pour.yaml", "14")
-    assert failure.get("message") == "step 'b' ran out of time: too slow" and failure.get("type") == "timeout"
+    assert failure.get("message") == "step 'b' timed out: too slow" and failure.get("type") == "timeout"
     assert "fails by 16.0 mm" in str(near.get("message")) and "margin -0.016 m\nat 2.740 s" in str(near.text)
     assert _case(suite, "c").find("skipped") is not None
     assert _case(suite, "near").get("file") is None  # the log does not say where

@@ -62,10 +62,10 @@ def test_a_step_that_fails_ends_the_run_where_nothing_else_is_said(run: Run) -> 
 
 def test_a_condition_that_is_waited_for_in_vain_is_told_with_what_it_lacks(run: Run) -> None:
     """0.3 rad away, 0.1 rad allowed: 0.2 rad, 11.5 deg. Also in a combination, and in a wait."""
-    at_end = "the condition under `until` %s; at the end it fails by 11.5 deg: at_pose: joint 'pitch' is 17.2 deg from"
-    assert at_end % "did not hold in time" in run(f"steps:\n{AWAY}{UP}").steps[0].text
+    at_end = "`until` %s; at the end it fails by 11.5 deg: at_pose: joint 'pitch' is 17.2 deg from"
+    assert at_end % "did not hold by t = 0.400 s" in run(f"steps:\n{AWAY}{UP}").steps[0].text
     both = UP.replace("{at_pose", "{all: [{duration: {below: 10 s}}, {at_pose").replace("$wide}}", "$wide}}]}")
-    assert at_end % "did not hold in time" in run(f"steps:\n{AWAY}{both}").steps[0].text
+    assert at_end % "did not hold by t = 0.400 s" in run(f"steps:\n{AWAY}{both}").steps[0].text
     assert at_end % "held" in run(f"steps:\n{AWAY}  - wait: 0.1 s\n{UP}").steps[1].text
 
 
@@ -97,7 +97,7 @@ def test_a_retry_that_never_helps_fails_with_its_last_attempt(run: Run) -> None:
     verdict = run(f"steps:\n{AWAY}{UP}    on_fail: {{retry: 2}}\n")
     assert verdict.verdict == "failed"
     assert [one.outcome for one in verdict.steps[0].attempts] == ["timeout"] * 3
-    assert "did not hold in time" in verdict.text
+    assert "`until` did not hold by t = 2.200 s" in verdict.text
 
 
 @pytest.mark.parametrize("on_fail", ["continue", "{retry: 1, then: continue}"])

@@ -40,7 +40,7 @@ def test_what_was_taken_in_vain_is_taken_again(tmp_path: Path, steps: str, phase
     file, log = tmp_path / "again.yaml", tmp_path / "again.mcap"
     file.write_text(f"{TASK}{steps}{NEVER}")
     last = pipeline.run_task(file, log=log).verdict.steps[-1]
-    assert [(one.outcome, one.text.startswith("the condition under `until`")) for one in last.attempts] == [
+    assert [(one.outcome, one.text.startswith("`until` did not hold by")) for one in last.attempts] == [
         ("timeout", True),
         ("timeout", True),
     ]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.scene.drop_test import GRAZES, LEAST, landing
+from manipcli.scene.drop_test import GRAZES, LEAST, drop_height
 from manipcli.scene.scene import Body
 from manipcli.shapes.primitives import Box, Geometry, Sphere
 
@@ -55,6 +55,6 @@ BALL = body((Sphere(0.03), (0.0, 0.0, 0.03)), size=(0.06, 0.06, 0.06))
 )
 def test_a_fall_ends_at_what_is_met_first(falling: Body, x: float, fall: float | None) -> None:
     X_WU = Transform.of(xyz=(1.0, 2.0, 0.5), rpy=(0.0, 0.0, 0.3))
-    found = landing(falling, X_WU @ Transform.of(xyz=(x, 0.1, 0.3)), DRAWER, X_WU)
+    found = drop_height(falling, X_WU @ Transform.of(xyz=(x, 0.1, 0.3)), DRAWER, X_WU)
     assert (found is None) == (fall is None)
     assert fall is None or fall - LEAST <= (found or 0.0) <= fall + GRAZES

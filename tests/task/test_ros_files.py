@@ -81,9 +81,9 @@ arm_controller:
       trajectory: 0.05
 """
     (line,) = errors(tmp_path, listing)
-    assert "controllers.yaml:2:3: error[CTRL103]: controller 'arm_controller': the gains of joint 'joint_1'" in line
+    assert "controllers.yaml:2:3: error[CTRL103]: controller 'arm_controller': joint 'joint_1' has no gains" in line
     hint = "add `gains: {joint_1: {p: ..., d: ...}}`; `manipcli tune ROBOT CONTROLLERS` proposes them"
-    assert f"are all zero; on the {interface} interface it would not move | {hint}" in line
+    assert f"has no gains; on the {interface} interface it would not move | {hint}" in line
     assert errors(tmp_path, listing + "  gains: {joint_1: {p: 3, d: 0.5}}\n") == []
     (line,) = errors(tmp_path, listing + "  gains: {joint_1: {i_clamp: 1}}\n")
     assert "would not move | give gains.joint_1.p; `manipcli tune" in line
@@ -101,7 +101,7 @@ hand_controller: {ros__parameters: {joint: finger_1_proximal}}
 """
     assert errors(tmp_path, hand) == []
     (line,) = errors(tmp_path, hand.replace("position_controllers", "effort_controllers"))
-    assert "controller 'hand_controller': the gains of joint 'finger_1_proximal' are all zero; on the effort" in line
+    assert "controller 'hand_controller': joint 'finger_1_proximal' has no gains; on the effort" in line
 
 
 def interfaces(command: str, state: str = "position, velocity") -> str:

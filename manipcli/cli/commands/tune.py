@@ -45,7 +45,7 @@ def tune(
             metavar="S",
             min=1e-6,
             max=10.0,
-            help="Size of the step [rad], a tenth of it [m] for prismatic joints; the gains are limited so that it "
+            help="Size of the step [rad]; prismatic joints: a tenth [m]; the gains are limited so that it "
             "does not saturate the effort.",
         ),
     ] = 0.02,

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.body_poses import centres, highest, lowest
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, unmoving
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import rotate_inverse
@@ -30,7 +30,7 @@ class AboveSpec(Model):
     )
 
 
-def monitor(spec: AboveSpec, world: World) -> Gauge:
+def monitor(spec: AboveSpec, world: World) -> Monitor:
     """The lesser of two lengths [m]: the gap minus `by`, and the distance of the centre to the edge.
 
     The gap is from the highest corner of the bounding box of `of` to the lowest corner of the object's. The edge is

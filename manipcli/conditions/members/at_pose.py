@@ -8,7 +8,7 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_group
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_group
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import wrapped
@@ -37,7 +37,7 @@ class AtPoseSpec(Model):
     )
 
 
-def monitor(spec: AtPoseSpec, world: World) -> Gauge:
+def monitor(spec: AtPoseSpec, world: World) -> Monitor:
     """`within` minus the largest |q - q_pose| [rad], or `slide` minus that of prismatic joints [m]; the lesser.
 
     The difference of a continuous joint is wrapped to +-pi.
@@ -52,7 +52,7 @@ def monitor(spec: AtPoseSpec, world: World) -> Gauge:
     return look
 
 
-def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[str, float]) -> Gauge:
+def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[str, float]) -> Monitor:
     joints, goal = tuple(wanted), np.array(list(wanted.values()))
     columns = robot.indices(joints)
     endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, unmoving
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import cross, rotate
@@ -24,7 +24,7 @@ class AtRestSpec(Model):
     below: Annotated[Speed, Field(gt=0)] = Field(default=0.001, description="Speed [m/s]. Default 1 mm/s.")
 
 
-def monitor(spec: AtRestSpec, world: World) -> Gauge:
+def monitor(spec: AtRestSpec, world: World) -> Monitor:
     """`below` minus the speed [m/s] of the object's centre C over the last tick: |v_O + w x R_WO p_OC|."""
     body = world.scene.body(spec.object)
 

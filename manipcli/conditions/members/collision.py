@@ -9,7 +9,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, untouchable
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, untouchable
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair
@@ -58,7 +58,7 @@ class CollisionSpec(PairsSpec):
     above: Annotated[Force, Field(gt=0)] = Field(default=0.01, description="Least normal force [N]. Default 10 mN.")
 
 
-def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:
+def monitor_no_collision(spec: NoCollisionSpec, world: World) -> Monitor:
     """`below` minus the largest normal force [N] of all pairs.
 
     Without contact the margin is `below`: 0 N by default, which passes. Where units differ, the margin is divided by
@@ -67,12 +67,12 @@ def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:
     return _monitor(spec.pairs, spec.below, -1.0)
 
 
-def gauge_some(spec: CollisionSpec, world: World) -> Gauge:
+def monitor_collision(spec: CollisionSpec, world: World) -> Monitor:
     """The largest normal force of all pairs, minus `above` [N]."""
     return _monitor(spec.pairs, spec.above, 1.0)
 
 
-def _monitor(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
+def _monitor(pairs: tuple[Pair, ...], limit: float, sign: float) -> Monitor:
     def hardest(contacts: Sequence[Contact]) -> Contact | None:
         hits = [contact for contact in contacts if any(between(pair, contact) for pair in pairs)]
         return max(hits, key=lambda contact: contact.force, default=None)
@@ -108,7 +108,7 @@ NO_COLLISION = Condition(
     name="no_collision",
     spec=NoCollisionSpec,
     units=("N",),
-    open=gauge_none,
+    open=monitor_no_collision,
     check=check,
     absent=lambda spec, world: untouchable(world),
     scope="always",
@@ -119,7 +119,7 @@ COLLISION = Condition(
     name="collision",
     spec=CollisionSpec,
     units=("N",),
-    open=gauge_some,
+    open=monitor_collision,
     check=check,
     absent=lambda spec, world: untouchable(world),
     example="collision: [robot, desk]",

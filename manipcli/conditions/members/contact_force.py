@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, untouchable
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, untouchable
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair, is_part, unknown_part
@@ -45,7 +45,7 @@ class ContactForceSpec(Model):
         return self
 
 
-def monitor(spec: ContactForceSpec, world: World) -> Gauge:
+def monitor(spec: ContactForceSpec, world: World) -> Monitor:
     """`below` minus the force, and the force minus `above` [N]; the lesser if both are given.
 
     Bodies are rigid: an impact is stopped within one physics step, by a force of mass times speed over that step. A

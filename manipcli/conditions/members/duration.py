@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, World
+from manipcli.conditions.condition import Condition, Monitor, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.spec.base import Model
@@ -20,7 +20,7 @@ class TimeTakenSpec(Model):
     below: Annotated[Time, Field(gt=0)] = Field(description="Longest simulated time [s].")
 
 
-def monitor(spec: TimeTakenSpec, world: World) -> Gauge:
+def monitor(spec: TimeTakenSpec, world: World) -> Monitor:
     """`below` minus the time [s] since the first tick.
 
     A tick of a step lasts until the next tick or the end of the step: with `at: STEP` and `during: STEP` this is the

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, effortless, unknown_group
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, effortless, unknown_group
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
@@ -23,7 +23,7 @@ class EnergySpec(Model):
     group: str | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
 
 
-def monitor(spec: EnergySpec, world: World) -> Gauge:
+def monitor(spec: EnergySpec, world: World) -> Monitor:
     """`below` minus the work W [J] of the joints.
 
         W = sum over joints of the integral of max(tau_j qd_j, 0) dt

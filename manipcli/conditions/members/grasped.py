@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, untouchable
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, untouchable
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.units import readable
@@ -24,7 +24,7 @@ class GraspedSpec(Model):
     )
 
 
-def monitor(spec: GraspedSpec, world: World) -> Gauge:
+def monitor(spec: GraspedSpec, world: World) -> Monitor:
     """The second largest normal force of a link on the object, minus `above` [N]."""
 
     def look(window: StateWindow) -> Robustness:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.body_poses import centres, point_text
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, unmoving
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotate_inverse
@@ -37,7 +37,7 @@ class OutsideSpec(Model):
 Spec = InsideSpec | OutsideSpec
 
 
-def monitor(spec: Spec, world: World, *, sign: float) -> Gauge:
+def monitor(spec: Spec, world: World, *, sign: float) -> Monitor:
     """Depth [m] of the object's centre in the hollow: the distance to its nearest face, negative outside.
 
     The faces are the walls and the floor of the hollow and the plane of its rim. Outside, the margin is minus the

@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, effortless, unknown_group
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, effortless, unknown_group
 from manipcli.conditions.robustness import Measured, Robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.units import readable
@@ -55,7 +55,7 @@ class _Bound:
     half: float
 
 
-def monitor(spec: LimitsSpec, world: World) -> Gauge:
+def monitor(spec: LimitsSpec, world: World) -> Monitor:
     """The least distance of a measured position, velocity or effort to its limit, relative to the limit.
 
     The unit is that of the deciding quantity and joint. A quantity without a limit is not compared. A position up to
@@ -93,7 +93,7 @@ def monitor(spec: LimitsSpec, world: World) -> Gauge:
 
 
 def _apart(values: tuple[float, float, float], unit: str) -> tuple[str, str, str]:
-    """A value and its two limits as text, with enough digits to tell them apart."""
+    """A value and its two limits as text, with enough digits to distinguish them."""
     value, low, high = (readable(each, unit) for each in values)
     for digits in range(4, MOST_DIGITS + 1):
         if value not in (low, high):

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from manipcli.conditions.body_poses import centres
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, unmoving
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotation_between
@@ -64,7 +64,7 @@ def since_first(world: World, name: str) -> Callable[[StateWindow], Change]:
     return changed
 
 
-def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
+def monitor_moved(spec: MovedSpec, world: World) -> Monitor:
     """The displacement of the centre minus `by` [m]; the rotation minus `rotation` [rad]; the lesser."""
     changed = since_first(world, spec.object)
 
@@ -86,7 +86,7 @@ def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
     return look
 
 
-def gauge_unmoved(spec: UnmovedSpec, world: World) -> Gauge:
+def monitor_unmoved(spec: UnmovedSpec, world: World) -> Monitor:
     """`within` minus the displacement of the centre [m]; `rotation` minus the rotation [rad]; the lesser."""
     changed = since_first(world, spec.object)
 
@@ -117,7 +117,7 @@ MOVED = Condition(
     name="moved",
     spec=MovedSpec,
     units=("m", "rad"),
-    open=gauge_moved,
+    open=monitor_moved,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
     example="moved: {object: block, by: 5 cm}",
@@ -126,7 +126,7 @@ UNMOVED = Condition(
     name="unmoved",
     spec=UnmovedSpec,
     units=("m", "rad"),
-    open=gauge_unmoved,
+    open=monitor_unmoved,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
     scope="always",

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.body_poses import point_text
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, unmoving
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotate
@@ -34,7 +34,7 @@ class NearSpec(Model):
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
 
 
-def monitor(spec: NearSpec, world: World) -> Gauge:
+def monitor(spec: NearSpec, world: World) -> Monitor:
     """`within` minus the distance [m] between the origin of the object's frame and the target."""
     called = "its start" if spec.to == START else f"'{spec.to}'" if isinstance(spec.to, str) else "the point"
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, untouchable
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, untouchable
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between
@@ -24,7 +24,7 @@ class RestsOnSpec(Model):
     share: Annotated[Share, Field(gt=0)] = Field(default=0.5, description="Least share of its weight. Default 50 %.")
 
 
-def monitor(spec: RestsOnSpec, world: World) -> Gauge:
+def monitor(spec: RestsOnSpec, world: World) -> Monitor:
     """The normal force between the two minus `share` m g [N], g the scene's gravity.
 
     Contacts have only a normal force, without direction: an object pressed hard against a wall also counts as resting

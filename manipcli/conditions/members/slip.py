@@ -13,7 +13,7 @@ from manipcli.conditions.body_poses import centres
 from manipcli.conditions.condition import (
     CheckContext,
     Condition,
-    Gauge,
+    Monitor,
     Problem,
     World,
     unknown_body,
@@ -98,7 +98,7 @@ def hand(spec: SlipSpec, robot: RobotModel) -> str:
     return spec.link or (robot.tool.link if robot.tool is not None else robot.root)
 
 
-def monitor(spec: SlipSpec, world: World) -> Gauge:
+def monitor(spec: SlipSpec, world: World) -> Monitor:
     """`within` minus the motion of the object's centre in the hand [m]; `rotation` minus its rotation [rad]; the
     lesser.
 

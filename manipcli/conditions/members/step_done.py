@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.text import did_you_mean
@@ -18,7 +18,7 @@ class StepDoneSpec(Model):
     step: str = Field(description="Id of a step of the task.")
 
 
-def monitor(spec: StepDoneSpec, world: World) -> Gauge:
+def monitor(spec: StepDoneSpec, world: World) -> Monitor:
     """1 from the time at which the step is done, -1 before and if it fails; without unit."""
 
     def look(window: StateWindow) -> Robustness:

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Transform
@@ -25,7 +25,7 @@ class ToolSpeedSpec(Model):
     link: str | None = Field(default=None, description="A link instead of the tool frame; its origin counts.")
 
 
-def monitor(spec: ToolSpeedSpec, world: World) -> Gauge:
+def monitor(spec: ToolSpeedSpec, world: World) -> Monitor:
     """`below` minus the speed [m/s] of the point in the world, from measured positions and velocities of the joints."""
     link, X_LT = _frame(spec, world.robot)
     name = "the tool" if spec.link is None else f"link '{link}'"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_group
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_group
 from manipcli.conditions.robustness import Measured, Robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, wrapped
@@ -21,7 +21,7 @@ class TrackingSpec(Model):
     within: JointTolerance = Field(description="Largest difference of a joint [rad or m], to pi.")
 
 
-def monitor(spec: TrackingSpec, world: World) -> Gauge:
+def monitor(spec: TrackingSpec, world: World) -> Monitor:
     """`within` minus the largest |reference - measured| of the joints [rad, or m if the worst joint is prismatic].
 
     The error of a continuous joint is wrapped to +-pi. Ticks at which a joint has no active controller are ignored.

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, unmoving
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import rotate
-from manipcli.core.text import told_apart
+from manipcli.core.text import distinguished
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import AngleTolerance
@@ -24,7 +24,7 @@ class UprightSpec(Model):
     within: AngleTolerance = Field(description="Largest tilt [rad], to pi.")
 
 
-def monitor(spec: UprightSpec, world: World) -> Gauge:
+def monitor(spec: UprightSpec, world: World) -> Monitor:
     """`within` minus the tilt [rad]: the angle between the object's z axis and the world's, 0 to pi."""
 
     def look(window: StateWindow) -> Robustness:
@@ -34,7 +34,7 @@ def monitor(spec: UprightSpec, world: World) -> Gauge:
         tilts = np.broadcast_to(tilt, np.shape(window.times))
 
         def describe(k: int) -> str:
-            tilted, within = told_apart(math.degrees(tilts[k]), math.degrees(spec.within), form=".3g")
+            tilted, within = distinguished(math.degrees(tilts[k]), math.degrees(spec.within), form=".3g")
             return f"'{spec.object}' is tilted {tilted} deg; within {within} deg"
 
         return robustness(spec.within - tilts, window.times, unit="rad", scale=spec.within, describe=describe)

@@ -173,7 +173,7 @@ def check(spec: ComputedTorqueSpec, robot: RobotModel) -> Iterator[Problem]:
     for joint, gains in spec.gains.items():
         if joint in spec.joints and gains.p == gains.i == gains.d == 0.0:
             hint = f"give gains.{joint}.p [1/s2] and d [1/s], or remove them to use the bandwidth"
-            message = f"the gains of joint '{joint}' are all zero; it would not return to its reference"
+            message = f"joint '{joint}' has gains that are all zero; it would not return to its reference"
             yield Problem(("gains", joint), message, hint, "CTRL103")
 
 

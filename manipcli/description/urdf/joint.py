@@ -165,7 +165,7 @@ def _stated(reader: Reader, limit: Element, attribute: str, joint: str) -> float
         return value
     if value == 0.0 or attribute not in limit.attributes:
         how = "is 0" if value == 0.0 else "is missing"
-        message = f"joint '{joint}': {attribute} limit {how}; it is unknown"
+        message = f"joint '{joint}': {attribute} limit {how}; it is read as not stated"
         hint = f"add it to the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
         reader.report("URDF036", message, limit.place, hint=hint, severity="warning")
     return None

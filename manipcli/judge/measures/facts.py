@@ -147,7 +147,7 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
         powers.add(states.time, np.nan_to_num(effort * velocity))
         for meter in meters:
             meter.add(span, bodies)
-    cuts = Saturations.from_metadata(recording.metadata, end=end, period=recording.period)
+    saturations = Saturations.from_metadata(recording.metadata, end=end, period=recording.period)
     found = tuple(
         JointFacts(
             name,
@@ -158,7 +158,7 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
             given=float(powers.given[:, k].sum()),
             taken=float(powers.taken[:, k].sum()),
             power=powers.peak(k),
-            saturated=cuts.joints.get(name, 0),
+            saturated=saturations.joints.get(name, 0),
         )
         for k, name in enumerate(robot.joint_names)
     )
@@ -166,7 +166,7 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
         joints=found,
         steps=powers.steps(),
         holds=tuple(meter.finish() for meter in meters),
-        actuators=tuple(cuts.actuators.items()),
+        actuators=tuple(saturations.actuators.items()),
         times=errors.times,
         errors=errors.table(),
         period=recording.period,

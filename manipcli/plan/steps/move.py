@@ -46,7 +46,7 @@ class MoveSpec(Model):
 
     At a `point` the orientation of the tool is free; with `pointing`, only its rotation about the z axis is. Use this
     for arms with fewer than six joints, which reach few poses. Three joints suffice for a point; `pointing` needs five,
-    none of which may only rotate the tool about its z axis.
+    and none may only rotate the tool about its z axis.
 
     After `pick` or `grasp` the hand stays closed, even if it met nothing, until `release` or `place` opens it. Until
     then a named pose moves only the joints of the arm, and explicit positions for joints of the hand are refused.

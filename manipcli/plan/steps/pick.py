@@ -108,7 +108,7 @@ class PickSpec(Model):
     open: str = Field("open", description="The pose of the hand while approaching.")
     velocity_scaling: VelocityScaling = Field(
         1.0,
-        description="Share of the velocity, acceleration and jerk limits while reaching; the approach uses half of it.",
+        description="Share of the velocity, acceleration and jerk limits while reaching; the approach uses half.",
     )
 
 

@@ -29,7 +29,7 @@ from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.plan.unknown_names import unknown_posture
-from manipcli.scene.drop_test import FORMED, landing
+from manipcli.scene.drop_test import FORMED, drop_height
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Cylinder
 from manipcli.spec.base import Model
@@ -77,7 +77,7 @@ class PlaceSpec(Model):
     retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The named pose to which the hand opens.")
     velocity_scaling: VelocityScaling = Field(
-        0.5, description="Share of the velocity, acceleration and jerk limits while carrying; lowering uses half of it."
+        0.5, description="Share of the velocity, acceleration and jerk limits while carrying; lowering uses half."
     )
 
 
@@ -189,7 +189,7 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     X_WG = Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
     if under.kind not in FORMED:
         return X_WG
-    deeper = landing(body, X_WG, under, X_WU)
+    deeper = drop_height(body, X_WG, under, X_WU)
     if deeper is None:
         raise NotPlannable(
             f"no part of '{spec.onto}' is below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",

@@ -47,7 +47,7 @@ class SwitchControllersSpec(Model):
     deactivate: tuple[str, ...] = Field((), description="Controllers to deactivate.")
     strictness: Strictness = Field(
         "strict",
-        description="`strict`: all of it or nothing. `best_effort`: all that can be switched. Default `strict`.",
+        description="`strict`: all or nothing. `best_effort`: all that can be switched. Default `strict`.",
     )
 
     @model_validator(mode="before")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import Diagnostic
-from manipcli.core.text import told_apart
+from manipcli.core.text import distinguished
 from manipcli.preflight.preflight import Check, Subject
 
 
@@ -23,7 +23,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
         limit, joint = min((most or math.inf, joint) for joint, most in limits.items())
         if speed > limit:
             unit = f"{task.robot.joint(joint).unit}/s"
-            closing, most = told_apart(speed, limit, form=".3g")
+            closing, most = distinguished(speed, limit, form=".3g")
             message = f"{joint}: closing speed {closing} {unit} exceeds its velocity limit {most} {unit}"
             place = task.controllers_file.place("controllers", name, "speed")
             yield Diagnostic(

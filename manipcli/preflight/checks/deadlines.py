@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from manipcli.core.errors import Diagnostic
-from manipcli.core.text import told_apart
+from manipcli.core.text import distinguished
 from manipcli.plan.motion import Motion
 from manipcli.preflight.preflight import Check, Subject
 
@@ -16,7 +16,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
     for k, (step, planned) in enumerate(zip(task.spec.steps, plan.steps, strict=True)):
         least = sum(_least(motion) for motion in planned.plan.motions)
         if step.timeout is not None and least > step.timeout:
-            takes, given = told_apart(least, step.timeout, form=".3g")
+            takes, given = distinguished(least, step.timeout, form=".3g")
             message = f"step '{planned.id}' times out after {given} s, its plan takes {takes} s"
             hint = f"set `timeout` to more than {takes} s"
             yield Diagnostic("TASK243", message, task.file.place("steps", k, "timeout"), hint, "warning")

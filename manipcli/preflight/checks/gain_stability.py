@@ -84,7 +84,7 @@ def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | Non
             return None
         most = largest_damping(loop)
         message = f"{joint}: {kd} rings {at}: its effort changes sign every tick; {inertia}"
-        return "CTRL150", message, f"the stability limit is d {digits(most)}: lower d to at most half of it"
+        return "CTRL150", message, f"lower d to at most half the limit: d {digits(0.5 * most)}"
     most = largest_damping(loop)
     if 0.0 < most < d:
         message = f"{joint}: {kd} is unstable, the limit is {digits(most)} {at}; {inertia}"
@@ -116,7 +116,7 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     if ratio >= SWINGING:
         return None
     message = (
-        f"{joint}: p {digits(p)} with d {digits(d)} oscillates at {abs(s) / math.tau:.2g} Hz, "
+        f"{joint}: p {digits(p)} with d {digits(d)} oscillates at {digits(abs(s) / math.tau)} Hz, "
         f"damping ratio {ratio:.2g}; {inertia}"
     )
     return (

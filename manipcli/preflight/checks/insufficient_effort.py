@@ -15,7 +15,7 @@ from manipcli.control.control_loop import PidLoop
 from manipcli.control.joint_space_load import JointSpaceLoad
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import Array
-from manipcli.core.text import digits, told_apart
+from manipcli.core.text import digits, distinguished
 from manipcli.description.elements import Joint
 from manipcli.model.robot import RobotModel
 from manipcli.preflight.preflight import Check, ControlledJoint, Shift, Subject, once
@@ -55,7 +55,7 @@ def _of_joint(
     gravity, needed = load.gravity[:, k], load.needed[:, k]
     weight, limit = float(np.abs(gravity).max()), float(load.effort[k])
     most = float(np.abs(needed).max()) if planned else 0.0
-    finding = _too_weak(robot, joint.name, joint.place, weight=weight, needed=most, limit=limit)
+    finding = _insufficient(robot, joint.name, joint.place, weight=weight, needed=most, limit=limit)
     if finding is None and planned and "effort" in joint.interfaces:
         finding = _throttled(robot.joint(joint.name), joint.place, needed, velocity)
     if finding is not None:
@@ -71,19 +71,19 @@ def _of_joint(
         yield Diagnostic(code, f"{joint.name}: {message}", joint.place, hint, "warning")
 
 
-def _too_weak(
+def _insufficient(
     robot: RobotModel, joint: str, place: Place, *, weight: float, needed: float, limit: float
 ) -> Diagnostic | None:
     """An effort limit below `weight` or `needed`, all in N m or N; None if it suffices."""
     unit = robot.joint(joint).effort_unit
     if weight > limit:
-        takes, most = told_apart(weight, limit, form=".3g")
+        takes, most = distinguished(weight, limit, form=".3g")
         message = f"{joint}: gravity needs up to {takes} {unit}, its effort limit is {most} {unit}"
         return Diagnostic(
             "CTRL155", message, place, "the joint will sink: check its effort limit and the masses", "warning"
         )
     if needed > limit:
-        takes, most = told_apart(needed, limit, form=".3g")
+        takes, most = distinguished(needed, limit, form=".3g")
         message = f"{joint}: the planned motions need up to {takes} {unit}, its effort limit is {most} {unit}"
         hint = f"the joint will lag: lower its acceleration limit (robot file, limits.{joint}.acceleration)"
         return Diagnostic("CTRL155", message, place, hint, "warning")

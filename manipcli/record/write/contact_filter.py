@@ -20,7 +20,7 @@ STEADY_SHARE, STEADY_LEAST = 0.01, 0.005
 """A small change exceeds a hundredth of the recorded force and 0.005 N."""
 
 KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
-"""An impact: the larger of the recorded and the current force exceeds the smaller one by more than half of it plus 1 N.
+"""An impact: the larger of the recorded and the current force exceeds 1.5 times the smaller one plus 1 N.
 Its start and end are recorded at once."""
 
 DEPTH_LEAST = 2e-4

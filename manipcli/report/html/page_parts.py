@@ -110,7 +110,7 @@ def number(value: float, unit: str) -> str:
 
 
 def of_limit(value: float, limit: float, unit: str) -> str:
-    """`6.3 of 20 mm`: both in the unit of the limit, to about 1 % of it."""
+    """`6.3 of 20 mm`: both in the unit of the limit, rounded to about 1 %."""
     shown, _, name = readable(limit, unit).partition(" ")
     digits = min(max(2 - math.floor(math.log10(abs(float(shown)))), 0), 3)
     text = f"{value / limit * float(shown):.{digits}f}"

@@ -87,7 +87,7 @@ def causes(page: RunPage) -> Markup | None:
             element("p", jump, line_link(cause.written) if cause.written is not None else None, class_="jump"),
         )
         shown.append(element("div", *lines, class_="cause"))
-    cut = str(page.verdict.cuts)
+    cut = str(page.verdict.saturations)
     # The page of an invalid file has no other place for its causes; a single cause is as short as its summary line.
     rest = shown[1 + ALSO :] if page.facts is not None and len(shown) > 2 + ALSO else []
     folded = element("details", element("summary", f"{len(rest)} more"), *rest) if rest else None

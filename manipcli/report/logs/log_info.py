@@ -46,7 +46,7 @@ class LogInfo:
         return self.found.metadata.get("versions", {})
 
     @property
-    def cuts(self) -> Saturations:
+    def saturations(self) -> Saturations:
         """Saturated joints and actuators."""
         try:
             period = float(self.run.get("period", ""))
@@ -82,7 +82,7 @@ def render_text(info: LogInfo) -> str:
     if meshes:
         held = "all embedded in the log" if embedded >= meshes else f"{embedded} embedded in the log"
         lines += ["", f"{meshes} meshes, {'not embedded in the log' if not embedded else held}"]
-    lines += ["", _headline(info), *([str(info.cuts)] if str(info.cuts) else []), _length(info)]
+    lines += ["", _headline(info), *([str(info.saturations)] if str(info.saturations) else []), _length(info)]
     return "\n".join([*lines, f"log: {found.path}"])
 
 
@@ -103,7 +103,7 @@ def render_json(info: LogInfo) -> str:
             "run": dict(info.run),
             "versions": dict(info.versions),
             "verdict": dict(info.verdict) or None,
-            "saturated": saturated_object(info.cuts),
+            "saturated": saturated_object(info.saturations),
             "steps": [step_object(step) for step in info.steps],
             "topics": [
                 {

@@ -65,7 +65,7 @@ class CaseReport:
     Attributes:
         text: why the case did not pass, in one line, if no step or expectation is the cause.
         run: the run; None without a verdict.
-        findings: errors because of which nothing was run.
+        findings: errors that prevented the run.
         troubles: what went wrong, the first cause first.
         warnings: warnings from before the run.
         duration: wall time [s], without the pictures and reports.
@@ -166,6 +166,6 @@ def troubles_of(findings: Sequence[Diagnostic]) -> tuple[Trouble, ...]:
     )
 
 
-def doubts_of(findings: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
+def warnings_of(findings: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
     """The findings that are not errors."""
     return tuple(finding for finding in findings if finding.severity != "error")

@@ -58,7 +58,7 @@ class ContactMerger:
 
     Args:
         parts: the name of every (body, link); a body's base is its link -1.
-        still: immovable parts: a robot that stands on the floor has no contact with it.
+        still: immovable parts: a robot on the floor has no contact with it.
     """
 
     def __init__(self, parts: Mapping[tuple[int, int], str], *, still: Collection[tuple[int, int]] = ()) -> None:

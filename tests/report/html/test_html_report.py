@@ -167,7 +167,7 @@ def test_what_was_doubted_before_the_run_is_told() -> None:
 
 def test_what_was_cut_at_its_limits_stands_with_the_causes() -> None:
     page = replace(_page(), causes=(Cause("expectation 'near' fails by 2 mm", "", 1.5),))
-    cut = replace(page, verdict=replace(page.verdict, cuts=Saturations({"b": 7}, {}, 150)))
+    cut = replace(page, verdict=replace(page.verdict, saturations=Saturations({"b": 7}, {}, 150)))
     told = "In this run: saturated: joint 'b' in 7 of 150 ticks."
     words = _Page(render_page(cut)).words
     assert words.index("fails by 2 mm") < words.index(told) < words.index("Tracking and limits")

@@ -17,7 +17,16 @@ from manipcli.report.html.suite_page import render_page
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import suite_json
 from manipcli.report.suite.github import render_annotations
-from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Suite, Trouble, doubts_of, signal_name, troubles_of
+from manipcli.report.suite.suite import (
+    Case,
+    CaseReport,
+    CaseWord,
+    Suite,
+    Trouble,
+    signal_name,
+    troubles_of,
+    warnings_of,
+)
 from manipcli.report.suite.suite_text import gist, render_case, render_line, render_suite, render_summary
 
 NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5, relative=0.78)
@@ -234,7 +243,7 @@ def test_what_ends_nothing_is_no_trouble() -> None:
     note = Diagnostic("URDF031", "link 'tip' has mass 0", Place("arm.urdf", 2, 3), severity="note")
     wrong = Diagnostic("ROBOT306", "no link 'x'", Place("robot.yaml", 6, 3))
     assert [one.message for one in troubles_of([note, wrong])] == ["error[ROBOT306]: no link 'x'"]
-    assert doubts_of([note, wrong]) == (note,)
+    assert warnings_of([note, wrong]) == (note,)
 
 
 def test_the_page_tells_all_that_is_wrong_with_what_has_no_page_of_its_own() -> None:
