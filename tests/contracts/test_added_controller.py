@@ -1,11 +1,13 @@
-"""A controller that is added as one file and one entry of the registry is loaded, checked, run and recorded like ours.
+"""`hold_position`: u = p (q_held - q) - d v, where each joint was when the controller was activated.
 
-controllers:
-  hold:
-    type: hold_position
-    joints: [joint_1]
-    p: 300
-    d: 20
+    controllers:
+      hold:
+        type: hold_position
+        joints: [joint_1]
+        gains:
+          joint_1: {p: 300, d: 20}
+
+A controller that is added as one file and one entry of the registry is loaded, checked, run and recorded like ours.
 """
 
 from __future__ import annotations
@@ -39,8 +41,7 @@ class HoldPositionSpec(ControllerSpec):
 
     type: Literal["hold_position"] = Field(description="`hold_position`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    p: float = Field(description="Stiffness [N m/rad].")
-    d: float = Field(description="Damping [N m s/rad].")
+    gains: dict[str, GainsSpec] = Field(description="Stiffness p [N m/rad] and damping d [N m s/rad] by joint.")
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
@@ -55,7 +56,9 @@ class HoldPosition:
     feed_forward: FeedForward = "gravity"
 
     def __init__(self, name: str, spec: HoldPositionSpec, context: BuildContext) -> None:
-        self.name, self.joints, self._p, self._d = name, spec.joints, spec.p, spec.d
+        self.name, self.joints = name, spec.joints
+        self._p = np.array([spec.gains[joint].p for joint in spec.joints])
+        self._d = np.array([spec.gains[joint].d for joint in spec.joints])
         self.output = ControllerOutput.of(len(spec.joints), 1)
         self._held: Array | None = None
 
@@ -77,7 +80,7 @@ def check(spec: HoldPositionSpec, robot: RobotModel) -> Iterator[Problem]:
 
 
 def loop(spec: HoldPositionSpec) -> ControlLoop:
-    return PidLoop(dict.fromkeys(spec.joints, GainsSpec(p=spec.p, d=spec.d)), carries_weight=True, tunable=False)
+    return PidLoop(spec.gains, carries_weight=True, tunable=False)
 
 
 MEMBER = ControllerMember("hold_position", HoldPositionSpec, HoldPosition, check, loop)
@@ -90,7 +93,8 @@ ROBOT = ROOT / "robots" / "arm7_hand3" / "robot.yaml"
 def task(tmp_path: Path) -> Iterator[Path]:
     """A task with a controller of the type, which is in the registry for as long."""
     (tmp_path / "c.yaml").write_text(
-        "controllers:\n  hold: {type: hold_position, joints: [joint_1, joint_2], p: 300, d: 20}\n"
+        "controllers:\n  hold: {type: hold_position, joints: [joint_1, joint_2], "
+        "gains: {joint_1: &g {p: 300, d: 20}, joint_2: *g}}\n"
     )
     (tmp_path / "task.yaml").write_text(
         f"task: t\nrobot: {ROBOT}\ncontrollers: c.yaml\nsteps: [{{wait: 100 ms}}]\n"
@@ -116,17 +120,19 @@ def test_its_gains_are_checked_before_the_run(task: Path) -> None:
     """A damping above 2 I / h is unstable, whatever the type of the controller is."""
     codes = [finding.code for finding in check_files([task])]
     assert "CTRL150" not in codes
-    wild = check_files([task], overrides=["controllers.hold.d=1e5"])
+    wild = check_files([task], overrides=[f"controllers.hold.gains.{joint}.d=1e5" for joint in ("joint_1", "joint_2")])
     doubted = [finding.message.partition(":")[0] for finding in wild if finding.code == "CTRL150"]
     assert doubted == ["joint_1", "joint_2"]
 
 
 def test_a_mistake_in_its_block_is_reported_at_its_place(task: Path, tmp_path: Path) -> None:
-    (tmp_path / "c.yaml").write_text("controllers:\n  hold: {type: hold_position, joints: [joint_1], p: 300, dd: 20}\n")
+    (tmp_path / "c.yaml").write_text(
+        "controllers:\n  hold: {type: hold_position, joints: [joint_1], gains: {}, dd: 20}\n"
+    )
     with pytest.raises(InvalidInput) as error:
         run_task(task, log=tmp_path / "t.mcap")
     places = [(found.code, found.place.line, found.place.column) for found in error.value.findings if found.place]
-    assert ("CTRL201", 2, 58) in places
+    assert ("CTRL201", 2, 61) in places
 
 
 def test_its_fields_are_in_the_schema_as_long_as_it_is_registered(task: Path) -> None:
@@ -134,7 +140,7 @@ def test_its_fields_are_in_the_schema_as_long_as_it_is_registered(task: Path) ->
 
 
 def test_without_its_entry_the_type_is_unknown(tmp_path: Path) -> None:
-    (tmp_path / "c.yaml").write_text("controllers:\n  hold: {type: hold_position, joints: [joint_1], p: 300, d: 20}\n")
+    (tmp_path / "c.yaml").write_text("controllers:\n  hold: {type: hold_position, joints: [joint_1], gains: {}}\n")
     (finding,) = check_files([tmp_path / "c.yaml"])
     assert "hold_position" in finding.message
     assert "joint_trajectory" in finding.message
