@@ -202,8 +202,14 @@ SIMPLE = "transmissions: {t: {joints: [foo], actuators: [m]}}\n"
         (SIMPLE.replace("foo", "fooo"), "robot.yaml:3:30: error[ROBOT340]: transmission 't': joint 'fooo' is not in"),
         (SIMPLE.replace("foo", "fooo"), "did you mean 'foo'"),
         (SIMPLE.replace("foo", "copy"), "joint 'copy' mimics 'bar'"),
-        (SIMPLE.replace("}}", "}, u: {joints: [foo], actuators: [n]}}"), "joint 'foo' already belongs to"),
-        (SIMPLE.replace("}}", "}, u: {joints: [bar], actuators: [m]}}"), "actuator 'm' already belongs to"),
+        (
+            SIMPLE.replace("}}", "}, u: {joints: [foo], actuators: [n]}}"),
+            "joint 'foo' already belongs to transmission 't'",
+        ),
+        (
+            SIMPLE.replace("}}", "}, u: {joints: [bar], actuators: [m]}}"),
+            "actuator 'm' already belongs to transmission 't'",
+        ),
         (SIMPLE.replace("[foo]", "[foo, bar]"), "joints has 2 items; a simple transmission needs 1"),
         (SIMPLE.replace("{joints", "{type: diferential, joints"), "differential"),
         (SIMPLE.replace("[m]", "[m], actuator_reduction: [0]"), "a reduction must not be 0"),
