@@ -121,6 +121,7 @@ class NotPlannable(ManipcliError):
         place: of the value that is the cause, or of the step.
         loc: path of that value below the step's verb; empty if no single value is the cause.
         reason: for code that decides what to try next.
+        parts: bodies and links (`robot/<link>`) that are in the way.
     """
 
     exit_code = ExitCode.FAILED
@@ -135,6 +136,7 @@ class NotPlannable(ManipcliError):
         place: Place | None = None,
         loc: Loc = (),
         reason: RefusalReason | None = None,
+        parts: frozenset[str] = frozenset(),
     ) -> None:
         self.cause = cause
         self.step = step
@@ -142,7 +144,22 @@ class NotPlannable(ManipcliError):
         self.place = place
         self.loc = loc
         self.reason = reason
+        self.parts = parts
         super().__init__(f"step '{step}': {cause}" if step is not None else cause)
+
+    def but(
+        self, *, cause: str | None = None, hint: str | None = None, step: str | None = None, place: Place | None = None
+    ) -> NotPlannable:
+        """The same refusal with these attributes, where they are given."""
+        return NotPlannable(
+            self.cause if cause is None else cause,
+            step=self.step if step is None else step,
+            hint=self.hint if hint is None else hint,
+            place=self.place if place is None else place,
+            loc=self.loc,
+            reason=self.reason,
+            parts=self.parts,
+        )
 
     @property
     def findings(self) -> tuple[Diagnostic, ...]:

@@ -247,7 +247,7 @@ class MotionBuilder:
         try:
             refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
-            raise NotPlannable(refusal.cause, hint=roomier or refusal.hint) from refusal
+            raise refusal.but(hint=roomier or None) from refusal
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
@@ -297,7 +297,7 @@ class MotionBuilder:
         except NotPlannable as refusal:
             if label == self._verb:
                 raise
-            raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint, reason=refusal.reason) from refusal
+            raise refusal.but(cause=f"{label}: {refusal.cause}") from refusal
 
     def _solved(self, X_WT: Transform, grip: Grip | None, solver: InverseKinematics, *, free: bool = False) -> Array:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""

@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from manipcli.core.errors import NotPlannable
+from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Transform
 from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, CollisionQuery, Pair, pairs
 from manipcli.model.kinematics import Kinematics
@@ -270,7 +270,8 @@ class Planner:
         else:
             near = f"{hit.amount} apart"
             cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
-        return NotPlannable(cause, hint=hint, reason="in_the_way" if hint == NO_WAY_AROUND else None)
+        reason: RefusalReason | None = "in_the_way" if hint == NO_WAY_AROUND else None
+        return NotPlannable(cause, hint=hint, reason=reason, parts=frozenset((hit.a, hit.b)))
 
     def _touchable(self, state: PlanningState, hit: CollisionHit) -> str:
         """The body that the hand, or what it holds, hit; "" where something else did."""

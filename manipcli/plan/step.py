@@ -6,13 +6,13 @@ controller goals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from manipcli.conditions.condition import Problem
-from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.motion import PlanningState, StepPlan, Switch
 from manipcli.plan.planner import Planner
@@ -22,6 +22,13 @@ from manipcli.spec.base import Model
 S = TypeVar("S", bound=Model)
 
 
+def single(
+    plan: Callable[[S, Planner, PlanningState], StepPlan],
+) -> Callable[[S, Planner, PlanningState], Candidates]:
+    """The candidates of a step that can be done in one way only."""
+    return lambda spec, planner, state: Candidates([Candidate(lambda: plan(spec, planner, state))])
+
+
 @dataclass(frozen=True, slots=True)
 class StepMember(Generic[S]):
     """A member of the seam: the verb in YAML.
@@ -29,22 +36,28 @@ class StepMember(Generic[S]):
     Attributes:
         name: the verb.
         spec: what the user writes under it.
-        plan: (spec, planner, state) -> StepPlan. Begins at the state; raises NotPlannable.
+        candidates: (spec, planner, state) -> the ways to do it from this state, lazily, the preferred first; raises
+            NotPlannable where there is none for a reason that all share.
         check: (spec, robot, scene) -> the names and values in the spec that do not fit this robot and scene.
         uncommanded: (spec, robot, claims) -> what these controllers cannot carry out; called only if `check` finds
             nothing.
         request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
-        alternative: (spec, planner, state, grasps) -> as `plan`, with another tool orientation than in any of
-            `grasps`, R_WT (3, 3) each; None for a step that does not grasp, or has no other grasp.
     """
 
     name: str
     spec: type[S]
-    plan: Callable[[S, Planner, PlanningState], StepPlan]
+    candidates: Callable[[S, Planner, PlanningState], Candidates]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
-    alternative: Callable[[S, Planner, PlanningState, Sequence[Array]], StepPlan] | None = None
+
+    def plan(self, spec: S, planner: Planner, state: PlanningState) -> StepPlan:
+        """The plan of the first candidate that has one.
+
+        Raises:
+            NotPlannable: none has.
+        """
+        return first(self.candidates(spec, planner, state))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,13 +13,14 @@ from manipcli.core.geometry import Array
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.configuration import configuration
+from manipcli.plan.candidates import Candidates, first
 from manipcli.plan.claimed_joints import Claims
-from manipcli.plan.grasp_backtracking import GraspBacktracking
 from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
+from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.task import StepSpec
 from manipcli.task.task import Task
@@ -132,15 +133,16 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
     Raises:
         NotPlannable: with the id of the step.
     """
-    member = STEPS[step.verb]
     try:
-        if state.at_start:
-            planner.outside(state)
-        if grasps and member.alternative is not None:
-            return member.alternative(step.body, planner, state, grasps)
-        return member.plan(step.body, planner, state)
+        return first(_candidates(planner, step, state), exclude=grasps)
     except NotPlannable as refusal:
-        raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
+        raise refusal.but(step=step.id) from refusal
+
+
+def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
+    if state.at_start:
+        planner.outside(state)
+    return STEPS[step.verb].candidates(step.body, planner, state)
 
 
 def start_position(task: Task) -> Array:
@@ -151,30 +153,28 @@ def start_position(task: Task) -> Array:
 def _steps(
     task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None]
 ) -> tuple[PlannedStep, ...]:
-    """Plans each step from the predicted end of the previous one; backtracks to other grasps."""
-    done: list[PlannedStep] = []
-    backtracking = GraspBacktracking(planner)
-    while (k := len(done)) < len(task.spec.steps):
-        grasps = backtracking.of(k)
-        retry = ", with another grasp" if grasps else ""
-        on_progress(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{retry}")
+    """Plans all steps; see `task_search`."""
+    steps = task.spec.steps
+
+    def located(k: int, refusal: NotPlannable) -> NotPlannable:
+        at = task.file.place("steps", k, *((steps[k].verb, *refusal.loc) if refusal.loc else ()))
+        return refusal.but(step=steps[k].id, place=at)
+
+    def opens(k: int, state: PlanningState) -> Candidates:
         try:
-            done.append(_planned(task, planner, k, done[-1].plan.end if done else start, grasps))
+            candidates = _candidates(planner, steps[k], state)
         except NotPlannable as refusal:
-            del done[backtracking.back(refusal, [(step.verb, step.plan.end) for step in done]) :]
-    return tuple(done)
+            raise located(k, refusal) from refusal
+        return replace(candidates, explain=lambda refusal: located(k, candidates.explain(refusal)))
 
+    def on_step(k: int, again: bool) -> None:
+        on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
 
-def _planned(task: Task, planner: Planner, k: int, start: PlanningState, grasps: tuple[Array, ...]) -> PlannedStep:
-    """Plans step `k`, excluding `grasps`; a refusal has the place of the step."""
-    step = task.spec.steps[k]
-    try:
-        planned = plan_step(planner, step, start, grasps)
-    except NotPlannable as refusal:
-        at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
-        located = NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at, loc=refusal.loc)
-        raise located from refusal
-    return PlannedStep(str(step.id), step.verb, planned, task.log_place("steps", k), grasps)
+    solved = search_task(opens, len(steps), start, on_step=on_step)
+    return tuple(
+        PlannedStep(str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps)
+        for k, (step, one) in enumerate(zip(steps, solved, strict=True))
+    )
 
 
 def _planner(task: Task) -> Planner:

@@ -24,7 +24,7 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import StepMember, single
 from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
 from manipcli.plan.unknown_names import unknown_joint
 from manipcli.scene.scene import Scene
@@ -179,4 +179,4 @@ def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Pr
     return unfollowed(claims, spec.joint_names, ("joint_names",))
 
 
-MEMBER = StepMember(name="follow", spec=FollowSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="follow", spec=FollowSpec, candidates=single(plan), check=check, uncommanded=uncommanded)

@@ -15,7 +15,7 @@ from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import StepMember, single
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
@@ -68,4 +68,4 @@ def uncommanded(spec: GraspSpec, robot: RobotModel, claims: Claims) -> tuple[Pro
     return tool + unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="grasp", spec=GraspSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="grasp", spec=GraspSpec, candidates=single(plan), check=check, uncommanded=uncommanded)

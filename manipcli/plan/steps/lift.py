@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -12,12 +13,14 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
+from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Scene
@@ -36,8 +39,8 @@ class LiftSpec(Model):
     velocity_scaling: VelocityScaling = 0.5
 
 
-def plan(spec: LiftSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """A straight line of the tool, its orientation kept."""
+def candidates(spec: LiftSpec, planner: Planner, state: PlanningState) -> Candidates:
+    """Straight lines of the tool, its orientation kept, to several heights."""
     planner.held(state, spec.object)
     under = planner.touching(state, spec.object)
 
@@ -47,10 +50,11 @@ def plan(spec: LiftSpec, planner: Planner, state: PlanningState) -> StepPlan:
         try:
             builder.straight("lift", up @ planner.tool_pose(state), speed=spec.velocity_scaling, allowed=under)
         except NotPlannable as refusal:
-            raise NotPlannable(refusal.cause, hint=_LESS if refusal.reason == "line" else refusal.hint) from refusal
+            raise refusal.but(hint=_LESS if refusal.reason == "line" else None) from refusal
         return builder.plan()
 
-    return first_feasible(attempt, spread(spec.by), what=f"cannot lift '{spec.object}'")
+    options = [Candidate(partial(attempt, height), name=readable(height, "m")) for height in spread(spec.by)]
+    return Candidates(options, what=f"cannot lift '{spec.object}'")
 
 
 def check(spec: LiftSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
@@ -63,4 +67,4 @@ def uncommanded(spec: LiftSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("object",))
 
 
-MEMBER = StepMember(name="lift", spec=LiftSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="lift", spec=LiftSpec, candidates=candidates, check=check, uncommanded=uncommanded)

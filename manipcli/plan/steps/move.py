@@ -28,7 +28,7 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import StepMember, single
 from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
@@ -176,5 +176,10 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
 
 
 MEMBER = StepMember(
-    name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded, guarded=lambda spec: spec.guarded
+    name="move",
+    spec=MoveSpec,
+    candidates=single(plan),
+    check=check,
+    uncommanded=uncommanded,
+    guarded=lambda spec: spec.guarded,
 )

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
@@ -17,12 +18,14 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, Planner
-from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
@@ -40,8 +43,6 @@ ALIKE = 0.5
 """Cosine above which two tool directions are similar enough to compare their rotation about them."""
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Candidate slopes of the straight approach: along the hand's axis, or from above it, which folds the arm less."""
-OTHER = math.radians(40.0)
-"""[rad] Grasps that differ by less count as the same: where one of them fails, the other is likely to fail."""
 HIGHER = (2 / 3, 5 / 6)
 """Shares of an object's height at which it is grasped from above if its middle is out of reach: the palm touches."""
 
@@ -112,13 +113,11 @@ class PickSpec(Model):
     )
 
 
-def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
-    """The plan of the first candidate direction, roll, distance and slope that is reachable and free.
-
-    Tool orientations near those of `grasps`, R_WT (3, 3) each, are skipped.
+def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candidates:
+    """Directions, heights and rolls of the hand, distances and slopes of the approach.
 
     Raises:
-        NotPlannable: the hand already holds something, or no candidate is feasible.
+        NotPlannable: the hand already holds something.
     """
     planner.free_hand(state, spec.object)
     before = _clear(spec, planner, state)
@@ -139,8 +138,7 @@ def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequenc
         height, R_WT = goals[k]
         return Transform.of(xyz=X_WO.apply([body.centre[0], body.centre[1], height]), R=R_WT)
 
-    def attempt(candidate: tuple[int, float, float]) -> StepPlan:
-        k, distance, slope = candidate
+    def attempt(k: int, distance: float, slope: float) -> StepPlan:
         X_WG = tool_at(k)
         builder = MotionBuilder(planner, state)
         if k not in out_of_reach:  # checked once: it does not depend on distance and slope
@@ -151,7 +149,7 @@ def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequenc
             if refusal.reason == "orientation":
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or set ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
-            raise NotPlannable(refusal.cause, hint=hint)
+            raise refusal.but(hint=hint)
         builder.reach("reach", backed_off(X_WG, distance, slope), speed=spec.velocity_scaling, hand=spec.open)
         builder.straight("approach", X_WG, speed=spec.velocity_scaling / 2)
         builder.close(
@@ -164,23 +162,37 @@ def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequenc
         planned = builder.plan()
         return replace(planned, motions=(*before.motions, *planned.motions))
 
-    def candidates() -> Iterator[tuple[int, float, float]]:
-        for k in range(len(goals)):
+    def options() -> Iterator[Candidate]:
+        for k, (height, R_WT) in enumerate(goals):
             if k == len(rotations) and all(
                 why is not None and why.reason != "touches" for why in out_of_reach.values()
             ):
                 return  # a higher grasp is not nearer
-            if any(_same(goals[k][1], R_WT) for R_WT in grasps):
-                continue
-            yield from itertools.product((k,), spread(spec.approach.distance), slopes())
+            for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
+                name = _name(R_WT, height - bottom, distance, slope)
+                yield Candidate(partial(attempt, k, distance, slope), name=name, grasp=R_WT)
 
-    try:
-        return first_feasible(attempt, candidates(), what=f"cannot pick '{spec.object}'")
-    except NotPlannable as refusal:
+    def explain(refusal: NotPlannable) -> NotPlannable:
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [tool_at(k) for k in range(len(rotations))])
         hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
-        raise NotPlannable(refusal.cause, hint="; or ".join(hints) or None) from refusal
+        return refusal.but(hint="; or ".join(hints) or None)
+
+    return Candidates(options(), what=f"cannot pick '{spec.object}'", decides="grasp", explain=explain)
+
+
+def _name(R_WT: Array, height: float, distance: float, slope: float) -> str:
+    """The approach, the height above the object's bottom, and the roll of the hand, as told of a candidate."""
+    z = R_WT[:, 2]
+    if abs(z[2]) > UPRIGHT:
+        side, yaw = "from the top", math.atan2(R_WT[1, 0], R_WT[0, 0])
+    else:
+        side, yaw = f"from the side{', rolled' if R_WT[2, 0] > 0.0 else ''}", math.atan2(z[1], z[0])
+    sloping = f" at a slope of {math.degrees(slope):.0f} deg" if slope else ""
+    return (
+        f"{side}, yaw {math.degrees(yaw):.0f} deg, {readable(height, 'm')} above its bottom, "
+        f"approach of {readable(distance, 'm')}{sloping}"
+    )
 
 
 def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
@@ -188,15 +200,16 @@ def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
     if planner.distance(state, spec.object) >= CLEARANCE:
         return StepPlan((), state)
 
-    def attempt(candidate: tuple[float, float]) -> StepPlan:
+    def attempt(distance: float, slope: float) -> StepPlan:
         builder = MotionBuilder(planner, state)
         builder.open(spec.open, around=spec.object)
-        X_WT = backed_off(planner.tool_pose(state), *candidate)
+        X_WT = backed_off(planner.tool_pose(state), distance, slope)
         builder.withdraw(X_WT, spec.object, speed=spec.velocity_scaling / 2, grazing=True)
         return builder.plan()
 
-    candidates = itertools.product(spread(spec.approach.distance), slopes())
-    return first_feasible(attempt, candidates, what=f"cannot withdraw from '{spec.object}'")
+    ways = itertools.product(spread(spec.approach.distance), slopes())
+    options = [Candidate(partial(attempt, *way)) for way in ways]
+    return first(Candidates(options, what=f"cannot withdraw from '{spec.object}'"))
 
 
 def backed_off(X_WG: Transform, distance: float, slope: float) -> Transform:
@@ -242,11 +255,6 @@ def _nearer_first(first: Array, second: Array, R: Array) -> list[Array]:
     return [second, first] if alike and np.sum(second * R) > np.sum(first * R) + 1e-3 else [first, second]
 
 
-def _same(R_A: Array, R_B: Array) -> bool:
-    """Whether two rotations (3, 3) differ by less than `OTHER`; the trace of R_A^T R_B is 1 + 2 cos(angle)."""
-    return float(np.sum(R_A * R_B)) > 1.0 + 2.0 * math.cos(OTHER)
-
-
 def _frame(x: Array, z: Array) -> Array:
     """The rotation with these two unit axes."""
     return np.column_stack([x, np.cross(z, x), z])
@@ -270,4 +278,4 @@ def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     )
 
 
-MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check, uncommanded=uncommanded, alternative=plan)
+MEMBER = StepMember(name="pick", spec=PickSpec, candidates=candidates, check=check, uncommanded=uncommanded)

@@ -7,9 +7,11 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -18,13 +20,15 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
-from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.steps.pick import backed_off, slopes
@@ -81,8 +85,10 @@ class PlaceSpec(Model):
     )
 
 
-def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
+def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candidates:
+    """Tilts of the object, clearances, and withdrawals of the hand.
+
+    The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
 
     Paths on which the hand withdraws clear of the object are tried first, then those on which it may graze it; only the
     latter if the open hand is too near to it anyway, as around an object that sits deep in the hand. If the arm comes
@@ -106,8 +112,7 @@ def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
         return builder
 
-    def attempt(candidate: tuple[float, bool, float, float, float]) -> StepPlan:
-        tilt, grazing, clearance, retreat, slope = candidate
+    def attempt(tilt: float, grazing: bool, clearance: float, retreat: float, slope: float) -> StepPlan:
         if (tilt, clearance) not in lowered:
             try:
                 lowered[tilt, clearance] = lower(tilt, clearance)
@@ -115,7 +120,7 @@ def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
                 lowered[tilt, clearance] = refusal
         down = lowered[tilt, clearance]
         if isinstance(down, NotPlannable):
-            raise NotPlannable(down.cause, hint=down.hint)
+            raise down
         builder = down.copy()
         with _hinted(_ROOMIER):
             builder.open(spec.posture, must_arrive=True)
@@ -127,8 +132,15 @@ def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
     near = planner.distance(MotionBuilder(planner, state).let_go(spec.posture), spec.object) < CLEARANCE
     withdrawals = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
     tilts = TILTS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
-    candidates = itertools.product(tilts, (True,) if near else (False, True), *withdrawals)
-    return first_feasible(attempt, candidates, what=f"cannot place '{spec.object}'")
+    ways = itertools.product(tilts, (True,) if near else (False, True), *withdrawals)
+    options = [Candidate(partial(attempt, *way), name=_name(*way)) for way in ways]
+    return Candidates(options, what=f"cannot place '{spec.object}'", decides="place")
+
+
+def _name(tilt: float, grazing: bool, clearance: float, retreat: float, slope: float) -> str:
+    tilted = f"tilted {readable(tilt, 'rad')}, " if tilt else ""
+    way = f"{readable(retreat, 'm')}{f' at a slope of {math.degrees(slope):.0f} deg' if slope else ''}"
+    return f"{tilted}from {readable(clearance, 'm')} above, withdrawing {way}{', grazing it' if grazing else ''}"
 
 
 @contextmanager
@@ -138,7 +150,7 @@ def _hinted(hint: str) -> Iterator[None]:
         yield
     except NotPlannable as refusal:
         better = {"in_the_way": hint, "line": _WITHIN}.get(refusal.reason or "", refusal.hint)
-        raise NotPlannable(refusal.cause, hint=better) from refusal
+        raise refusal.but(hint=better) from refusal
 
 
 def _horizontal(X_WT: Transform) -> Array | None:
@@ -235,4 +247,4 @@ def uncommanded(spec: PlaceSpec, robot: RobotModel, claims: Claims) -> tuple[Pro
     return unmoved_tool(claims, robot, ("object",)) + unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="place", spec=PlaceSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="place", spec=PlaceSpec, candidates=candidates, check=check, uncommanded=uncommanded)

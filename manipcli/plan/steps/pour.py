@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -25,12 +26,14 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Body, Scene
@@ -57,8 +60,8 @@ class PourSpec(Model):
     )
 
 
-def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
-    """The plan of the first candidate direction, sense and clearance that is reachable and free."""
+def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candidates:
+    """Heights of the lip, directions of the hand, and both senses of the tilt."""
     planner.held(state, spec.object)
     planner.free_start(state)
     body = planner.scene.body(spec.object)
@@ -68,8 +71,7 @@ def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
     X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
-    def attempt(candidate: tuple[float, float, float]) -> StepPlan:
-        clearance, yaw, sense = candidate
+    def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
         a = _horizontal_axis(R_WT0)
         theta = sense * spec.tilt
@@ -85,10 +87,15 @@ def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
         builder.back("tilt back")
         return builder.plan()
 
-    candidates = itertools.product(
-        spread(spec.clearance), (math.radians(yaw) for yaw in YAWS_DEG), _senses(planner, state, mouth, R_WT)
-    )
-    return first_feasible(attempt, candidates, what=f"cannot pour from '{spec.object}' into '{spec.into}'")
+    ways = itertools.product(spread(spec.clearance), YAWS_DEG, _senses(planner, state, mouth, R_WT))
+    options = [
+        Candidate(
+            partial(attempt, clearance, math.radians(yaw), sense),
+            name=f"lip {readable(clearance, 'm')} above the rim, hand turned {yaw:g} deg, tilt {sense:+.0f}",
+        )
+        for clearance, yaw, sense in ways
+    ]
+    return Candidates(options, what=f"cannot pour from '{spec.object}' into '{spec.into}'")
 
 
 def _horizontal_axis(R_WT: Array) -> Array:
@@ -136,4 +143,4 @@ def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("object",))
 
 
-MEMBER = StepMember(name="pour", spec=PourSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="pour", spec=PourSpec, candidates=candidates, check=check, uncommanded=uncommanded)

@@ -13,7 +13,7 @@ from manipcli.plan.claimed_joints import Claims, unmoved_hand
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import StepMember, single
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
@@ -42,4 +42,4 @@ def uncommanded(spec: ReleaseSpec, robot: RobotModel, claims: Claims) -> tuple[P
     return unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="release", spec=ReleaseSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="release", spec=ReleaseSpec, candidates=single(plan), check=check, uncommanded=uncommanded)

@@ -19,7 +19,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unknown_controller
 from manipcli.plan.motion import Motion, PlanningState, StepPlan, Strictness, Switch
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import StepMember, single
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, or_short
 
@@ -98,7 +98,7 @@ def uncommanded(spec: SwitchControllersSpec, robot: RobotModel, claims: Claims) 
 MEMBER = StepMember(
     name="switch_controllers",
     spec=SwitchControllersSpec,
-    plan=plan,
+    candidates=single(plan),
     check=check,
     uncommanded=uncommanded,
     request=request,

@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import StepMember, single
 from manipcli.spec.base import Model, or_short
 from manipcli.spec.quantity import Pause, Time
 
@@ -43,4 +43,4 @@ def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
     return builder.plan()
 
 
-MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=lambda *_: (), uncommanded=lambda *_: ())
+MEMBER = StepMember(name="wait", spec=WaitSpec, candidates=single(plan), check=lambda *_: (), uncommanded=lambda *_: ())

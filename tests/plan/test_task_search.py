@@ -1,20 +1,24 @@
-"""What cannot be lifted or placed as it is held is taken in another way."""
+"""The search over the steps of a task: against brute force, and on tasks whose first grasp leads to nothing."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace as replaced
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Array, Transform
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.collision import Carried
 from manipcli.pipeline import run_task
-from manipcli.plan.grasp_backtracking import MOST
+from manipcli.plan.candidates import Candidate, Candidates, Decision
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
+from manipcli.plan.task_search import MOST, search_task
 from manipcli.run import replan
 from manipcli.spec.task import StepSpec
 from manipcli.task.load_task import load_task
@@ -79,7 +83,7 @@ def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_pa
     assert told[0].startswith("planning step 1 of 4") and not any(
         one.startswith("planning step 1 ") for one in told[1:]
     )
-    tried = 1 + sum("'pick_1', with another grasp" in one for one in told)
+    tried = 1 + sum("'pick_1', with another candidate" in one for one in told)
     assert 2 < tried <= MOST + 1
     picked = sum(
         before.startswith("planning step 2") and not after.startswith("planning step 2")
@@ -114,7 +118,7 @@ def test_a_refusal_with_an_empty_hand_or_of_the_only_grasp_is_told_as_it_is(tmp_
         with pytest.raises(NotPlannable) as refused:
             plan_task(task_of(tmp_path, steps), on_progress=told.append)
         assert "grasps" not in refused.value.cause
-    assert not any("another grasp" in one for one in told)
+    assert not any("another candidate" in one for one in told)
 
 
 def test_a_step_that_is_tried_with_other_values_may_use_every_grasp(
@@ -137,6 +141,50 @@ def test_a_step_that_is_tried_with_other_values_may_use_every_grasp(
         assert plan_task(task_of(tmp_path, pick + never + retry + LIFT, head)).steps[0].grasps
         run_task(tmp_path / "task.yaml", log=tmp_path / "log.mcap", force=True, allow_outside=True)
         assert used and all(bool(grasps) != changed for grasps in used)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_the_search_finds_a_plan_if_brute_force_finds_one(seed: int) -> None:
+    """Steps that take, carry and set down; whether one has a plan depends on the grasp of what it carries, and on where
+    the body in its way was set down. The oracle tries all combinations."""
+    rng = np.random.default_rng(seed)
+    count, ways = 6, 3
+    verbs = ["pick", "carry", "place"] * 2
+    legal = {k: rng.random((ways, ways, ways)) < 0.45 for k in range(count)}
+
+    def fits(k: int, way: int, grasp: int, place: int) -> bool:
+        return bool(legal[k][way, grasp if verbs[k] != "pick" else 0, place if k >= 3 else 0])
+
+    def possible(k: int, grasp: int, place: int) -> bool:
+        if k == count:
+            return True
+        return any(
+            fits(k, way, grasp, place)
+            and possible(k + 1, way if verbs[k] == "pick" else grasp, way if k == 2 else place)
+            for way in range(ways)
+        )
+
+    def opens(k: int, state: PlanningState) -> Candidates:
+        grasp, place = (int(x) for x in state.position)
+        first_one = Carried("one", "hand", Transform.identity())
+
+        def attempt(way: int) -> StepPlan:
+            if not fits(k, way, grasp, place):
+                raise NotPlannable("no", parts=frozenset({"one"}))
+            carried = None if verbs[k] == "place" else replaced(first_one, body="one" if k < 3 else "two")
+            now = [way if verbs[k] == "pick" else grasp, way if k == 2 else place]
+            return StepPlan((), PlanningState(frozen(now), (), carried=carried))
+
+        decides: dict[str, Decision] = {"pick": "grasp", "carry": "nothing", "place": "place"}
+        options = [Candidate(partial(attempt, way), name=str(way)) for way in range(ways)]
+        return Candidates(options, what=f"step {k}", decides=decides[verbs[k]])
+
+    start = PlanningState(frozen([0.0, 0.0]), ())
+    if possible(0, 0, 0):
+        assert len(search_task(opens, count, start)) == count
+    else:
+        with pytest.raises(NotPlannable):
+            search_task(opens, count, start)
 
 
 @pytest.mark.slow

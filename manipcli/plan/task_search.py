@@ -1,0 +1,145 @@
+"""Search over the candidates of all steps: depth first, with backjumping to the step that caused a failure.
+
+Each step starts at the predicted end of the one before. Where no candidate of a step has a plan, the search goes back
+to the latest step that decided what the failure depends on: the grasp of the carried object, the place of a body that
+is in the way, or the configuration in which the arm arrived. That step takes its next candidate, and all later steps
+are planned again. A step without further candidates passes the failure on, with what it depends on itself
+(conflict-directed backjumping; Prosser, Computational Intelligence 9, 1993).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.plan.candidates import Attempts, Candidates, Chosen
+from manipcli.plan.motion import PlanningState
+
+MOST: Final = 7
+"""Maximum number of plans of one step before its failure is passed on."""
+
+Opens = Callable[[int, PlanningState], Candidates]
+"""The candidates of step k from a state; raises NotPlannable."""
+
+
+@dataclass(slots=True)
+class Node:
+    """A step of the search.
+
+    Attributes:
+        start: the state before it.
+        attempts: its candidates.
+        chosen: the one that is taken; None before the first.
+        taken: number of plans so far.
+        conflicts: earlier steps on which the failures of later steps depend, too.
+    """
+
+    start: PlanningState
+    attempts: Attempts
+    chosen: Chosen | None = None
+    taken: int = 0
+    conflicts: set[int] = field(default_factory=set)
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The plan of one step. `grasps`: excluded tool orientations R_WT (3, 3), after which a later step has no plan."""
+
+    chosen: Chosen
+    grasps: tuple[Array, ...]
+
+
+def search_task(
+    opens: Opens, count: int, start: PlanningState, *, on_step: Callable[[int, bool], None] = lambda *_: None
+) -> tuple[Solved, ...]:
+    """The first plan of all `count` steps.
+
+    Args:
+        opens: gives the candidates of each step.
+        count: number of steps.
+        start: the state before the first.
+        on_step: called before a step is planned, with its index and whether it takes another candidate.
+
+    Raises:
+        NotPlannable: there is none; the refusal of the latest step that was reached.
+    """
+    done: list[Node] = []
+    latest = -1, NotPlannable("there is no step")
+    grasps: dict[int, int] = {}
+    resumed: Node | None = None
+    while (k := len(done)) < count:
+        state = _end(done[-1]) if done else start
+        on_step(k, resumed is not None)
+        node = resumed
+        try:
+            if node is None:
+                node = Node(state, Attempts(opens(k, state)))
+            node.chosen = node.attempts.take()
+        except NotPlannable as refusal:
+            if refusal.loc:
+                raise  # a value of the step, which no earlier step changes
+            conflicts = _causes(done, state, refusal) | (set() if node is None else node.conflicts)
+            if k > latest[0]:
+                latest = k, refusal
+                grasps = {j: 0 for j in conflicts if done[j].attempts.decides == "grasp"}
+            grasps |= {j: done[j].taken for j in grasps if j < len(done)}
+            resumed = _back(done, conflicts)
+            if resumed is None:
+                raise _counted(latest[1], max(grasps.values(), default=0)) from refusal
+        else:
+            node.taken += 1
+            done.append(node)
+            resumed = None
+    return tuple(Solved(node.chosen, tuple(node.attempts.excluded)) for node in done if node.chosen is not None)
+
+
+def _counted(refusal: NotPlannable, grasps: int) -> NotPlannable:
+    if grasps < 2:
+        return refusal
+    return refusal.but(cause=f"{refusal.cause}; {grasps} grasps of the object were tried")
+
+
+def _causes(done: Sequence[Node], state: PlanningState, refusal: NotPlannable) -> set[int]:
+    """The planned steps that decided what a refusal in this state depends on."""
+    return {k for k, node in enumerate(done) if _decided(node, done[k:], state, refusal)}
+
+
+def _decided(node: Node, since: Sequence[Node], state: PlanningState, refusal: NotPlannable) -> bool:
+    """Whether the step of `node` decided what a refusal depends on; `since`: it and all later steps."""
+    decides = node.attempts.decides
+    if decides == "grasp":
+        return state.carried is not None and all(_end(later).carried is not None for later in since)
+    if decides == "place":
+        return bool(refusal.parts & _set_down(node))
+    return decides == "branch" and len(since) == 1 and refusal.reason in ("line", "in_the_way")
+
+
+def _set_down(node: Node) -> frozenset[str]:
+    """The body that a step sets down."""
+    carried = node.start.carried
+    return frozenset() if carried is None or _end(node).carried is not None else frozenset({carried.body})
+
+
+def _back(done: list[Node], conflicts: set[int]) -> Node | None:
+    """The latest step among `conflicts` with plans left, which is taken from `done` with all later ones; None if there
+    is none."""
+    while conflicts:
+        k = max(conflicts)
+        conflicts.remove(k)
+        node = done[k]
+        del done[k:]
+        conflicts |= node.conflicts
+        if node.taken < MOST:
+            node.conflicts = set(conflicts)
+            if node.chosen is not None and node.chosen.candidate.grasp is not None:
+                node.attempts.excluded.append(node.chosen.candidate.grasp)
+            return node
+    return None
+
+
+def _end(node: Node) -> PlanningState:
+    assert node.chosen is not None  # only steps with a plan are done
+    return node.chosen.plan.end
