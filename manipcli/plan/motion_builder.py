@@ -30,6 +30,8 @@ from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
 
+BRANCH = 0.3
+"""[rad or m] Configurations of the arm that differ by less in every joint count as the same."""
 GRAZE = 1e-4
 """[m] How much nearer than before a withdrawing finger may come: rounding, and the arm's own curve."""
 
@@ -118,18 +120,19 @@ class MotionBuilder:
         hand: str | None = None,
         free: bool = False,
         leaving: Open = "nothing",
+        avoid: Sequence[Array] = (),
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
         Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
-        path is. Part of the orientation may be left open.
+        path is. So are those near one of `avoid`, (n) each. Part of the orientation may be left open.
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
         solver = self._planner.solver.leaving(leaving)
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
-            goal = self._solved(X_WT, grip, solver, free=free)
+            goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid)
             trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
         self._add(label, trajectory, grip)
 
@@ -299,13 +302,23 @@ class MotionBuilder:
                 raise
             raise refusal.but(cause=f"{label}: {refusal.cause}") from refusal
 
-    def _solved(self, X_WT: Transform, grip: Grip | None, solver: InverseKinematics, *, free: bool = False) -> Array:
+    def _solved(
+        self,
+        X_WT: Transform,
+        grip: Grip | None,
+        solver: InverseKinematics,
+        *,
+        free: bool = False,
+        avoid: Sequence[Array] = (),
+    ) -> Array:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
         query = self._query()
 
         def refuse(q: Array) -> object | None:
+            if any(np.abs(q - other).max() < BRANCH for other in avoid):
+                return "the arm has a configuration that was tried"
             hit = query.check(q)
             if hit is not None or not free:
                 return None if hit is None else planner.in_the_way(hit)

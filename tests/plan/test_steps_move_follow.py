@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +12,9 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
+from manipcli.core.errors import NotPlannable
 from manipcli.model.collision import CollisionHit
+from manipcli.plan.candidates import Attempts
 from manipcli.plan.hand import pressing
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.steps import STEPS
@@ -142,6 +145,22 @@ def test_linear_is_straight_in_space_and_joint_in_the_joints(bench: Make) -> Non
     np.testing.assert_allclose(arm.tool(joint.end.position), arm.tool(linear.end.position), atol=3e-4)
     p = arm.tools(before, joint, "move")[:, :3, 3]
     assert np.linalg.norm((p - p[0]) - np.outer((p - p[0]) @ along, along), axis=1).max() > 1e-3
+
+
+def test_a_tool_pose_has_several_configurations_of_the_arm(bench: Make) -> None:
+    """All have the tool at the pose, and differ by more than 0.3 rad in some joint; the first is that of the plan."""
+    arm = bench("panda")
+    step = STEPS["move"]
+    spec = step.spec.model_validate({"pose": {"xyz": [0.45, 0.1, 0.5], "rpy": ["180 deg", 0, 0]}})
+    attempts = Attempts(step.candidates(spec, arm.planner, arm.now))
+    found = []
+    with pytest.raises(NotPlannable):
+        while True:
+            found.append(attempts.take().plan.end.position)
+    assert 2 <= len(found) <= 4
+    for q in found:
+        np.testing.assert_allclose(arm.tool(q)[:3, 3], [0.45, 0.1, 0.5], atol=2e-5)
+    assert all(np.abs(a - b).max() > 0.3 for a, b in itertools.combinations(found, 2))
 
 
 def test_half_speed_halves_velocity_and_acceleration(bench: Make) -> None:

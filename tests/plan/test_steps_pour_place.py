@@ -20,6 +20,10 @@ RADIUS, HEIGHT = 0.036, 0.110
 DRAWER_SIDES = ((0.095, 0), (-0.095, 0), (0, 0.095), (0, -0.095))
 TRAY = np.array([0.70, 0.32])
 RIM = 0.4 + 0.05
+TABLE = """
+  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}
+  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}
+"""
 LEANING = {-7.0: 0.0, 7.0: 4.0}
 FACETS = 8e-4  # the cup's wall is 16 boxes, whose corners reach up to r (1 / cos(pi / 16) - 1) beyond its circle
 
@@ -205,6 +209,40 @@ def test_a_block_goes_inside_a_tray(bench: Make) -> None:
     panda = held_block(bench, scene)
     panda.do("place", {"object": "block", "at": [0.5, 0.2], "onto": "tray"})
     assert panda.body("block").p[2] == pytest.approx(0.2 + 0.005 + 0.025, abs=1e-4)
+
+
+REGION = {"object": "block", "onto": "table", "region": {"box": {"centre": [0.5, 0.2], "size": ["20 cm", "30 cm"]}}}
+
+
+def test_a_place_in_a_region_keeps_away_from_what_stands_there(bench: Make) -> None:
+    """The centre if it is free; else a place in the rectangle with 10 mm to every other body, by their edges."""
+    panda = held_block(bench)
+    lifted = panda.now
+    panda.do("place", REGION)
+    np.testing.assert_allclose(panda.body("block").p, [0.5, 0.2, 0.225], atol=1e-4)
+    post = "  post: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 0.1, rests_on: table, at: [0.5, 0.2]}\n"
+    crowd = held_block(bench, TABLE + post)
+    crowd.do("place", REGION)
+    x, y, z = crowd.body("block").p
+    assert abs(x - 0.5) <= 0.1 and abs(y - 0.2) <= 0.15 and z == pytest.approx(0.225, abs=1e-4)
+    assert max(abs(x - 0.5), abs(y - 0.2)) >= 0.04 + 0.01 - 1e-6  # both are squares of 4 cm along the axes
+    assert not np.allclose(lifted.position, crowd.now.position)
+    small = {**REGION, "region": {"box": {"centre": [0.5, 0.2], "size": ["2 cm", "2 cm"]}}}
+    refusal = held_block(bench, TABLE + post).refused("place", small)
+    assert "all 16 candidates failed" in refusal.cause and "is within 10 mm of 'post' (16 of 16)" in refusal.cause
+    assert refusal.hint == "make `region` larger"
+    assert "post" in refusal.parts
+
+
+def test_a_region_needs_a_support_and_no_other_place(bench: Make) -> None:
+    arm = bench("panda")
+    box = {"box": {"centre": [0.5, 0.2], "size": [0.1, 0.1]}}
+    assert arm.problems("place", {"object": "block", "region": box}) == [
+        (("region",), "`region` needs a supporting body", "add `onto: BODY`")
+    ]
+    assert arm.problems("place", {"object": "block", "region": box, "at": [0.5, 0.2], "onto": "table"}) == [
+        (("region",), "`region` and `at` both set the place", "remove one of them")
+    ]
 
 
 def test_a_place_is_said_completely_and_consistently(bench: Make) -> None:

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
@@ -19,8 +19,9 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.inverse_kinematics import Open, pointed
 from manipcli.plan.limit_check import verify_written
@@ -28,7 +29,7 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
-from manipcli.plan.step import StepMember, single
+from manipcli.plan.step import StepMember
 from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
@@ -113,7 +114,32 @@ class MoveSpec(Model):
         return self
 
 
-def plan(spec: MoveSpec, planner: Planner, state: PlanningState) -> StepPlan:
+CONFIGURATIONS = 4
+"""Maximum number of configurations of the arm in which a tool pose is reached."""
+
+
+def candidates(spec: MoveSpec, planner: Planner, state: PlanningState) -> Candidates:
+    """One for joint positions and straight lines; for a pose of the tool one per configuration of the arm."""
+    found: list[Array] = []
+
+    def attempt() -> StepPlan:
+        planned = _plan(spec, planner, state, avoid=found)
+        found.append(planned.end.position)
+        return planned
+
+    def options() -> Iterator[Candidate]:
+        yield Candidate(attempt)
+        many = spec.to is None and spec.path != "linear"
+        while many and 0 < len(found) < CONFIGURATIONS:
+            tried = len(found)
+            yield Candidate(attempt, name=f"configuration {tried + 1} of the arm")
+            if len(found) == tried:
+                return  # there is no other
+
+    return Candidates(options(), decides="branch")
+
+
+def _plan(spec: MoveSpec, planner: Planner, state: PlanningState, *, avoid: Sequence[Array]) -> StepPlan:
     """One motion; a named pose with joints of the hand moves the hand at the same time, unless it is closed."""
     allowed = planner.may_touch(state, spec.touch) if spec.touch else NOTHING
     builder = MotionBuilder(planner, state, verb="move", allowed=allowed)
@@ -131,7 +157,9 @@ def plan(spec: MoveSpec, planner: Planner, state: PlanningState) -> StepPlan:
         if spec.path == "linear":
             builder.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
         else:
-            builder.reach("move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving)
+            builder.reach(
+                "move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving, avoid=avoid
+            )
     planned = builder.plan()
     (motion,) = planned.motions
     end = planned.end
@@ -178,7 +206,7 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
 MEMBER = StepMember(
     name="move",
     spec=MoveSpec,
-    candidates=single(plan),
+    candidates=candidates,
     check=check,
     uncommanded=uncommanded,
     guarded=lambda spec: spec.guarded,

@@ -2,13 +2,14 @@
 
 - place: {object: cup, at: start}
 - place: {object: block, at: [0.5, 0.2], onto: table, yaw: 90 deg}
+- place: {object: block, onto: table, region: {box: {centre: [0.5, 0.2], size: [20 cm, 30 cm]}}}
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -26,6 +27,7 @@ from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
+from manipcli.plan.place_goals import ROOM, UPRIGHT, crowded, spots, standing
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.ranges import Range, spread
@@ -33,18 +35,16 @@ from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.plan.unknown_names import unknown_posture
-from manipcli.scene.drop_test import FORMED, drop_height
 from manipcli.scene.scene import Body, Scene
-from manipcli.shapes.primitives import Cylinder
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 
-UPRIGHT = np.cos(np.radians(5.0))
-"""Cosine of the tilt: a body that is more upright than this can be placed on."""
 TILTS = tuple(np.radians([0.0, 2.0, 4.0]))
 """Candidate tilts [rad] of the object when it is released."""
 ROUND = ("cup", "cylinder", "sphere")
 """Bodies that are as wide along their diagonal as along their axes."""
+WAYS = 9
+"""Number of ways to set the object down that are tried at each place in a region."""
 POINTING = 0.5
 """Cosine to the ground: a tool below this points up or down."""
 _OVER = (
@@ -57,6 +57,19 @@ _LOWER = (
 )
 _WITHIN = "place it within reach, `at: [x, y]`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
 _ROOMIER = "place it where the opening fingers have room, rotate it: `yaw: ...`, or open the hand less: `posture: ...`"
+
+
+class RectangleSpec(Model):
+    """A rectangle along the axes of the world."""
+
+    centre: tuple[Length, Length] = Field(description="Its centre [x, y] in the world.")
+    size: tuple[Annotated[Length, Field(ge=0)], Annotated[Length, Field(ge=0)]] = Field(description="Its sides [m].")
+
+
+class RegionSpec(Model):
+    """A region for an object's frame."""
+
+    box: RectangleSpec = Field(description="A rectangle.")
 
 
 class PlaceSpec(Model):
@@ -76,6 +89,10 @@ class PlaceSpec(Model):
         description="The supporting body at [x, y]: on its top, or inside a tray; in or on a URDF or a mesh, at the "
         "first contact from above.",
     )
+    region: RegionSpec | None = Field(
+        None,
+        description="Where on the body `onto` it may stand, instead of `at`; the nearest to its centre is tried first.",
+    )
     yaw: Turn | None = Field(None, description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held.")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
@@ -86,7 +103,64 @@ class PlaceSpec(Model):
 
 
 def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candidates:
-    """Tilts of the object, clearances, and withdrawals of the hand.
+    """Places in the region, and at each the tilts of the object, clearances, and withdrawals of the hand."""
+    planner.held(state, spec.object)
+    planner.free_start(state)
+    what = f"cannot place '{spec.object}'"
+    if spec.region is None:
+        X_WG = _goal(spec, planner, state)
+        options = (Candidate(plan, name=name) for name, plan in _ways(spec, planner, state, X_WG))
+        return Candidates(options, what=what, decides="place")
+    region = spec.region.box
+
+    def in_region() -> Iterator[Candidate]:
+        for at in spots(region.centre, region.size):
+            where = f"at [{at[0]:.3f}, {at[1]:.3f}] m"
+            try:
+                X_WG = _free(spec, planner, state, at)
+            except NotPlannable as refusal:
+                yield Candidate(partial(_refused, refusal), name=where)
+                continue
+            for name, plan in itertools.islice(_ways(spec, planner, state, X_WG), WAYS):
+                yield Candidate(plan, name=f"{where}, {name}")
+
+    return Candidates(in_region(), what=what, decides="place")
+
+
+def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[float, float]) -> Transform:
+    """X_WG at a place in the region.
+
+    Raises:
+        NotPlannable: it is not on the support, or too near to another body.
+    """
+    assert spec.onto is not None  # `check` asks for it
+    X_WG = standing(planner, state, spec.object, spec.onto, at, spec.yaw)
+    hit = crowded(planner, state, spec.object, X_WG, spec.onto)
+    if hit is None:
+        return X_WG
+    other = hit.a if hit.b == spec.object else hit.b
+    where = f"[{at[0]:.3f}, {at[1]:.3f}] m"
+    raise NotPlannable(
+        f"{where} is within {1000 * ROOM:.0f} mm of '{other}'", hint="make `region` larger", parts=frozenset((other,))
+    )
+
+
+def _refused(refusal: NotPlannable) -> StepPlan:
+    raise refusal
+
+
+def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
+    """X_WG: the goal pose of the object's frame."""
+    if spec.at == "start":
+        return planner.scene.body(spec.object).X_WO
+    assert spec.onto is not None  # `check` asks for it
+    return standing(planner, state, spec.object, spec.onto, spec.at, spec.yaw)
+
+
+def _ways(
+    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform
+) -> Iterator[tuple[str, Callable[[], StepPlan]]]:
+    """The ways to set the object down at `X_WG`, with their names.
 
     The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
 
@@ -94,9 +168,6 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     latter if the open hand is too near to it anyway, as around an object that sits deep in the hand. If the arm comes
     too near to something, the object is set down a little tilted, with the arm higher: it rights itself when released.
     """
-    planner.held(state, spec.object)
-    planner.free_start(state)
-    X_WG = _goal(spec, planner, state)
     X_OT = planner.held_in_tool(state).inverse()
     lowered: dict[tuple[float, float], MotionBuilder | NotPlannable] = {}
 
@@ -133,8 +204,8 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     withdrawals = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
     tilts = TILTS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
     ways = itertools.product(tilts, (True,) if near else (False, True), *withdrawals)
-    options = [Candidate(partial(attempt, *way), name=_name(*way)) for way in ways]
-    return Candidates(options, what=f"cannot place '{spec.object}'", decides="place")
+    for way in ways:
+        yield _name(*way), partial(attempt, *way)
 
 
 def _name(tilt: float, grazing: bool, clearance: float, retreat: float, slope: float) -> str:
@@ -176,51 +247,6 @@ def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transf
     return about @ X_WG
 
 
-def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
-    """X_WG: the goal pose of the object's frame."""
-    body = planner.scene.body(spec.object)
-    if spec.at == "start":
-        return body.X_WO
-    assert spec.onto is not None  # `check` asks for it
-    X_WU = planner.body_pose(state, spec.onto)
-    under = planner.scene.body(spec.onto)
-    if X_WU.R[2, 2] < UPRIGHT:
-        raise NotPlannable(f"'{spec.onto}' is tilted; '{spec.object}' cannot be placed on it", loc=("onto",))
-    floor, size = _surface(under)
-    x, y, _ = X_WU.inverse().apply([*spec.at, 0.0]) - under.centre
-    if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
-        raise NotPlannable(
-            f"[{spec.at[0]:g}, {spec.at[1]:g}] m is outside '{spec.onto}', whose centre is at "
-            f"[{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`at` is in the world frame; '{spec.onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
-            loc=("at",),
-        )
-    bottom = float(body.centre[2] - body.size[2] / 2)
-    x_axis = planner.body_pose(state, spec.object).R[:, 0]
-    yaw = float(np.arctan2(x_axis[1], x_axis[0])) if spec.yaw is None else spec.yaw
-    X_WG = Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
-    if under.kind not in FORMED:
-        return X_WG
-    deeper = drop_height(body, X_WG, under, X_WU)
-    if deeper is None:
-        raise NotPlannable(
-            f"no part of '{spec.onto}' is below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
-            hint=f"choose `at` over a part of '{spec.onto}'",
-            loc=("at",),
-        )
-    return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
-
-
-def _surface(under: Body) -> tuple[float, tuple[float, float]]:
-    """Height [m] of the supporting surface of a body above its O, and its size (x, y) [m]."""
-    if under.interior is None:
-        return float(under.centre[2] + under.size[2] / 2), (float(under.size[0]), float(under.size[1]))
-    shape, middle = under.interior.shape, float(under.interior.X_OS.p[2])
-    if isinstance(shape, Cylinder):
-        return middle - shape.length / 2, (2 * shape.radius, 2 * shape.radius)
-    return middle - shape.size[2] / 2, shape.size[:2]
-
-
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown bodies and postures; a place without a support."""
     found = unknown_body(scene, spec.object, ("object",), movable=True)
@@ -229,12 +255,19 @@ def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
         found += (Problem(loc=("onto",), message=f"'{spec.object}' cannot be placed on itself"),)
     elif spec.onto is not None:
         found += unknown_body(scene, spec.onto, ("onto",))
-    elif spec.at != "start":
-        found += (Problem(loc=("at",), message="`at: [x, y]` needs a supporting body", hint="add `onto: BODY`"),)
-    if spec.at == "start":
+    elif spec.at != "start" or spec.region is not None:
+        word, example = ("region", "region") if spec.at == "start" else ("at", "at: [x, y]")
+        message = f"`{example}` needs a supporting body"
+        found += (Problem(loc=(word,), message=message, hint="add `onto: BODY`"),)
+    if spec.at != "start" and spec.region is not None:
+        message = "`region` and `at` both set the place"
+        found += (Problem(loc=("region",), message=message, hint="remove one of them"),)
+    if spec.at == "start" and spec.region is None:
         found += tuple(
             Problem(
-                loc=(word,), message=f"`{word}` needs `at: [x, y]`", hint=f"remove `{word}`: `at: start` sets the pose"
+                loc=(word,),
+                message=f"`{word}` needs `at: [x, y]` or `region`",
+                hint=f"remove `{word}`: `at: start` sets the pose",
             )
             for word, value in (("onto", spec.onto), ("yaw", spec.yaw))
             if value is not None
