@@ -100,7 +100,7 @@ def page() -> str:
 
 def example(one: StepMember[Any]) -> str:
     """How it is written: the list in the docstring of its module."""
-    _, _, after = cleandoc(sys.modules[one.plan.__module__].__doc__ or "").partition("\n\n")
+    _, _, after = cleandoc(sys.modules[one.spec.__module__].__doc__ or "").partition("\n\n")
     return dedent(after.partition("\n\n")[0]).strip("\n")
 
 
