@@ -11,7 +11,7 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from unittest.mock import patch
@@ -31,7 +31,7 @@ from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
 from manipcli.record.write.recorder import Recorder
 from manipcli.scene.scene import Scene
-from manipcli.simulate.engine import EngineMember, EngineSettings
+from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.engines.pybullet import PybulletEngine
 from manipcli.task.load_task import load_task
@@ -102,14 +102,7 @@ def watched_run(folder: Path) -> tuple[float, Cost]:
     """Seconds of the simulate phase of the pour without the pauses, and what it is made of."""
     cost = Cost()
     member = ENGINES["pybullet"]
-    watched = EngineMember(
-        name=member.name,
-        physics=member.physics,
-        refuses=member.refuses,
-        open=partial(Watched, cost),
-        version=member.version,
-        prepare=member.prepare,
-    )
+    watched = replace(member, open=partial(Watched, cost))
     with patch("manipcli.run.execute.ENGINES", {"pybullet": watched}):
         report = run_task(POUR, log=folder / "pour.mcap", force=True)
     return report.timing.simulate - cost.paused, cost

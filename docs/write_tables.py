@@ -22,9 +22,11 @@ from write_steps import table
 
 from manipcli.control.controller import ControllerMember
 from manipcli.control.controllers import CONTROLLERS
+from manipcli.simulate.engines import ENGINES
 from manipcli.spec import baseline, controllers, reactions, robot, task, vary
 from manipcli.spec.base import about
 from manipcli.spec.controllers import ControllerSpec, GainsSpec
+from manipcli.task.vocabulary import task_spec
 
 PAGES: Final = tuple(Path(__file__).with_name(name) for name in ("task.md", "robot.md", "controllers.md"))
 _MODULES: Final = (task, robot, controllers, reactions, vary, baseline)
@@ -42,6 +44,10 @@ def renewed(page: str) -> str:
 
 
 def _model(name: str) -> type[BaseModel]:
+    engines = {member.spec.__name__: member.spec for member in ENGINES}
+    simulation = task_spec().model_fields["simulation"].default
+    if name in engines or name == type(simulation).__name__:
+        return engines.get(name, type(simulation))
     found: type[BaseModel] = next(getattr(module, name) for module in _MODULES if hasattr(module, name))
     return found
 

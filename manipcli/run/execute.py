@@ -15,10 +15,10 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.record.write.recorder import Recorder
+from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
 from manipcli.run.step_loop import StepLoop, saturations_of
-from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
@@ -89,11 +89,7 @@ def _run_steps(
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
     simulation, true = task.spec.simulation, task.true
-    settings = EngineSettings(
-        step=simulation.step,
-        substeps=round(simulation.control_period / simulation.step),
-        start=plan.start.position,
-    )
+    settings = engine_settings(task, plan)
     engine = ENGINES[simulation.engine].open(true.robot, true.scene, settings)
     try:
         with stdout_to_stderr():

@@ -25,6 +25,7 @@ from manipcli.record.recording import EMBEDDED
 from manipcli.record.selection import Selection
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.embedding import embeddable
+from manipcli.run.engine_settings import engine_settings
 from manipcli.scene.scene_file import scene_to_json
 from manipcli.shapes.primitives import Mesh
 from manipcli.simulate.engines import ENGINES
@@ -100,6 +101,7 @@ def open_log(
             ],
             metadata={
                 "run": run_metadata(task),
+                **({"engine": chosen} if (chosen := _chosen(task, plan)) else {}),
                 **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
                 "versions": {"manipcli": __version__, engine.name: engine.version()},
                 "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},
@@ -138,6 +140,12 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
         "period": repr(simulation.control_period),
         **end,
     }
+
+
+def _chosen(task: Task, plan: Plan) -> dict[str, str]:
+    """The settings that the engine chose itself."""
+    engine = ENGINES[task.spec.simulation.engine]
+    return dict(engine.chosen(task.true.robot, task.true.scene, engine_settings(task, plan)))
 
 
 def recorded(controller: Controller) -> Recorded:

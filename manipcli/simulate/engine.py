@@ -6,25 +6,41 @@ engines in one process are independent. Engines have no clock: the session count
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from manipcli.control.command import JointCommand
-from manipcli.core.errors import Diagnostic
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
+from manipcli.spec.base import Model
 
 
 @dataclass(frozen=True, slots=True)
 class EngineSettings:
-    """`step` [s]: one physics step; `substeps`: physics steps per control tick; `start` (n): joint positions."""
+    """Settings of one world.
+
+    Attributes:
+        step: one physics step [s].
+        substeps: physics steps per control tick.
+        start: (n) joint positions.
+        own: the engine's own settings, of its `spec`; None: its defaults.
+    """
 
     step: float
     substeps: int
     start: Array
+    own: Model | None = None
+
+
+class Refusal(NamedTuple):
+    """Why an engine cannot simulate a task. `at`: location in the task file, for a finding without a place."""
+
+    finding: Diagnostic
+    at: Loc = ("robot",)
 
 
 class Engine(Protocol):
@@ -81,15 +97,19 @@ class EngineMember:
     Attributes:
         name: as in `simulation: {engine: ...}`.
         physics: for judges: with "none", objects do not move.
-        refuses: (robot) -> all reasons why the engine cannot load this robot.
-        open: (robot, scene, settings) -> a running engine, for a robot without such reasons.
+        spec: its own settings, the block `simulation: {NAME: {...}}`; a model without fields has no block.
+        refuses: (robot, scene, own settings) -> all reasons why the engine cannot simulate them.
+        open: (robot, scene, settings) -> a running engine, without such reasons.
+        chosen: (robot, scene, settings) -> values that the engine chose itself, for the log.
         version: of the engine, for the log.
         prepare: imports the engine's library, which is otherwise imported by the first world.
     """
 
     name: str
     physics: Literal["full", "none"]
-    refuses: Callable[[RobotModel], tuple[Diagnostic, ...]]
+    spec: type[Model]
+    refuses: Callable[[RobotModel, Scene, Model | None], tuple[Refusal, ...]]
     open: Callable[[RobotModel, Scene, EngineSettings], Engine]
+    chosen: Callable[[RobotModel, Scene, EngineSettings], Mapping[str, str]]
     version: Callable[[], str]
     prepare: Callable[[], object]

@@ -35,9 +35,8 @@ Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
 class SimulationSpec(Model):
     """Engine and clock. `control_period` is a whole multiple of `step`; `settle` is simulated before the start."""
 
-    engine: str = Field(
-        "pybullet", description="Engine: `pybullet` (physics) or `kinematic` (ideal tracking, no physics)."
-    )
+    # `unions.task_model` adds the settings of each engine, in a field with its name.
+    engine: str = Field("pybullet", description="Engine. Default pybullet.")
     step: Annotated[Time, Field(ge=1e-6, le=0.02, description="Physics step, 1 us to 20 ms. Default 1 ms.")] = 0.001
     control_period: Annotated[
         Time, Field(gt=0, le=0.05, description="Control period, a whole multiple of `step`, up to 50 ms. Default 1 ms.")
@@ -49,6 +48,12 @@ class SimulationSpec(Model):
     settle: Annotated[
         Time, Field(ge=0, le=60, description="Time simulated before the start, 0 to 60 s. Default 0.5 s.")
     ] = 0.5
+
+    @property
+    def own(self) -> Model | None:
+        """The selected engine's own settings; None for an engine without any, or an unknown engine."""
+        own = getattr(self, self.engine, None) if self.engine in type(self).model_fields else None
+        return own if isinstance(own, Model) else None
 
     @model_validator(mode="after")
     def _whole_steps(self) -> SimulationSpec:

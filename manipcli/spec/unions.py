@@ -31,11 +31,11 @@ from manipcli.spec.condition import (
 )
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.task import SimulationSpec, StepSpec, TaskSpec
 
 
 class SpecMember(Protocol):
-    """A step or condition as the unions need it: its key in YAML, and the spec of the block under it."""
+    """A step, condition or engine as the specs need it: its key in YAML, and the spec of the block under it."""
 
     @property
     def name(self) -> str: ...
@@ -56,15 +56,16 @@ class ControllerSpecMember(Protocol):
 
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
+E = TypeVar("E", bound=SpecMember)
 L = TypeVar("L", bound=ControllerSpecMember)
 
 _STEP = tuple(name for name in StepSpec.model_fields if name != "verb")
 _EXPECTATION = tuple(ExpectationSpec.model_fields)
 
 
-def task_model(steps: Seam[S], conditions: Seam[C]) -> type[TaskSpec]:
-    """`TaskSpec` with the steps and conditions of the seams; the same class for the same members."""
-    return _task_model(_members(steps), _members(conditions))
+def task_model(steps: Seam[S], conditions: Seam[C], engines: Seam[E]) -> type[TaskSpec]:
+    """`TaskSpec` with the steps, conditions and engines of the seams; the same class for the same members."""
+    return _task_model(_members(steps), _members(conditions), _members(engines))
 
 
 Members = tuple[tuple[str, type[Model]], ...]
@@ -75,22 +76,40 @@ def _members(seam: Seam[S]) -> Members:
 
 
 @lru_cache(maxsize=8)
-def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
+def _task_model(steps: Members, conditions: Members, engines: Members) -> type[TaskSpec]:
     condition = _conditions(conditions)
     expectation = _expectations(conditions, condition)
     until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`object` has no operator `|`)
     steps_of = [_wrapped(StepSpec, name, spec, {"until": until}) for name, spec in steps]
     step = _union("verb", steps_of, common=_STEP)
+    simulation = simulation_model(engines)
     # These types exist only at run time; type checkers cannot follow them.
     model = create_model(
         "TaskSpec",
         __base__=TaskSpec,
         __doc__=TaskSpec.__doc__,
+        simulation=(simulation, Field(simulation(), description=TaskSpec.model_fields["simulation"].description)),
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
         watch=(tuple[_watches([name for name, _ in conditions], condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
     )
     return cast(type[TaskSpec], model)
+
+
+def simulation_model(engines: Members) -> type[SimulationSpec]:
+    """`SimulationSpec` with a block for each engine with settings."""
+    own = {name: (spec, Field(spec(), description=about(spec))) for name, spec in engines if spec.model_fields}
+    default = SimulationSpec.model_fields["engine"].default
+    text = f"Engine: {', '.join(f'`{name}`' for name, _ in engines)}. Default {default}."
+    # The field names are only known at run time: no overload of create_model fits.
+    made = create_model(  # type: ignore[call-overload]
+        "SimulationSpec",
+        __base__=SimulationSpec,
+        __doc__=SimulationSpec.__doc__,
+        engine=(str, Field(default, description=text)),
+        **own,
+    )
+    return cast(type[SimulationSpec], made)
 
 
 def controllers_model(controllers: Seam[L]) -> type[ControllersSpec]:

@@ -72,7 +72,7 @@ def disagreements(
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
-    return (*found, *_refused(task, robot), *claimed, *misread, *warned)
+    return (*found, *_refused(task, robot, scene), *claimed, *misread, *warned)
 
 
 def not_there(
@@ -195,17 +195,18 @@ def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) ->
         )
 
 
-def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Diagnostic, ...]:
-    """Errors for a robot without movable joints, or that the engine refuses."""
+def _refused(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> tuple[Diagnostic, ...]:
+    """Errors for a robot without movable joints, and for what the engine refuses."""
     if not robot.moving_joints:
         message = f"robot '{robot.name}' has no movable joint"
         hint = "write a passive object as a body of the scene: `urdf: {file: ...}`"
         return (task.source.finding(MOTIONLESS, ("robot",), message, hint=hint),)
-    engine = task.spec.simulation.engine
-    if engine not in ENGINES.names:
+    simulation = task.spec.simulation
+    if simulation.engine not in ENGINES.names:
         return ()
     return tuple(
-        replace(finding, place=finding.place or task.place("robot")) for finding in ENGINES[engine].refuses(robot)
+        replace(finding, place=finding.place or task.place(*at))
+        for finding, at in ENGINES[simulation.engine].refuses(robot, scene, simulation.own)
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from manipcli.conditions.members import CONDITIONS
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.plan.steps import STEPS
+from manipcli.simulate.engines import ENGINES
 from manipcli.spec.base import about
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.controllers_file import ControllersSpec
@@ -15,8 +16,8 @@ from manipcli.spec.unions import controllers_model, task_model
 
 
 def task_spec() -> type[TaskSpec]:
-    """`TaskSpec` with all verbs and conditions; always the same class."""
-    return task_model(STEPS, CONDITIONS)
+    """`TaskSpec` with all verbs, conditions and engines; always the same class."""
+    return task_model(STEPS, CONDITIONS, ENGINES)
 
 
 def controllers_spec() -> type[ControllersSpec]:

@@ -58,11 +58,11 @@ def simulated_answers(
         _Holder(name, [tuned for tuned in proposals if tuned.controller == name], spec, robot, start)
         for name in dict.fromkeys(tuned.controller for tuned in proposals)
     ]
-    member = ENGINES["pybullet"]
-    refused = member.refuses(robot)
-    if refused:
-        raise InvalidInput(refused)
+    member = next(member for member in ENGINES if member.physics == "full")
     scene = Scene(bodies=(), frames=(), gravity=np.array(EARTH_GRAVITY))
+    refused = member.refuses(robot, scene, None)
+    if refused:
+        raise InvalidInput([refusal.finding for refusal in refused])
     with stdout_to_stderr():
         engine = member.open(robot, scene, EngineSettings(wish.period / wish.substeps, wish.substeps, start))
         try:

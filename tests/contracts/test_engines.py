@@ -522,9 +522,9 @@ def chain(count: int) -> RobotModel:
 
 def test_bullet_holds_127_joints_and_says_so_of_128(opens: Opens) -> None:
     member = ENGINES["pybullet"]
-    assert member.refuses(chain(127)) == ()
+    assert member.refuses(chain(127), scene(), None) == ()
     assert np.isfinite(opens(member, chain(127)).read().position).all()
-    (finding,) = member.refuses(chain(128))
+    ((finding, _),) = member.refuses(chain(128), scene(), None)
     assert "128 joints" in finding.message
     with pytest.raises(InvalidInput, match="128 joints"):
         opens(member, chain(128))
@@ -532,11 +532,11 @@ def test_bullet_holds_127_joints_and_says_so_of_128(opens: Opens) -> None:
 
 def test_bullet_refuses_a_joint_that_moves_no_mass(opens: Opens) -> None:
     model = robot([joint("a", "x"), joint("b", "y", parent="x")], [inertial(1.0), None])
-    (finding,) = ENGINES["pybullet"].refuses(model)
+    ((finding, _),) = ENGINES["pybullet"].refuses(model, scene(), None)
     assert finding.message.startswith("link 'y' has no mass")
     with pytest.raises(InvalidInput, match=r"link 'y' has no mass .* moved by joint 'b'"):
         opens(ENGINES["pybullet"], model)
-    assert ENGINES["kinematic"].refuses(model) == ()
+    assert ENGINES["kinematic"].refuses(model, scene(), None) == ()
 
 
 def test_moments_written_with_few_digits_are_held(opens: Opens) -> None:

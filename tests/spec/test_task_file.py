@@ -71,6 +71,16 @@ class Near(Model):
     within: Length
 
 
+class Solver(Model):
+    """Settings of an engine."""
+
+    solver_iterations: int = 200
+
+
+class Plain(Model):
+    """An engine without settings."""
+
+
 @dataclass(frozen=True)
 class Member:
     name: str
@@ -79,7 +89,8 @@ class Member:
 
 STEPS = Seam("step", (Member("move", Move), Member("pour", Pour), Member("wait", Wait)))
 CONDITIONS = Seam("condition", (Member("inside", Inside), Member("near", Near)))
-MODEL = task_model(STEPS, CONDITIONS)
+ENGINES = Seam("engine", (Member("pybullet", Solver), Member("kinematic", Plain)))
+MODEL = task_model(STEPS, CONDITIONS, ENGINES)
 
 TASK = """\
 task: pour
@@ -835,3 +846,18 @@ def test_the_schema_offers_each_verb_once_and_takes_expressions() -> None:
 def test_the_spec_layer_starts_without_numpy() -> None:
     code = "import sys, manipcli.spec.load, manipcli.spec.schema; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_task_has_the_settings_of_each_engine_and_the_selected_ones() -> None:
+    def own(text: str) -> Model | None:
+        return load(f"{TASK}simulation: {text}\n").spec.simulation.own
+
+    assert own("{engine: pybullet, pybullet: {solver_iterations: 50}}") == Solver(solver_iterations=50)
+    assert own("{engine: kinematic, pybullet: {solver_iterations: 50}}") is None
+    assert own("{}") == Solver()
+
+
+def test_an_unknown_setting_of_an_engine_names_the_nearest() -> None:
+    finding = only(f"{TASK}simulation: {{pybullet: {{solver_iteration: 50}}}}\n")
+    assert (finding.code, str(finding.place)) == ("TASK201", "t.yaml:18:25")
+    assert "solver_iterations" in (finding.hint or "")

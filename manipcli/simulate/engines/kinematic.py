@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from manipcli.control.command import JointCommand
-from manipcli.core.errors import Diagnostic
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
-from manipcli.simulate.engine import EngineMember, EngineSettings
+from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
+from manipcli.spec.base import Model
+
+
+class KinematicSpec(Model):
+    """The ideal engine has no settings of its own."""
 
 
 class KinematicEngine:
@@ -87,8 +92,12 @@ def _version() -> str:
     return __version__
 
 
-def _refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
+def _refuses(robot: RobotModel, scene: Scene, own: Model | None) -> tuple[Refusal, ...]:
     return ()
+
+
+def _chosen(robot: RobotModel, scene: Scene, settings: EngineSettings) -> Mapping[str, str]:
+    return {}
 
 
 def _prepare() -> None:
@@ -96,5 +105,12 @@ def _prepare() -> None:
 
 
 MEMBER = EngineMember(
-    name="kinematic", physics="none", refuses=_refuses, open=KinematicEngine, version=_version, prepare=_prepare
+    name="kinematic",
+    physics="none",
+    spec=KinematicSpec,
+    refuses=_refuses,
+    open=KinematicEngine,
+    chosen=_chosen,
+    version=_version,
+    prepare=_prepare,
 )

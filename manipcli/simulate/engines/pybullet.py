@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import struct
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Final
+from typing import Annotated, Final
+
+from pydantic import Field
 
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, SimulationFailed
@@ -17,7 +20,7 @@ from manipcli.model.normalised_urdf import engine_urdf, massless_links
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
-from manipcli.simulate.engine import EngineMember, EngineSettings
+from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
 from manipcli.simulate.engines.pybullet_contacts import (
     BulletPoint,
     ContactMerger,
@@ -30,10 +33,20 @@ from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
 from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
+from manipcli.spec.base import Model
 
 SOLVER_ITERATIONS: Final = 200
 """Maximum; the solver stops at a residual of 1e-7. With Bullet's default of 50 it does not converge while a hand holds
 an object: for a cup pressed with 34 N in all by three fingers, it computed 39 N, varying by 7 N."""
+
+
+class PybulletSpec(Model):
+    """Settings of PyBullet."""
+
+    solver_iterations: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        SOLVER_ITERATIONS,
+        description="Largest number of iterations of the contact solver per physics step, 1 to 10000. Default 200.",
+    )
 
 
 class PybulletEngine:
@@ -42,8 +55,8 @@ class PybulletEngine:
     ideal: Final = False
 
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
-        if refused := refuses(robot):
-            raise InvalidInput(refused)
+        if refused := refuses(robot, scene, settings.own):
+            raise InvalidInput([refusal.finding for refusal in refused])
         pybullet = _library()
         with stdout_to_stderr():
             self._p = pybullet
@@ -61,7 +74,7 @@ class PybulletEngine:
         p.setGravity(*scene.gravity, physicsClientId=client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=settings.step,
-            numSolverIterations=SOLVER_ITERATIONS,
+            numSolverIterations=_own(settings.own).solver_iterations,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
         )
@@ -233,7 +246,7 @@ def _version() -> str:
     return "unknown"
 
 
-def refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
+def refuses(robot: RobotModel, scene: Scene, own: Model | None) -> tuple[Refusal, ...]:
     """Too many joints for Bullet, and moving links without mass."""
     found = []
     if len(robot.joints) > MAX_JOINTS:
@@ -241,9 +254,24 @@ def refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
             f"robot '{robot.name}' has {len(robot.joints)} joints; Bullet supports {MAX_JOINTS}, including fixed ones"
         )
         found.append(Diagnostic("SIM120", message, hint="merge links that are fixed to each other"))
-    return (*found, *massless_links(robot, "SIM121"))
+    return tuple(Refusal(finding) for finding in (*found, *massless_links(robot, "SIM121")))
+
+
+def _own(settings: Model | None) -> PybulletSpec:
+    return settings if isinstance(settings, PybulletSpec) else PybulletSpec()
+
+
+def _chosen(robot: RobotModel, scene: Scene, settings: EngineSettings) -> Mapping[str, str]:
+    return {}
 
 
 MEMBER = EngineMember(
-    name="pybullet", physics="full", refuses=refuses, open=PybulletEngine, version=_version, prepare=_library
+    name="pybullet",
+    physics="full",
+    spec=PybulletSpec,
+    refuses=refuses,
+    open=PybulletEngine,
+    chosen=_chosen,
+    version=_version,
+    prepare=_library,
 )
