@@ -100,7 +100,8 @@ def lying(
 
 def total(contact: Contact) -> Array:
     """(3,) [N] force on `a`."""
-    return np.sum([p.force * np.array(p.normal) + p.friction for p in contact.points], axis=0)
+    found: Array = np.sum([p.force * np.array(p.normal) + p.friction for p in contact.points], axis=0)
+    return found
 
 
 @with_physics

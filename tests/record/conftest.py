@@ -149,7 +149,7 @@ def _run(ticks: int) -> Run:
     )
     outputs = tuple(tuple(rng.normal(size=(ticks, len(c.joints))) for _ in range(4)) for c in CONTROLLERS)
     points = tuple(
-        ContactPoint(tuple(p), tuple(n), force, tuple(f))  # type: ignore[arg-type]
+        ContactPoint(tuple(p), tuple(n), force, tuple(f))
         for force, (p, n, f) in zip((1.25, 0.0, 0.25), rng.normal(size=(3, 3, 3)).tolist(), strict=True)
     )
     contacts = (

@@ -37,11 +37,11 @@ def _forces(a: str, b: str, *, since: float = 0.0, **turns: tuple[float, float])
     for j, name in enumerate(("ball", "cup")):
         about_x, about_y = turns.get(name, (0.0, 0.0))
         quat[:, j] = [quat_from_matrix(matrix_from_rpy((about_x * t, about_y * t, 0.0))) for t in TIMES]
-    none = np.zeros((6, 0))
+    none, bodies = np.zeros((6, 0)), tuple(_body(name, fixed=name == "desk") for name in ("ball", "cup", "desk"))
     playback = Playback(
         name="",
         robot=RobotModel("r", "base", (Link("base", None, (), ()),), (), (), (), (), Transform.identity(), ""),
-        scene=Scene(tuple(_body(name, fixed=name == "desk") for name in ("ball", "cup", "desk")), (), frozen([0.0] * 3)),
+        scene=Scene(bodies, (), frozen([0.0] * 3)),
         joint_names=(), times=TIMES, position=none, velocity=none, effort=none, reference=none,
         body_position=frozen(position), body_quat_xyzw=frozen(quat),
         contacts=((Contact(a, b, 2.0, 0.0, (POINT,)),),) * 6, contact_times=((since,),) * 6,
