@@ -121,7 +121,6 @@ def refused_page(task: Task, verdict: Verdict) -> RunPage:
         provenance=(
             ("manipcli", __version__),
             ("engine", verdict.engine),
-        *engine_choices(recording.metadata),
             ("seed", str(verdict.seed)),
             ("run", "nothing was run"),
         ),

@@ -30,11 +30,12 @@ from manipcli.simulate.engines.pybullet_contacts import (
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
-from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
 from manipcli.simulate.engines.pybullet_solver import iterations
+from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 from manipcli.spec.base import Model
+
 
 class PybulletSpec(Model):
     """Settings of PyBullet."""
@@ -42,8 +43,9 @@ class PybulletSpec(Model):
     solver_iterations: Annotated[int, Field(ge=1, le=10_000)] | None = Field(
         None,
         description="Largest number of iterations of the contact solver per physics step, 1 to 10000. Default: by the "
-        "scene: 1000 if a movable body is lighter than 10 g; 100 for up to 5 movable bodies whose masses differ by up "
-        "to 50 times and a robot without rotor inertia; else 200. The log contains the number and the reason.",
+        "scene. 1000 if a movable body is lighter than 50 g. 100 for at most 5 movable bodies with masses up to 50 times "
+        "apart and a robot without rotor inertia; what lies in a movable container need only have 10 g. Else 200. The "
+        "log contains the number and the reason.",
     )
 
 
