@@ -43,9 +43,9 @@ class PybulletSpec(Model):
     solver_iterations: Annotated[int, Field(ge=1, le=10_000)] | None = Field(
         None,
         description="Largest number of iterations of the contact solver per physics step, 1 to 10000. Default: by the "
-        "scene. 1000 if a movable body is lighter than 50 g. 100 for at most 5 movable bodies with masses up to 50 times "
-        "apart and a robot without rotor inertia; what lies in a movable container need only have 10 g. Else 200. The "
-        "log contains the number and the reason.",
+        "scene. 1000 if a movable body is lighter than 50 g. 100 for at most 5 movable bodies with masses up to 50 "
+        "times apart and a robot without rotor inertia; what lies in a movable container need only have 10 g. Else "
+        "200. The log contains the number and the reason.",
     )
 
 
