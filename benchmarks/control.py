@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 from unittest.mock import patch
 
-from benchmarks.inside import POUR, clock
+from benchmarks.inside import POUR
 from benchmarks.table import Row
+from benchmarks.twin import clock
 from manipcli.control.actuation import Actuation
 from manipcli.control.limiter import JointLimiter
 from manipcli.control.manager import ControllerManager
