@@ -19,6 +19,7 @@ from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
 from typing import BinaryIO
 
+from manipcli.batch.forks import ONE_THREAD, Forked, ForkPool
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode
 from manipcli.core.lock import Taken, lock
@@ -33,8 +34,6 @@ from manipcli.batch.child import main
 main(int(sys.argv[2]))
 """
 """The child has the module path of its parent, and not the working directory (`-P`)."""
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-"""Default environment: with one run per core, threads of libraries would compete for the cores."""
 DRAWING = """
 import json, sys
 sys.path[:], log, picture, packages, outside = json.loads(sys.argv[1])
@@ -68,6 +67,7 @@ def run_jobs(
     at_once: int = 1,
     observer: Callable[[Job, Beat], None] | None = None,
     command: tuple[str, ...] = (),
+    server: tuple[str, ...] = (),
 ) -> Generator[CaseReport, None, None]:
     """Runs jobs and yields their reports, in the order in which they end.
 
@@ -77,14 +77,17 @@ def run_jobs(
         jobs: the runs, in the order in which they start.
         at_once: number of parallel runs.
         observer: callback for each start and each heartbeat.
-        command: another program instead of `batch/child.py`.
+        command: another program instead of `batch/child.py`, started as a new process.
+        server: another program instead of `batch/fork_server.py`.
     """
     waiting = deque(jobs)
     running: list[Process] = []
+    pool = ForkPool([] if command else waiting, command=server)
     try:
+        pool.open()
         while waiting or running:
             while waiting and len(running) < at_once:
-                started = _started(waiting.popleft(), command)
+                started = _started(waiting.popleft(), command, pool)
                 if isinstance(started, CaseReport):
                     yield started
                     continue
@@ -105,14 +108,15 @@ def run_jobs(
     finally:
         for process in running:
             process.forget()
+        pool.close()
 
 
-def _started(job: Job, command: tuple[str, ...]) -> Process | CaseReport:
+def _started(job: Job, command: tuple[str, ...], pool: ForkPool) -> Process | CaseReport:
     """The process of a job, or why there is none."""
     if job.case.findings:
         return _unreadable(job)
     try:
-        return Process(job, command=command)
+        return Process(job, command=command, pool=pool)
     except Taken:
         where = f"writes to '{job.settings.folder}'"
         return _no_process(job, f"another process is running this task and {where}; nothing was run")
@@ -129,12 +133,13 @@ class Process:
         activity: its last heartbeat.
     """
 
-    def __init__(self, job: Job, *, command: tuple[str, ...]) -> None:
+    def __init__(self, job: Job, *, command: tuple[str, ...], pool: ForkPool | None = None) -> None:
         """Starts the process.
 
         Args:
             job: the job.
             command: another program with the messages of `batch/child.py`.
+            pool: forks the process where it can.
 
         Raises:
             Taken: a process of another batch is running this job.
@@ -152,18 +157,23 @@ class Process:
             duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
         _remove(job.log, job.partial, job.picture, job.page)
-        self._process = subprocess.Popen(
-            [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=self._output,
-            pass_fds=(childs.fileno(),),
-            start_new_session=True,  # signals of the terminal reach only the parent
-            env={**ONE_THREAD, **os.environ},
-        )
+        forked = pool.start(job, childs.fileno(), self._output.fileno()) if pool is not None else None
+        self._process = forked or self._new_process(childs.fileno(), command)
+        self._note = pool.take_note() if pool is not None else ""
         childs.close()
         with suppress(ConnectionError):  # it has exited already, which `hear` finds
             self.connection.send(job)
+
+    def _new_process(self, channel: int, command: tuple[str, ...]) -> subprocess.Popen[bytes] | Forked:
+        return subprocess.Popen(
+            [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(channel)],
+            stdin=subprocess.DEVNULL,
+            stdout=self._output,
+            stderr=self._output,
+            pass_fds=(channel,),
+            start_new_session=True,  # signals of the terminal reach only the parent
+            env={**ONE_THREAD, **os.environ},
+        )
 
     @property
     def elapsed(self) -> float:
@@ -230,6 +240,8 @@ class Process:
         self.end()
         code, end = self._process.returncode, self._end
         if end is None:
+            if code is None:
+                return self._report("crashed", f"ended before it was done, as its fork server did; {self.activity}")
             if code < 0:
                 cause = f"crashed by {signal_name(-code)}"
                 hint = "; check that there is enough memory" if -code == signal.SIGKILL else ""
@@ -274,7 +286,7 @@ class Process:
             picture=kept[job.picture],
             page=str(job.page) if job.page is not None and job.page.exists() else None,
             output=kept[job.output],
-            notes=end.notes,
+            notes=(*end.notes, *([self._note] if self._note else [])),
         )
         return self._with_page(report) if unfinished else report
 
