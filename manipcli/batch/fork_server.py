@@ -224,6 +224,8 @@ def _unsafe() -> str:
 
 def _load_engine(name: str) -> None:
     """Imports the library of an engine; a run reports the error of one that is missing."""
+    if not name:
+        return
     from manipcli.run import libraries
 
     with suppress(Exception):

@@ -105,7 +105,7 @@ class ForkServer:
         self._ready: Ready | None = None
         self._codes: dict[int, int] = {}
         self._requests = 0
-        self._closed = False
+        self._closed = ""  # why, if it is
 
     def ready(self, timeout: float) -> bool:
         """Whether it has sent that it is ready, after at most `timeout` [s].
@@ -117,7 +117,7 @@ class ForkServer:
         while self._ready is None and self._receive(deadline) is not None:
             pass
         if self._closed:
-            raise NoFork("the fork server was closed")
+            raise Died(self._closed)
         if self._ready is not None and self._ready.unsafe:
             raise NoFork(self._ready.unsafe)
         return self._ready is not None
@@ -135,30 +135,35 @@ class ForkServer:
         """
         self._requests += 1
         number = self._requests
+        if self._closed:
+            raise Died(self._closed)
         with suppress(ConnectionError):  # the next message is the end
             send(self._channel, Request(number, engine, template), [channel, output])
         deadline = time.monotonic() + ANSWER_TIME
         while (received := self._receive(deadline)) is not None:
             match received:
-                case Started(), [pidfd]:
-                    return Forked(self, number, received[0].pid, pidfd)
-                case Refused(), _:
-                    raise NoFork(received[0].cause)
-        self.close()
-        raise Died("the fork server does not answer")
+                case Started(_, pid), [pidfd]:
+                    return Forked(self, number, pid, pidfd)
+                case Started(_, pid), _:  # this process has too many open files
+                    os.kill(pid, signal.SIGKILL)
+                    raise NoFork("too many open files")
+                case Refused(_, cause), _:
+                    raise NoFork(cause)
+        self.close("the fork server did not answer")
+        raise Died(self._closed)
 
     def exit_code(self, number: int) -> int | None:
         """The exit code of a child that has exited; None if this server has died."""
         deadline = time.monotonic() + EXIT_TIME
         with suppress(NoFork):
-            while number not in self._codes and not self._closed and self._receive(deadline) is not None:
+            while number not in self._codes and self._receive(deadline) is not None:
                 pass
         return self._codes.pop(number, None)
 
-    def close(self) -> None:
+    def close(self, why: str = "the fork server was closed") -> None:
         """Ends the server, but not its children."""
         if not self._closed:
-            self._closed = True
+            self._closed = why
             self._process.kill()
             self._process.wait()
             self._channel.close()
@@ -171,12 +176,13 @@ class ForkServer:
             Died: the server has died.
         """
         if self._closed:
-            raise Died("the fork server was closed")
+            raise Died(self._closed)
         if not _readable(self._channel.fileno(), max(0.0, deadline - time.monotonic())):
             return None
         received = receive(self._channel)
         if received is None:
-            raise Died(self._end())
+            self._end()
+            raise Died(self._closed)
         answer, descriptors = received
         match answer:
             case Ready():
@@ -185,16 +191,15 @@ class ForkServer:
                 self._codes[answer.number] = answer.code
         return cast("Answer", answer), descriptors
 
-    def _end(self) -> str:
-        """How the server died, and closes it."""
+    def _end(self) -> None:
+        """Closes a server that has died."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(EXIT_TIME)
         code = self._process.returncode
         self._errors.seek(0)
         last = self._errors.read().decode("utf-8", "replace").strip().rpartition("\n")[2]
-        self.close()
         how = f"was ended by {signal_name(-code)}" if code is not None and code < 0 else f"ended with exit code {code}"
-        return f"the fork server {how}{f': {last}' if last else ''}"
+        self.close(f"the fork server {how}{f': {last}' if last else ''}")
 
 
 class ForkPool:

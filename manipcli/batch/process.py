@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
 
 from manipcli.batch.forks import ONE_THREAD, Forked, ForkPool
 from manipcli.batch.job import Beat, End, Job, Message
@@ -26,6 +26,8 @@ from manipcli.core.lock import Taken, lock
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
 from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of, warnings_of
+
+Child: TypeAlias = "Connection[Job, Message]"
 
 CHILD = """
 import json, sys
@@ -82,7 +84,7 @@ def run_jobs(
     """
     waiting = deque(jobs)
     running: list[Process] = []
-    pool = ForkPool([] if command else waiting, command=server)
+    pool = ForkPool([] if command and not server else waiting, command=server)
     try:
         pool.open()
         while waiting or running:
@@ -151,29 +153,40 @@ class Process:
         self.activity = Beat("starting")
         self._end: End | None = None
         self._judged: float | None = None
-        self.connection: Connection[Job, Message]
-        self.connection, childs = Pipe()
-        with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
-            duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
         _remove(job.log, job.partial, job.picture, job.page)
-        forked = pool.start(job, childs.fileno(), self._output.fileno()) if pool is not None else None
-        self._process = forked or self._new_process(childs.fileno(), command)
+        self.connection: Child
+        self._process: subprocess.Popen[bytes] | Forked
+        forked = self._forked(pool) if pool is not None else None
         self._note = pool.take_note() if pool is not None else ""
-        childs.close()
+        self.connection, self._process = forked or self._new(command)
+        with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
+            duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         with suppress(ConnectionError):  # it has exited already, which `hear` finds
             self.connection.send(job)
 
-    def _new_process(self, channel: int, command: tuple[str, ...]) -> subprocess.Popen[bytes] | Forked:
-        return subprocess.Popen(
-            [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(channel)],
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=self._output,
-            pass_fds=(channel,),
-            start_new_session=True,  # signals of the terminal reach only the parent
-            env={**ONE_THREAD, **os.environ},
-        )
+    def _forked(self, pool: ForkPool) -> tuple[Child, Forked] | None:
+        ours, childs = Pipe()
+        with childs:
+            process = pool.start(self.job, childs.fileno(), self._output.fileno())
+        if process is None:
+            ours.close()
+            return None
+        return ours, process
+
+    def _new(self, command: tuple[str, ...]) -> tuple[Child, subprocess.Popen[bytes]]:
+        ours, childs = Pipe()
+        with childs:
+            process = subprocess.Popen(
+                [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=self._output,
+                stderr=self._output,
+                pass_fds=(childs.fileno(),),
+                start_new_session=True,  # signals of the terminal reach only the parent
+                env={**ONE_THREAD, **os.environ},
+            )
+        return ours, process
 
     @property
     def elapsed(self) -> float:
@@ -241,7 +254,7 @@ class Process:
         code, end = self._process.returncode, self._end
         if end is None:
             if code is None:
-                return self._report("crashed", f"ended before it was done, as its fork server did; {self.activity}")
+                return self._report("crashed", f"crashed, exit code unknown as the fork server ended; {self.activity}")
             if code < 0:
                 cause = f"crashed by {signal_name(-code)}"
                 hint = "; check that there is enough memory" if -code == signal.SIGKILL else ""
