@@ -14,8 +14,8 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, suppress
 from socket import AF_UNIX, SOCK_SEQPACKET, socket, socketpair
 from tempfile import TemporaryFile
 from typing import IO, Final, cast
@@ -213,6 +213,7 @@ class ForkPool:
         """
         self._left = Counter(job.loading for job in jobs if not job.case.findings)
         self._command = command or (sys.executable, "-P", "-c", SERVER, json.dumps(sys.path))
+        self._servers: list[ForkServer] = []  # all of them: also one that is not used any more has children
         self._first: ForkServer | None = None
         self._templates: dict[Loading, ForkServer | None] = {}
         self._note = ""
@@ -221,23 +222,12 @@ class ForkPool:
         """Starts the first server, where it can save time, and waits until it is ready."""
         if not available() or self._left.total() < 2:
             return
-        channel, servers = socketpair(AF_UNIX, SOCK_SEQPACKET)
-        errors = TemporaryFile()  # noqa: SIM115 (closed with the server)
-        with servers:
-            process = subprocess.Popen(
-                [*self._command, str(servers.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=errors,
-                stderr=errors,
-                pass_fds=(servers.fileno(),),
-                start_new_session=True,  # signals of the terminal reach only the parent
-                env={**ONE_THREAD, **os.environ},
-            )
-        self._first = ForkServer(process, channel, errors)
         try:
+            self._first = _server(self._new_process)
+            self._servers.append(self._first)
             if not self._first.ready(START_TIME):
-                self._lose(Died(f"the fork server was not ready within {START_TIME:g} s"))
-        except NoFork as cause:
+                raise Died(f"the fork server was not ready within {START_TIME:g} s")
+        except (NoFork, OSError) as cause:
             self._lose(cause)
 
     def start(self, job: Job, channel: int, output: int) -> Forked | None:
@@ -257,19 +247,23 @@ class ForkPool:
             try:
                 if template.ready(0.0):
                     return template.fork(channel, output)
-            except NoFork:
-                template.close()
+            except (NoFork, OSError):
                 self._templates[job.loading] = None
         if self._first is None:
             return None
+        first = self._first
         engine = next((tag.removeprefix(ENGINE) for tag in job.case.tags if tag.startswith(ENGINE)), "")
         try:
-            forked = self._first.fork(channel, output, engine=engine)
-            if job.loading not in self._templates and self._left[job.loading] >= WORTHWHILE:
-                self._templates[job.loading] = _template(self._first, job.loading, engine)
-        except NoFork as cause:
+            forked = first.fork(channel, output, engine=engine)
+        except (NoFork, OSError) as cause:
             self._lose(cause)
             return None
+        if job.loading not in self._templates and self._left[job.loading] >= WORTHWHILE:
+            self._templates[job.loading] = None
+            with suppress(NoFork, OSError):
+                template = _server(lambda *files: first.fork(*files, engine=engine, template=job.loading))
+                self._servers.append(template)
+                self._templates[job.loading] = template
         return forked
 
     def take_note(self) -> str:
@@ -279,18 +273,24 @@ class ForkPool:
 
     def close(self) -> None:
         """Ends the servers."""
-        for server in (*self._templates.values(), self._first):
-            if server is not None:
-                server.close()
-        self._templates.clear()
-        self._first = None
+        for server in reversed(self._servers):  # the first one reaps the templates
+            server.close()
 
-    def _lose(self, cause: NoFork) -> None:
+    def _new_process(self, channel: int, output: int) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [*self._command, str(channel)],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            pass_fds=(channel,),
+            start_new_session=True,  # signals of the terminal reach only the parent
+            env={**ONE_THREAD, **os.environ},
+        )
+
+    def _lose(self, cause: NoFork | OSError) -> None:
         """Does without the first server from now on."""
         if isinstance(cause, Died):
             self._note = f"{cause}; runs are started without it"
-        if self._first is not None:
-            self._first.close()
         self._first = None
 
 
@@ -299,21 +299,18 @@ def available() -> bool:
     return sys.platform == "linux" and hasattr(os, "pidfd_open")
 
 
-def _template(server: ForkServer, loading: Loading, engine: str) -> ForkServer:
-    """A server that has loaded a task.
+def _server(start: Callable[[int, int], subprocess.Popen[bytes] | Forked]) -> ForkServer:
+    """A server, started with the descriptors of its socket and its output.
 
     Raises:
-        NoFork: it was not started.
+        NoFork, OSError: it was not started.
     """
     channel, servers = socketpair(AF_UNIX, SOCK_SEQPACKET)
-    errors = TemporaryFile()  # noqa: SIM115 (closed with the server)
-    with servers:
-        try:
-            process = server.fork(servers.fileno(), errors.fileno(), engine=engine, template=loading)
-        except NoFork:
-            channel.close()
-            errors.close()
-            raise
+    with servers, ExitStack() as failed:
+        failed.callback(channel.close)
+        errors = failed.enter_context(TemporaryFile())
+        process = start(servers.fileno(), errors.fileno())
+        failed.pop_all()
     return ForkServer(process, channel, errors)
 
 

@@ -157,9 +157,14 @@ class Process:
         _remove(job.log, job.partial, job.picture, job.page)
         self.connection: Child
         self._process: subprocess.Popen[bytes] | Forked
-        forked = self._forked(pool) if pool is not None else None
-        self._note = pool.take_note() if pool is not None else ""
-        self.connection, self._process = forked or self._new(command)
+        try:
+            forked = self._forked(pool) if pool is not None else None
+            self._note = pool.take_note() if pool is not None else ""
+            self.connection, self._process = forked or self._new(command)
+        except BaseException:  # an interrupt, too
+            _remove(job.output)
+            self._output.close()
+            raise
         with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
             duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         with suppress(ConnectionError):  # it has exited already, which `hear` finds
