@@ -27,6 +27,7 @@ from manipcli.report.run_report import RunReport, Timing
 from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
+from manipcli.run.prepared import Prepared
 from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, verdict_metadata
 from manipcli.task.controller_rows import controllers_of
 from manipcli.task.load_task import LoadOptions, load_task
@@ -62,6 +63,7 @@ def run_task(
     force: bool = False,
     embed_meshes: bool = False,
     progress: Progress = SILENT,
+    prepared: Prepared | None = None,
     **options: Unpack[LoadOptions],
 ) -> RunReport:
     """Loads, plans, simulates, records and judges a task.
@@ -72,6 +74,7 @@ def run_task(
         force: replace `log` if it exists.
         embed_meshes: store all mesh files in the log, so that it can be shown without packages.
         progress: receives warnings, steps and ticks.
+        prepared: the same task, loaded and planned before; ignored if a file has changed.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
@@ -82,8 +85,8 @@ def run_task(
         InvalidInput: a file or the path of the log is invalid; nothing was simulated.
         RecordingFailed: writing the log failed.
     """
-    task, loading = timed(_load, path, progress, options)
-    (plan, warnings), planning = timed(_plan, task, progress)
+    task, loading = timed(_load, path, progress, options, prepared)
+    (plan, warnings), planning = timed(_plan, task, progress, prepared)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings)
     where = log if log is not None else default_log(task)
@@ -131,18 +134,19 @@ def verify_log(
         return compared(recording, log, repeated, unlike=recorded.unlike, began=began)
 
 
-def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
-    task = load_task(path, **options)
+def _load(path: Path, progress: Progress, options: LoadOptions, prepared: Prepared | None) -> Task:
+    task = prepared.load(path, **options) if prepared is not None else load_task(path, **options)
     if task.warnings:
         progress.warned(task.warnings)
     load_libraries(task)
     return task
 
 
-def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
+def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task without a plan; and all warnings before the run."""
     try:
-        plan = plan_task(task, on_progress=progress.activity)
+        plan = prepared.take_plan(task) if prepared is not None else None
+        plan = plan or plan_task(task, on_progress=progress.activity)
     except NotPlannable as refusal:
         return refused(task, refusal), task.warnings
     findings = preflight_findings(task, plan)

@@ -6,11 +6,15 @@ import math
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.report.html.markup import link
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite.suite import Case, Trouble
+
+if TYPE_CHECKING:
+    from manipcli.task.load_task import FileOptions
 
 FOLDER = Path("runs") / "test"
 """Folder for the logs of tests, below the working directory."""
@@ -55,12 +59,37 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
+class Loading:
+    """How the task of a job is loaded, without its sample: a task file and the options of `load_task`."""
+
+    path: Path
+    overrides: tuple[str, ...] = ()
+    seed: int | None = None
+    package_path: tuple[Path, ...] = ()
+    allow_outside: bool = False
+
+    @property
+    def options(self) -> FileOptions:
+        return {
+            "overrides": self.overrides,
+            "seed": self.seed,
+            "package_path": self.package_path,
+            "allow_outside": self.allow_outside,
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """A case, its task file, and the paths of its output files."""
 
     case: Case
     path: Path
     settings: Settings
+
+    @property
+    def loading(self) -> Loading:
+        settings = self.settings
+        return Loading(self.path, settings.overrides, settings.seed, settings.package_path, settings.allow_outside)
 
     @property
     def log(self) -> Path:
