@@ -51,8 +51,8 @@ class Shapes:
             case Sphere(radius):
                 return [self._geom(body, type=kinds.mjGEOM_SPHERE, size=[radius, 0.0, 0.0], **attributes)]
             case Cylinder(radius, length):
-                size = [radius, length / 2, 0.0]
-                return [self._geom(body, type=kinds.mjGEOM_CYLINDER, size=size, **attributes)]
+                half = [radius, length / 2, 0.0]
+                return [self._geom(body, type=kinds.mjGEOM_CYLINDER, size=half, **attributes)]
             case Mesh():
                 kind = kinds.mjGEOM_MESH
                 return [self._geom(body, type=kind, meshname=name, **attributes) for name in self._meshes(shape)]
@@ -93,9 +93,9 @@ def convex_parts(mesh: Mesh) -> list[Array]:
 
 def _solid(points: Array) -> Array:
     """The points; if they are in a plane, copies on both sides of it, `THICKNESS` apart."""
-    centred = points - points.mean(axis=0)
-    _, spread, axes = np.linalg.svd(centred, full_matrices=True)
-    spread = np.concatenate((spread, np.zeros(3 - len(spread))))
+    centred = np.zeros((max(len(points), 3), 3))
+    centred[: len(points)] = points - points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(centred, full_matrices=False)
     for axis, extent in zip(axes, spread, strict=True):
         if extent <= 1e-6 * spread[0]:
             points = np.concatenate((points - THICKNESS / 2 * axis, points + THICKNESS / 2 * axis))

@@ -23,7 +23,7 @@ from manipcli.simulate.engines.mujoco_shapes import Shapes, wxyz
 HARD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Impedance of motors, mimic joints and joint limits: the largest that MuJoCo supports."""
 ROBOT, SCENE = 1, 2
-"""Bits of collision masks: bodies collide with bodies and with the robot, whose links do not collide with each other."""
+"""Bits of collision masks: bodies collide with bodies and the robot; links do not collide with each other."""
 UNBOUNDED: Final = 1e9
 """[rad or m] Represents a missing limit on one side."""
 MIN_INERTIA: Final = 1e-12
@@ -67,14 +67,14 @@ def build(
     shapes = Shapes(mujoco, spec)
     solref = [contact_time, 1.0]
     bodies = _add_robot(mujoco, spec, robot, shapes, solref)
-    geoms = {}
+    geoms: dict[str, list[str]] = {}
     for k, body in enumerate(scene.bodies):
-        names = geoms[body.name] = []
+        geoms[body.name] = []
         made = spec.worldbody.add_body(name=f"body{k}", **_placed(body))
         contact = {"contype": SCENE, "conaffinity": SCENE | ROBOT, "priority": 1, "solref": solref}
         contact |= towards_robot(robot, body)
         for geometry in body.geometries:
-            names += shapes.add(made, geometry, Transform.of(xyz=-body.X_OI.p), **contact)
+            geoms[body.name] += shapes.add(made, geometry, Transform.of(xyz=-body.X_OI.p), **contact)
         if not body.fixed:
             made.add_freejoint()
     for one, two, friction, condim in friction_pairs(scene):
@@ -98,7 +98,8 @@ def _options(mujoco: ModuleType, spec: Any, scene: Scene, step: float, impratio:
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = impratio
-    # A diverged world is an error; MuJoCo would put it back to its start.
+    # A diverged world is an error; MuJoCo would put it back to its start. Islands would hide the compliance of
+    # constraints, which `Motors.push` changes, from the solver.
     option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
 
 
