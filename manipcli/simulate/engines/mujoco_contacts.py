@@ -45,11 +45,13 @@ class Contacts:
         if not data.ncon:
             return bool(self._pairs)
         contact = data.contact
-        geoms = contact.geom
+        geoms, address = contact.geom, contact.efc_address
+        if (inactive := address < 0).any():
+            geoms, address = geoms[~inactive], address[~inactive]
         if geoms.tobytes() != self._geoms and self._touching(geoms) != self._pairs:
             return True
-        forces = data.efc_force[contact.efc_address]
-        return bool(forces.max() > self._knock) and self._greatest(geoms, forces) > self._knock
+        forces = data.efc_force[address]
+        return bool(forces.max(initial=0.0) > self._knock) and self._greatest(geoms, forces) > self._knock
 
     def now(self) -> tuple[Contact, ...]:
         """All contacts, sorted by the names of the parts; `changed` compares with them."""
@@ -58,11 +60,15 @@ class Contacts:
             self._geoms, self._pairs, self._knock = b"", frozenset(), KNOCK_LEAST
             return ()
         contact = data.contact
-        geoms, address = contact.geom, contact.efc_address
+        address = contact.efc_address
+        # Geoms that touch at a distance of 0 have no row among the constraints.
+        active = slice(None) if address.min() >= 0 else np.flatnonzero(address >= 0)
+        geoms, address = contact.geom[active], address[active]
         self._geoms, self._pairs = geoms.tobytes(), self._touching(geoms)
         forces = data.efc_force[address[:, None] + FORCES]
         self._knock = KNOCK * self._greatest(geoms, forces[:, 0]) + KNOCK_LEAST
-        return self._merged(self._part[geoms], forces, contact)
+        found = contact.pos[active], contact.frame[active], contact.dist[active]
+        return self._merged(self._part[geoms], forces, *found)
 
     def _touching(self, geoms: Any) -> frozenset[int]:
         """The touching pairs of parts as numbers."""
@@ -73,17 +79,19 @@ class Contacts:
         """[N] Largest force at a single point of the robot."""
         return float(forces[self._robot[geoms].any(axis=1)].max(initial=0.0))
 
-    def _merged(self, parts: Any, forces: Array, contact: Any) -> tuple[Contact, ...]:
+    def _merged(
+        self, parts: Any, forces: Array, positions: Array, frames: Array, distances: Array
+    ) -> tuple[Contact, ...]:
         # MuJoCo's normal points from the first to the second geom, on which the force acts.
         swapped = parts[:, 0] < parts[:, 1]
-        frame = contact.frame.reshape(-1, 3, 3) * np.where(swapped, -1.0, 1.0)[:, None, None]
+        frame = frames.reshape(-1, 3, 3) * np.where(swapped, -1.0, 1.0)[:, None, None]
         friction = forces[:, 1:2] * frame[:, 1] + forces[:, 2:3] * frame[:, 2]
         low, high = parts.min(axis=1).tolist(), parts.max(axis=1).tolist()
         found: dict[tuple[int, int], list[ContactPoint]] = {}
         depths: dict[tuple[int, int], float] = {}
         for a, b, at, normal, force, rubs, distance in zip(
-            low, high, contact.pos.tolist(), frame[:, 0].tolist(), forces[:, 0].tolist(), friction.tolist(),
-            contact.dist.tolist(), strict=True,
+            low, high, positions.tolist(), frame[:, 0].tolist(), forces[:, 0].tolist(), friction.tolist(),
+            distances.tolist(), strict=True,
         ):  # fmt: skip
             point = ContactPoint(tuple(at), tuple(normal), force, tuple(rubs))
             if (a, b) in found:
