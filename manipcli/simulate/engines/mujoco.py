@@ -10,14 +10,16 @@ from pydantic import Field
 
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, SimulationFailed
-from manipcli.core.geometry import Array, rotate
+from manipcli.core.geometry import Array
 from manipcli.model.normalised_urdf import massless_links
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
+from manipcli.simulate.engines.mujoco_bodies import BodyStates
 from manipcli.simulate.engines.mujoco_contacts import Contacts
 from manipcli.simulate.engines.mujoco_library import INSTALL, installed, library, version
+from manipcli.simulate.engines.mujoco_mimics import Mimics
 from manipcli.simulate.engines.mujoco_motors import Motors
 from manipcli.simulate.engines.mujoco_world import build
 from manipcli.simulate.engines.mujoco_wrench import WrenchSensors
@@ -75,46 +77,23 @@ class MujocoEngine:
         self._ticks = 0
         data.qpos[:n] = settings.start
         self._position, self._velocity = data.qpos[:n], data.qvel[:n]
-        self._poses = data.qpos[n:].reshape(m, 7)
-        self._twists = data.qvel[n:].reshape(m, 6)
-        offsets = np.array([body.X_OI.p for body in scene.movable]).reshape(m, 3)
-        self._offset_rows = [(k, *offset.tolist()) for k, offset in enumerate(offsets) if offset.any()]
-        self._offsets = offsets
+        self._bodies = BodyStates(data, scene)
         self._state = WorldState.room(n, m)
         self._motors = Motors(model, data, robot, settings.step)
         self._contacts = Contacts(model, data, built.parts)
         self._wrenches = WrenchSensors(mujoco, model, data, built.links, settings.step)
         self._warnings = data.warning.number
-        mimics = [(k, joint.mimic) for k, joint in enumerate(robot.moving_joints) if joint.mimic is not None]
-        self._followers = np.array([k for k, _ in mimics], dtype=np.intp)
-        self._drivers = np.array([robot.joint_names.index(mimic.joint) for _, mimic in mimics], dtype=np.intp)
-        self._multipliers = np.array([mimic.multiplier for _, mimic in mimics])
-        self._mimic_offsets = np.array([mimic.offset for _, mimic in mimics])
+        self._mimics = Mimics(data, robot)
 
     def read(self, *, velocities: bool = True) -> WorldState:
-        state, poses = self._state, self._poses
+        state = self._state
         state.position[:] = self._position
         state.velocity[:] = self._velocity
         self._motors.efforts(state.effort)
-        if len(poses):
-            state.body_position[:] = poses[:, :3]
-            state.body_quat_xyzw[:, :3] = poses[:, 4:]
-            state.body_quat_xyzw[:, 3] = poses[:, 3]
-            for row in self._offset_rows:
-                _shift(poses, state.body_position, *row)
-            if velocities:
-                self._read_velocities()
+        self._bodies.read(state, velocities=velocities)
         if self._wrenches:
             self._wrenches.measure()
         return state
-
-    def _read_velocities(self) -> None:
-        """Velocities of the origins O; MuJoCo has those of the centres of mass, and spins in the body's axes."""
-        state, twists = self._state, self._twists
-        quats = state.body_quat_xyzw
-        angular = rotate(quats, twists[:, 3:])
-        state.body_angular[:] = angular
-        state.body_linear[:] = twists[:, :3] - np.cross(angular, rotate(quats, self._offsets))
 
     def write(self, command: JointCommand) -> None:
         self._motors.write(command)
@@ -134,17 +113,11 @@ class MujocoEngine:
                 self._step1(model, data)
                 motors.push()
                 self._step2(model, data)
-                if len(self._followers):
-                    self._follow()
+                if self._mimics:
+                    self._mimics.follow()
         self._ticks += 1
         if self._warnings.any():
             self._fail()
-
-    def _follow(self) -> None:
-        """Put the mimic joints exactly where they belong: the solver leaves a small error."""
-        position, velocity = self._position, self._velocity
-        position[self._followers] = self._multipliers * position[self._drivers] + self._mimic_offsets
-        velocity[self._followers] = self._multipliers * velocity[self._drivers]
 
     def _fail(self) -> None:
         """Raise the first warning of MuJoCo: after it, the state is not usable."""
@@ -175,17 +148,6 @@ WARNINGS: Final = (
     "got a control that is not finite",
 )
 """MuJoCo's warnings (mjtWarning), in its order."""
-
-
-def _shift(poses: Array, positions: Array, k: int, a: float, b: float, c: float) -> None:
-    """Subtract R (a, b, c) from the position of body k; plain floats are faster than arrays here."""
-    px, py, pz, w, x, y, z = poses[k].tolist()
-    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    positions[k] = (
-        px - a - w * tx - y * tz + z * ty,
-        py - b - w * ty - z * tx + x * tz,
-        pz - c - w * tz - x * ty + y * tx,
-    )
 
 
 def _own(settings: Model | None) -> MujocoSpec:

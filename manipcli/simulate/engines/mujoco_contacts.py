@@ -4,54 +4,68 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from manipcli.core.geometry import Array
 from manipcli.model.state import Contact, ContactPoint
 
 KNOCK: Final = 1.5
 """A contact point with more than this factor of the largest force, plus `KNOCK_LEAST`, is an impact."""
 KNOCK_LEAST: Final = 1.0
 """[N]"""
-FORCES: Final = np.arange(3)
-"""Rows of a contact: normal force, and friction along two directions."""
 _sides = attrgetter("a", "b")
+
+
+class _Pair(NamedTuple):
+    """Two geoms that may touch.
+
+    Attributes:
+        names: of their parts, in alphabetical order.
+        sign: 1 if MuJoCo's contact force acts on the first of these, -1 if on the second.
+        robot: whether one is a link of the robot.
+    """
+
+    names: tuple[str, str]
+    sign: float
+    robot: bool
 
 
 class Contacts:
     """Contacts of one world, as the last physics step computed them.
 
+    Plain floats: numpy costs several times as much for a few contact points.
+
     Args:
-        data: `MjData`.
-        model: `MjModel`.
+        model, data: `MjModel` and `MjData`.
         parts: name of the part of each MuJoCo body.
     """
 
     def __init__(self, model: Any, data: Any, parts: Sequence[str]) -> None:
         self._data = data
-        names = [parts[body] for body in model.geom_bodyid]
-        order = {name: k for k, name in enumerate(sorted(set(names)))}
-        self._names = sorted(order)
-        self._part = np.array([order[name] for name in names], dtype=np.int64)
-        self._robot = np.array([name.startswith("robot/") for name in names], dtype=np.bool_)
-        self._geoms, self._pairs = b"", frozenset[int]()
+        self._parts = [parts[body] for body in model.geom_bodyid]
+        self._robot = np.array([name.startswith("robot/") for name in self._parts], dtype=np.bool_)
+        self._known: dict[tuple[int, int], _Pair] = {}
+        self._geoms, self._pairs = b"", frozenset[tuple[str, str]]()
         self._knock = KNOCK_LEAST
 
     def changed(self) -> bool:
-        """Whether parts touch or part since `now`, or the force at a contact point of the robot grew a lot."""
+        """Whether parts touch or part since `now`, or the force at a contact point of the robot grew a lot.
+
+        Called at every tick, so the cheapest test comes first.
+        """
         data = self._data
         if not data.ncon:
             return bool(self._pairs)
         contact = data.contact
-        geoms, address = contact.geom, contact.efc_address
-        if (inactive := address < 0).any():
-            geoms, address = geoms[~inactive], address[~inactive]
-        if geoms.tobytes() != self._geoms and self._touching(geoms) != self._pairs:
+        geoms = contact.geom
+        if geoms.tobytes() != self._geoms and self._touching(geoms, contact.efc_address) != self._pairs:
             return True
-        forces = data.efc_force[address]
-        return bool(forces.max(initial=0.0) > self._knock) and self._greatest(geoms, forces) > self._knock
+        if data.efc_force.max(initial=0.0) <= self._knock:  # of any constraint
+            return False
+        address = contact.efc_address
+        forces = data.efc_force[address[(address >= 0) & self._robot[geoms].any(axis=1)]]
+        return bool(forces.max(initial=0.0) > self._knock)
 
     def now(self) -> tuple[Contact, ...]:
         """All contacts, sorted by the names of the parts; `changed` compares with them."""
@@ -60,49 +74,54 @@ class Contacts:
             self._geoms, self._pairs, self._knock = b"", frozenset(), KNOCK_LEAST
             return ()
         contact = data.contact
-        address = contact.efc_address
-        # Geoms that touch at a distance of 0 have no row among the constraints.
-        active = slice(None) if address.min() >= 0 else np.flatnonzero(address >= 0)
-        geoms, address = contact.geom[active], address[active]
-        self._geoms, self._pairs = geoms.tobytes(), self._touching(geoms)
-        forces = data.efc_force[address[:, None] + FORCES]
-        self._knock = KNOCK * self._greatest(geoms, forces[:, 0]) + KNOCK_LEAST
-        found = contact.pos[active], contact.frame[active], contact.dist[active]
-        return self._merged(self._part[geoms], forces, *found)
-
-    def _touching(self, geoms: Any) -> frozenset[int]:
-        """The touching pairs of parts as numbers."""
-        parts = self._part[geoms]
-        return frozenset((parts.min(axis=1) * len(self._names) + parts.max(axis=1)).tolist())
-
-    def _greatest(self, geoms: Any, forces: Array) -> float:
-        """[N] Largest force at a single point of the robot."""
-        return float(forces[self._robot[geoms].any(axis=1)].max(initial=0.0))
-
-    def _merged(
-        self, parts: Any, forces: Array, positions: Array, frames: Array, distances: Array
-    ) -> tuple[Contact, ...]:
-        # MuJoCo's normal points from the first to the second geom, on which the force acts.
-        swapped = parts[:, 0] < parts[:, 1]
-        frame = frames.reshape(-1, 3, 3) * np.where(swapped, -1.0, 1.0)[:, None, None]
-        friction = forces[:, 1:2] * frame[:, 1] + forces[:, 2:3] * frame[:, 2]
-        low, high = parts.min(axis=1).tolist(), parts.max(axis=1).tolist()
-        found: dict[tuple[int, int], list[ContactPoint]] = {}
-        depths: dict[tuple[int, int], float] = {}
-        for a, b, at, normal, force, rubs, distance in zip(
-            low, high, positions.tolist(), frame[:, 0].tolist(), forces[:, 0].tolist(), friction.tolist(),
-            distances.tolist(), strict=True,
+        geoms, force = contact.geom, data.efc_force.tolist()
+        points: dict[tuple[str, str], list[ContactPoint]] = {}
+        depths: dict[tuple[str, str], float] = {}
+        greatest = 0.0
+        for (first, second), row, at, frame, distance in zip(
+            geoms.tolist(), contact.efc_address.tolist(), contact.pos.tolist(), contact.frame.tolist(),
+            contact.dist.tolist(), strict=True,
         ):  # fmt: skip
-            point = ContactPoint(tuple(at), tuple(normal), force, tuple(rubs))
-            if (a, b) in found:
-                found[a, b].append(point)
-                depths[a, b] = min(depths[a, b], distance)
+            if row < 0:  # geoms that touch at a distance of 0 have no row among the constraints
+                continue
+            names, sign, robot = self._known.get((first, second)) or self._pair(first, second)
+            nx, ny, nz, ax, ay, az, bx, by, bz = frame
+            press = force[row]
+            along, across = sign * force[row + 1], sign * force[row + 2]
+            if robot and press > greatest:
+                greatest = press
+            friction = along * ax + across * bx, along * ay + across * by, along * az + across * bz
+            point = ContactPoint(tuple(at), (sign * nx, sign * ny, sign * nz), press, friction)
+            if names not in points:
+                points[names], depths[names] = [point], distance
             else:
-                found[a, b], depths[a, b] = [point], distance
-        names = self._names
+                points[names].append(point)
+                if distance < depths[names]:
+                    depths[names] = distance
+        self._geoms, self._pairs = geoms.tobytes(), frozenset(points)
+        self._knock = KNOCK * greatest + KNOCK_LEAST
         contacts = [
-            Contact(names[a], names[b], sum([point.force for point in points]), depths[a, b], tuple(points))
-            for (a, b), points in found.items()
+            Contact(a, b, sum([point.force for point in between]), depths[a, b], tuple(between))
+            for (a, b), between in points.items()
         ]
-        contacts.sort(key=_sides)
+        if len(contacts) > 1:
+            contacts.sort(key=_sides)
         return tuple(contacts)
+
+    def _touching(self, geoms: Any, address: Any) -> frozenset[tuple[str, str]]:
+        """The names of the touching pairs of parts."""
+        known = self._known
+        return frozenset(
+            (known.get((first, second)) or self._pair(first, second))[0]
+            for (first, second), row in zip(geoms.tolist(), address.tolist(), strict=True)
+            if row >= 0
+        )
+
+    def _pair(self, first: int, second: int) -> _Pair:
+        """The facts of a pair of geoms, stored."""
+        a, b = self._parts[first], self._parts[second]
+        robot = bool(self._robot[first] or self._robot[second])
+        # MuJoCo's normal points from the first to the second geom, on which its force acts.
+        pair = _Pair((a, b), -1.0, robot) if a <= b else _Pair((b, a), 1.0, robot)
+        self._known[first, second] = pair
+        return pair
