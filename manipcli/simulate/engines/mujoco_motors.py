@@ -24,8 +24,11 @@ LEAST_EFFORT: Final = 1e-12
 """[N m or N] Represents an effort limit of 0: MuJoCo has no friction row for 0."""
 POSITION_TIME: Final = 0.01
 """[s] Time constant with which a position command is approached, as for PyBullet."""
-STIFFER: Final = 1e-3
-"""Factor of the compliance of motors and mimic joints: MuJoCo's least lets a braked joint creep under its load."""
+MOTOR_COMPLIANCE: Final = 0.1
+"""Factor of the compliance of motors. MuJoCo's least lets a braked joint creep by some 1e-6 rad/s under its load; with
+0.001, the solver misses the optimum where a motor reaches its effort limit."""
+MIMIC_COMPLIANCE: Final = 0.001
+"""Factor of the compliance of mimic joints, which have no limits to reach. With 1, they accelerate 2e-4 too slowly."""
 
 
 class Motors:
@@ -52,10 +55,14 @@ class Motors:
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._speeds = np.array([math.inf if limit is None else limit for limit in limits])
         self._rows = model.neq
+        self._compliance = np.full(model.neq + n, MOTOR_COMPLIANCE)
+        self._compliance[: model.neq] = MIMIC_COMPLIANCE
         self._version = -1
-        self._driven = np.zeros(0, dtype=np.intp)
+        self._driven = self._drove = np.zeros(0, dtype=np.intp)  # now, and in the last physics step
         self._by_position = self._by_torque = np.zeros(n, dtype=np.bool_)
-        self._targets, self._wanted, self._target_speed = np.zeros((3, n))
+        self._by_speed = self._by_position
+        self._all_torque = False
+        self._wanted, self._target_speed = np.zeros((2, n))
         self._follows = self._rows > 0
         self.active = self._follows
 
@@ -83,15 +90,17 @@ class Motors:
         self._all_torque = all(mode == "effort" for mode in modes)
         self._target_speed[:] = 0.0
         self._torques[:] = 0.0
+        self._drove = self._drove[:0]
         self._friction[:] = np.where(driven, self._limits, 0.0)
         self.active = self._follows or len(self._driven) > 0
 
     def push(self) -> None:
         """Set the speeds of the motors, between the two halves of a physics step."""
         data, rows = self._data, self._rows
+        self._drove = self._driven
         end = rows + len(self._driven)
-        data.efc_R[:end] *= STIFFER
-        data.efc_D[:end] /= STIFFER
+        data.efc_R[:end] *= self._compliance[:end]
+        data.efc_D[:end] /= self._compliance[:end]
         if end > rows:
             speed = self._target_speed
             if self._by_position.any():
@@ -103,5 +112,5 @@ class Motors:
     def efforts(self, out: Array) -> None:
         """(n) effort on each joint [N m or N] in the last physics step: the commanded one, plus that of its motor."""
         out[:] = self._torques
-        if len(self._driven) and self._data.nefc:
-            out[self._driven] += self._data.efc_force[self._rows : self._rows + len(self._driven)]
+        if len(self._drove):
+            out[self._drove] += self._data.efc_force[self._rows : self._rows + len(self._drove)]

@@ -58,7 +58,7 @@ class WrenchSensors:
         data.qacc[:] = (data.qvel - self._before) / self._step
         self._mujoco.mj_rnePostConstraint(self._model, data)
         for body, values in self._sensors:
-            wrench = data.cfrc_int[body]
+            wrench = -data.cfrc_int[body]  # MuJoCo's acts on the child: torque, force
             R = data.xmat[body].reshape(3, 3)
             arm = data.subtree_com[self._model.body_rootid[body]] - data.xpos[body]
             values[:3] = R.T @ wrench[3:]
