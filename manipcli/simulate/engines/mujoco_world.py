@@ -22,6 +22,9 @@ from manipcli.simulate.engines.mujoco_shapes import Shapes, wxyz
 
 HARD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Impedance of motors, mimic joints and joint limits: the largest that MuJoCo supports."""
+SOFT: Final = (0.0, 0.99, 0.0003, 0.5, 2.0)
+"""Impedance of contacts: from 0 at the surface to 0.99 at a depth of 0.3 mm. With MuJoCo's default, 0.9 at the surface,
+a sliding block hops: it touches in 14 % of the steps; and a light object pressed hard sinks in three times as far."""
 ROBOT, SCENE = 1, 2
 """Bits of collision masks: bodies collide with bodies and the robot; links do not collide with each other."""
 UNBOUNDED: Final = 1e9
@@ -65,13 +68,13 @@ def build(
     spec = mujoco.MjSpec()
     _options(mujoco, spec, scene, step, impratio)
     shapes = Shapes(mujoco, spec)
-    solref = [contact_time, 1.0]
-    bodies = _add_robot(mujoco, spec, robot, shapes, solref)
+    solver = {"solref": [contact_time, 1.0], "solimp": SOFT}
+    bodies = _add_robot(mujoco, spec, robot, shapes, solver)
     geoms: dict[str, list[str]] = {}
     for k, body in enumerate(scene.bodies):
         geoms[body.name] = []
         made = spec.worldbody.add_body(name=f"body{k}", **_placed(body))
-        contact = {"contype": SCENE, "conaffinity": SCENE | ROBOT, "priority": 1, "solref": solref}
+        contact = {"contype": SCENE, "conaffinity": SCENE | ROBOT, "priority": 1, **solver}
         contact |= towards_robot(robot, body)
         for geometry in body.geometries:
             geoms[body.name] += shapes.add(made, geometry, Transform.of(xyz=-body.X_OI.p), **contact)
@@ -80,7 +83,7 @@ def build(
     for one, two, friction, condim in friction_pairs(scene):
         for a in geoms[one]:
             for b in geoms[two]:
-                spec.add_pair(geomname1=a, geomname2=b, friction=friction, condim=condim, solref=solref)
+                spec.add_pair(geomname1=a, geomname2=b, friction=friction, condim=condim, **solver)
     model = spec.compile()
     parts = {spec.body(f"body{k}").id: body.name for k, body in enumerate(scene.bodies)}
     links = {name: made.id for name, made in bodies.items()}
@@ -125,8 +128,13 @@ def _inertia(mass: float, p: Array, R: Array, inertia: Array) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _add_robot(mujoco: ModuleType, spec: Any, robot: RobotModel, shapes: Shapes, solref: list[float]) -> dict[str, Any]:
-    """Add all links, depth-first as `RobotModel.joints`; returns their `MjsBody` by name."""
+def _add_robot(
+    mujoco: ModuleType, spec: Any, robot: RobotModel, shapes: Shapes, solver: dict[str, Any]
+) -> dict[str, Any]:
+    """Add all links, depth-first as `RobotModel.joints`; returns their `MjsBody` by name.
+
+    `solver`: attributes of geoms for the solver of contacts.
+    """
     armature = dict(zip(robot.joint_names, reflected_inertia(robot), strict=True))
     root = spec.worldbody.add_body(name="link0", pos=robot.X_WB.p, quat=wxyz(robot.X_WB.quat_xyzw))
     bodies = {robot.root: root}
@@ -138,7 +146,7 @@ def _add_robot(mujoco: ModuleType, spec: Any, robot: RobotModel, shapes: Shapes,
             moving = made.add_joint(name=f"joint{k}", armature=armature[joint.name], **_joint(mujoco, joint))
             moving.damping[0] = joint.damping  # the others are of a polynomial
     numbers = {joint.name: f"joint{k}" for k, joint in enumerate(robot.joints)}
-    contact = {"contype": ROBOT, "conaffinity": SCENE, "priority": 0, "solref": solref}
+    contact = {"contype": ROBOT, "conaffinity": SCENE, "priority": 0, **solver}
     for name, made in bodies.items():
         link = robot.link(name)
         for key, value in _link_inertia(link.inertial).items():
