@@ -77,12 +77,13 @@ class MujocoEngine:
         self._ticks = 0
         data.qpos[:n] = settings.start
         self._position, self._velocity = data.qpos[:n], data.qvel[:n]
-        self._bodies = BodyStates(data, scene)
         self._state = WorldState.room(n, m)
+        self._bodies = BodyStates(data, scene, self._state)
         self._motors = Motors(model, data, robot, settings.step)
         self._contacts = Contacts(model, data, built.parts)
         self._wrenches = WrenchSensors(mujoco, model, data, built.links, settings.step)
         self._warnings = data.warning.number
+        self._calm = self._warnings.tobytes()
         self._mimics = Mimics(data, robot)
 
     def read(self, *, velocities: bool = True) -> WorldState:
@@ -90,7 +91,7 @@ class MujocoEngine:
         state.position[:] = self._position
         state.velocity[:] = self._velocity
         self._motors.efforts(state.effort)
-        self._bodies.read(state, velocities=velocities)
+        self._bodies.read(velocities=velocities)
         if self._wrenches:
             self._wrenches.measure()
         return state
@@ -116,7 +117,7 @@ class MujocoEngine:
                 if self._mimics:
                     self._mimics.follow()
         self._ticks += 1
-        if self._warnings.any():
+        if self._warnings.tobytes() != self._calm:
             self._fail()
 
     def _fail(self) -> None:

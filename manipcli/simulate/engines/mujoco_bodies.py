@@ -6,6 +6,7 @@ the quaternion wxyz, the velocity of C in the world, and the angular velocity in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from manipcli.core.geometry import Array
@@ -21,44 +22,50 @@ class BodyStates:
     Args:
         data: `MjData`.
         scene: with the bodies.
+        state: receives what is read; from `WorldState.room`.
     """
 
-    def __init__(self, data: Any, scene: Scene) -> None:
+    def __init__(self, data: Any, scene: Scene, state: WorldState) -> None:
         m = len(scene.movable)
         self._poses: Array = data.qpos[len(data.qpos) - 7 * m :].reshape(m, 7)
         self._twists: Array = data.qvel[len(data.qvel) - 6 * m :].reshape(m, 6)
+        self._state = state
         offsets: list[Vector] = [(*map(float, body.X_OI.p),) for body in scene.movable]  # type: ignore[misc]
+        first = state.numbers.size - 7 * m
+        self._apart = [(k, first + 7 * k, offset) for k, offset in enumerate(offsets) if any(offset)]
         self._offsets = [offset if any(offset) else None for offset in offsets]
-        self._apart = [(k, offset) for k, offset in enumerate(offsets) if any(offset)]
+        # Single numbers are written through memory views: a row of an array takes a microsecond.
+        self._numbers = state.numbers.data
+        self._linear, self._angular = state.body_linear.reshape(-1).data, state.body_angular.reshape(-1).data
 
-    def read(self, state: WorldState, *, velocities: bool) -> None:
-        """Write poses, and on request `velocities`, of the frames O to `state`."""
-        poses = self._poses
+    def read(self, *, velocities: bool) -> None:
+        """Read the poses of the frames O, and on request their velocities."""
+        state, poses, numbers = self._state, self._poses, self._numbers
         state.body_position[:] = poses[:, :3]
         state.body_quat_xyzw[:, :3] = poses[:, 4:]
         state.body_quat_xyzw[:, 3] = poses[:, 3]
-        for k, offset in self._apart:
+        for k, at, offset in self._apart:
             px, py, pz, *quat = poses[k].tolist()
             x, y, z = _rotated(quat, offset)
-            state.body_position[k] = px - x, py - y, pz - z
+            numbers[at], numbers[at + 1], numbers[at + 2] = px - x, py - y, pz - z
         if velocities:
-            self._read_velocities(state)
+            self._read_velocities()
 
-    def _read_velocities(self, state: WorldState) -> None:
-        linear, angular = state.body_linear, state.body_angular
-        for k, (pose, twist, offset) in enumerate(
-            zip(self._poses.tolist(), self._twists.tolist(), self._offsets, strict=True)
-        ):
+    def _read_velocities(self) -> None:
+        linear, angular, at = self._linear, self._angular, 0
+        for pose, twist, offset in zip(self._poses.tolist(), self._twists.tolist(), self._offsets, strict=True):
             quat = pose[3:]
-            spin = angular[k] = _rotated(quat, (twist[3], twist[4], twist[5]))
-            vx, vy, vz = twist[:3]
+            vx, vy, vz, *local = twist
+            wx, wy, wz = _rotated(quat, local)
             if offset is not None:
-                (wx, wy, wz), (x, y, z) = spin, _rotated(quat, offset)
+                x, y, z = _rotated(quat, offset)
                 vx, vy, vz = vx - wy * z + wz * y, vy - wz * x + wx * z, vz - wx * y + wy * x
-            linear[k] = vx, vy, vz
+            linear[at], linear[at + 1], linear[at + 2] = vx, vy, vz
+            angular[at], angular[at + 1], angular[at + 2] = wx, wy, wz
+            at += 3
 
 
-def _rotated(quat_wxyz: list[float], v: Vector) -> Vector:
+def _rotated(quat_wxyz: list[float], v: Sequence[float]) -> Vector:
     """R(quat) v; plain floats, which are faster than numpy for one vector."""
     w, x, y, z = quat_wxyz
     a, b, c = v

@@ -61,7 +61,7 @@ class Contacts:
         geoms = contact.geom
         if geoms.tobytes() != self._geoms and self._touching(geoms, contact.efc_address) != self._pairs:
             return True
-        if data.efc_force.max(initial=0.0) <= self._knock:  # of any constraint
+        if max(data.efc_force.tolist(), default=0.0) <= self._knock:  # of any constraint
             return False
         address = contact.efc_address
         forces = data.efc_force[address[(address >= 0) & self._robot[geoms].any(axis=1)]]
