@@ -7,7 +7,7 @@ the quaternion wxyz, the velocity of C in the world, and the angular velocity in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
@@ -35,8 +35,8 @@ class BodyStates:
         self._apart = [(k, first + 7 * k, offset) for k, offset in enumerate(offsets) if any(offset)]
         self._offsets = [offset if any(offset) else None for offset in offsets]
         # Single numbers are written through memory views: a row of an array takes a microsecond.
-        self._numbers = state.numbers.data
-        self._linear, self._angular = state.body_linear.reshape(-1).data, state.body_angular.reshape(-1).data
+        self._numbers = _doubles(state.numbers)
+        self._linear, self._angular = _doubles(state.body_linear), _doubles(state.body_angular)
 
     def read(self, *, velocities: bool) -> None:
         """Read the poses of the frames O, and on request their velocities."""
@@ -71,3 +71,8 @@ def _rotated(quat_wxyz: list[float], v: Sequence[float]) -> Vector:
     a, b, c = v
     tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
+
+
+def _doubles(array: Array) -> memoryview[float]:
+    """The numbers of a contiguous array, for single assignments."""
+    return cast("memoryview[float]", array.reshape(-1).data)
