@@ -78,6 +78,11 @@ def test_help_loads_nothing_heavy() -> None:
 
 
 @pytest.mark.slow
+def test_the_registry_of_engines_loads_no_physics() -> None:
+    assert _loaded("import manipcli.simulate.engines") & {"mujoco", "pybullet"} == set()
+
+
+@pytest.mark.slow
 def test_reading_a_file_loads_no_arrays_and_no_physics() -> None:
     names = [_name(module) for module in MODULES if module.parent == PACKAGE / "spec"]
     assert _loaded(f"import {', '.join(names)}") & (HEAVY - {"pydantic", "yaml", "rich"}) == set()
