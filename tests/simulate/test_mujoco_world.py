@@ -161,6 +161,33 @@ def test_a_ball_rolls_slides_and_is_stopped_by_rolling_friction() -> None:
     assert abs(speed) < 0.01
 
 
+@pytest.mark.parametrize("step", [5e-4, 1e-3, 2e-3, 4e-3])
+def test_a_sliding_block_presses_steadily_whatever_the_physics_step(step: float) -> None:
+    """N = m g cos s at every step, and v = g t (sin s - mu cos s)."""
+    s, mu, seconds = np.radians(35.0), 0.4, 0.6
+    normal = np.array([np.sin(s), 0.0, np.cos(s)])
+    table, block = (
+        replace(
+            body(name, Box(size), (0.0, 0.0, 0.0), friction=friction, fixed=fixed),
+            X_WO=Transform.of(xyz=height * normal, rpy=(0.0, s, 0.0)),
+        )
+        for name, size, height, friction, fixed in (
+            ("table", (6.0, 1.0, 0.2), -0.1, 1.0, True),
+            ("block", (0.2, 0.16, 0.1), 0.05, mu, False),
+        )
+    )
+    scene = Scene((table, block), (), frozen((0.0, 0.0, -G)))
+    model = replace(robot(), X_WB=Transform.of(xyz=(0.0, 5.0, 0.0)))
+    engine = ENGINES["mujoco"].open(model, scene, EngineSettings(step, 1, np.zeros(1)))
+    forces = []
+    for _ in range(round(seconds / step)):
+        engine.advance()
+        forces.append(sum(contact.force for contact in engine.contacts()))
+    np.testing.assert_allclose(forces[len(forces) // 2 :], 0.5 * G * np.cos(s), rtol=0.01)
+    speed = float(engine.read().body_linear[0] @ [np.cos(s), 0.0, -np.sin(s)])
+    assert speed == pytest.approx(G * seconds * (np.sin(s) - mu * np.cos(s)), rel=0.01)
+
+
 def _stl(path: Path, points: Sequence[Sequence[float]], triangles: Sequence[Sequence[int]]) -> Mesh:
     path.write_bytes(binary_stl(np.array(points, dtype=float)[np.array(triangles)]))
     return Mesh(f"file://{path}", path, (0.001, 0.001, 0.001))

@@ -21,7 +21,7 @@ from manipcli.simulate.engines.mujoco_contacts import Contacts
 from manipcli.simulate.engines.mujoco_library import INSTALL, installed, library, version
 from manipcli.simulate.engines.mujoco_mimics import Mimics
 from manipcli.simulate.engines.mujoco_motors import Motors
-from manipcli.simulate.engines.mujoco_world import build
+from manipcli.simulate.engines.mujoco_world import build, contact_law
 from manipcli.simulate.engines.mujoco_wrench import WrenchSensors
 from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.spec.base import Model
@@ -42,7 +42,7 @@ class MujocoSpec(Model):
         "Default refuse.",
     )
     contact_time: Annotated[Time, Field(ge=1e-5, le=0.1)] = Field(
-        CONTACT_TIME, description="Time constant of contacts, at least 2 physics steps are used. Default 4 ms."
+        CONTACT_TIME, description="Time constant of contacts; at least 4 physics steps are used. Default 4 ms."
     )
     impratio: Annotated[float, Field(ge=1.0, le=1e4)] = Field(
         IMPRATIO, description="Stiffness ratio of friction to normal contact, 1 to 10000. Default 100."
@@ -173,7 +173,9 @@ def refuses(robot: RobotModel, scene: Scene, own: Model | None) -> tuple[Refusal
 
 
 def _chosen(robot: RobotModel, scene: Scene, settings: EngineSettings) -> Mapping[str, str]:
-    return {}
+    """The time constant and the depth of contacts, which depend on the physics step."""
+    law = contact_law(settings.step, _own(settings.own).contact_time)
+    return {"contact_time": f"{law.time:g} s", "contact_depth": f"{law.depth:g} m"}
 
 
 MEMBER = EngineMember(
