@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from manipcli.judge.agreement import Agreement
 from manipcli.judge.compared_numbers import Kind, Row
 from manipcli.report.agreement.compared_runs import ComparedRuns
-from manipcli.report.agreement.disagreement import allowed_of, describe, difference_of, shown, summary
+from manipcli.report.agreement.disagreement import allowed_of, describe, difference_of, short_summary, shown
 from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
@@ -30,7 +30,7 @@ def render_text(compared: ComparedRuns) -> str:
     parts += [""] if parts else []
     parts += [numbers_table(agreement), "", runs_table(agreement, compared.reports), ""]
     mark = PASS if agreement.agrees and compared.exit_code == 0 else FAIL
-    parts.append(f"{mark} {agreement.task}: engines and steps {summary(agreement)}")
+    parts.append(f"{mark} {agreement.task}: {short_summary(agreement)}")
     return "\n".join(parts)
 
 

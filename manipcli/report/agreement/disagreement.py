@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from manipcli.core.errors import Place
+from manipcli.core.text import number_of
 from manipcli.judge.agreement import Agreement, Disagreement
 from manipcli.judge.compared_numbers import Kind, Row
 from manipcli.judge.measured_run import Number
@@ -91,11 +92,17 @@ def allowed_of(row: Row) -> str:
 
 
 def summary(agreement: Agreement) -> str:
-    """The result in one line, without a mark."""
+    """The result in one line: `pybullet and mujoco agree: all passed`, or the first disagreement."""
+    if not agreement.agrees:
+        first, more = agreement.disagreements[0], len(agreement.disagreements) - 1
+        return message(first) + (f" (and {more} more)" if more else "")
     names = [run.name for run in agreement.runs]
-    whole = ", ".join(names[:-1]) + f" and {names[-1]}"
+    return f"{', '.join(names[:-1])} and {names[-1]} agree: all {agreement.runs[0].verdict.verdict}"
+
+
+def short_summary(agreement: Agreement) -> str:
+    """The result in one line below the disagreements: `engines disagree: 2 differences`."""
     if agreement.agrees:
-        verdict = agreement.runs[0].verdict.verdict
-        return f"agree: {whole} {'both ' if len(names) == 2 else ''}{verdict}"
-    first, more = agreement.disagreements[0], len(agreement.disagreements) - 1
-    return f"differ: {message(first)}" + (f" (and {more} more)" if more else "")
+        return summary(agreement)
+    causes = dict.fromkeys(CAUSES[found.cause] for found in agreement.disagreements)
+    return f"{', and '.join(causes)}: {number_of(len(agreement.disagreements), 'difference')}"
