@@ -19,8 +19,8 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "manipcli"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 HEAVY = {
-    "coal", "lxml", "matplotlib", "mcap", "numpy", "pinocchio", "pybullet", "pydantic", "rich", "ruckig", "scipy",
-    "toppra", "viser", "xacro", "yaml",
+    "coal", "lxml", "matplotlib", "mcap", "mujoco", "numpy", "pinocchio", "pybullet", "pydantic", "rich", "ruckig",
+    "scipy", "toppra", "viser", "xacro", "yaml",
 }  # fmt: skip
 
 

@@ -22,8 +22,8 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
 from manipcli.simulate.engines.pybullet_contacts import (
+    BulletPoint,
     ContactMerger,
-    ContactPoint,
     ContactWatch,
     Vector,
 )
@@ -90,7 +90,7 @@ class PybulletEngine:
         state = self._state = WorldState.room(n, m)
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
         self._watch = ContactWatch(self._robot)
-        self._points: tuple[ContactPoint, ...] | None = None
+        self._points: tuple[BulletPoint, ...] | None = None
         self._substeps = settings.substeps
 
     def _load_robot(self, robot: RobotModel, scene: Scene, folder: Path) -> None:
@@ -193,7 +193,7 @@ class PybulletEngine:
         self._watch.seen(points)
         return self._merge(points)
 
-    def _contact_points(self) -> tuple[ContactPoint, ...]:
+    def _contact_points(self) -> tuple[BulletPoint, ...]:
         """Read once per tick: building the tuples costs as much as reading them."""
         if self._points is None:
             self._points = self._p.getContactPoints(physicsClientId=self._client)
