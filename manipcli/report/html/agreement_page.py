@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
+from pathlib import Path
 
 from manipcli.replay.ghost import Ghost
 from manipcli.replay.playback import Playback
@@ -10,17 +12,28 @@ from manipcli.replay.player import POLICY, player_html
 from manipcli.report.agreement.agreement_text import TITLES, agrees, cells
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.agreement.disagreement import allowed_of, difference_of, message, summary
-from manipcli.report.html.markup import Markup, document, element, joined
+from manipcli.report.html.markup import Markup, document, element, joined, link
 from manipcli.report.html.page_parts import heading, mark, seek, table
 
 
-def render_page(compared: ComparedRuns, shown: tuple[str, Playback] | None, ghosts: tuple[Ghost, ...]) -> str:
+def render_page(
+    compared: ComparedRuns,
+    shown: tuple[str, Playback] | None = None,
+    ghosts: Sequence[Ghost] = (),
+    *,
+    index: str = "",
+    pages: Sequence[str | None] = (),
+    folder: Path = Path(),
+) -> str:
     """The HTML file.
 
     Args:
         compared: the runs.
         shown: the run of the replay and its name; None for no replay.
         ghosts: the other runs.
+        index: relative URL of the index of all runs; "" if there is none.
+        pages: the page of each run; None without one.
+        folder: of this page, for links.
     """
     agreement = compared.agreement
     good = compared.exit_code == 0
@@ -29,7 +42,7 @@ def render_page(compared: ComparedRuns, shown: tuple[str, Playback] | None, ghos
         "Cause": _causes(compared, playable=shown is not None),
         "Replay": _replay(shown, ghosts),
         "Numbers": _numbers(compared),
-        "Runs": _runs(compared),
+        "Runs": _runs(compared, [None if page is None else link(page, folder) for page in pages]),
     }
     links = (element("a", name, href=f"#{name.lower()}") for name, part in parts.items() if part)
     own = files("manipcli.report.html").joinpath("page")
@@ -44,7 +57,7 @@ def render_page(compared: ComparedRuns, shown: tuple[str, Playback] | None, ghos
     return document(
         f"{sign} {agreement.task} {word}",
         head,
-        element("nav", *links, aria_label="sections"),
+        element("nav", element("a", "All runs", href=index) if index else None, *links, aria_label="sections"),
         element("main", *parts.values()),
         element("script", script),
         style=style,
@@ -74,7 +87,7 @@ def _causes(compared: ComparedRuns, *, playable: bool) -> Markup | None:
     return element("section", heading("cause", "What disagrees"), *causes, class_="why")
 
 
-def _replay(shown: tuple[str, Playback] | None, ghosts: tuple[Ghost, ...]) -> Markup | None:
+def _replay(shown: tuple[str, Playback] | None, ghosts: Sequence[Ghost]) -> Markup | None:
     if shown is None:
         return None
     others = ", ".join(ghost.name for ghost in ghosts)
@@ -104,18 +117,19 @@ def _numbers(compared: ComparedRuns) -> Markup:
     )
 
 
-def _runs(compared: ComparedRuns) -> Markup:
+def _runs(compared: ComparedRuns, urls: Sequence[str | None]) -> Markup:
+    urls = urls or [None] * len(compared.reports)
     rows = [
         (
             mark(run.verdict.verdict == "passed", run.verdict.verdict),
-            element("b", run.name),
+            element("a", run.name, href=url) if url is not None else element("b", run.name),
             f"{1e3 * run.step:g} ms",
             f"{run.verdict.simulated_time:.2f} s",
             f"{run.wall_time:.2f} s",
             run.verdict.text,
-            report.log or "nothing was run",
+            report.log or "",
         )
-        for run, report in zip(compared.agreement.runs, compared.reports, strict=True)
+        for run, report, url in zip(compared.agreement.runs, compared.reports, urls, strict=True)
     ]
     headers = ("verdict", "run", "step", "simulated", "real", "reason", "log")
     shown = table(headers, rows, numbers=("step", "simulated", "real"), stacks=True)
