@@ -54,7 +54,7 @@ def agreement_report(job: Job, runs: Sequence[CaseReport]) -> CaseReport:
     """The report of a case that compares runs, from their reports."""
     lacking = [run for run in runs if run.measured is None]
     if lacking:
-        text = "; ".join(f"not compared: '{run.case.name}' {_word(run.outcome)}" for run in lacking)
+        text = "not compared: " + ", ".join(f"'{run.case.name}' {_word(run.outcome)}" for run in lacking)
         return CaseReport(job.case, "error", 0.0, job.command(), text, troubles=(Trouble(text, _task(job)),))
     try:
         agreement = compare([run.measured for run in runs if run.measured is not None])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +10,11 @@ from manipcli.cli import console
 from manipcli.cli.engine_options import variants_of
 from manipcli.cli.interrupts import Interrupts
 from manipcli.cli.options import OutputFormat
-from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import ExitCode
+from manipcli.cli.outputs import Outputs
+from manipcli.core.errors import ExitCode, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.judge.measured_run import Variant
-    from manipcli.report.agreement.compared_runs import ComparedRuns
 
 
 def run_engines(
@@ -44,9 +42,10 @@ def run_engines(
     """
     from manipcli import pipeline
     from manipcli.cli.progress import StepProgress
+    from manipcli.record.faults import RecordingRefused
     from manipcli.report.agreement import agreement_json, agreement_text
 
-    check_outputs(("--report", report_file), reads=(task, log))
+    outputs = Outputs(report_file, None, others=(task, log), quiet=quiet)
     names = engines or (pipeline.simulation_of(task, overrides=overrides, seed=seed).engine,)
 
     def started(variant: Variant) -> None:
@@ -54,37 +53,27 @@ def run_engines(
             console.talk(f"run in {variant.name}")
 
     with StepProgress(verbose=verbose, quiet=quiet, interrupts=interrupts) as progress:
-        compared = pipeline.compare_runs(
-            task,
-            variants_of(names, check_step=check_step),
-            overrides=overrides,
-            seed=seed,
-            sample=sample,
-            log=log,
-            force=force,
-            embed_meshes=embed_meshes,
-            package_path=package_path,
-            allow_outside=allow_outside,
-            progress=progress,
-            started=started,
-        )
+        try:
+            compared = pipeline.compare_runs(
+                task,
+                variants_of(names, check_step=check_step),
+                overrides=overrides,
+                seed=seed,
+                sample=sample,
+                log=log,
+                force=force,
+                embed_meshes=embed_meshes,
+                package_path=package_path,
+                allow_outside=allow_outside,
+                progress=progress,
+                started=started,
+            )
+        except RecordingRefused:
+            raise  # nothing was run; an existing page belongs to the logs that are kept
+        except InvalidInput as invalid:
+            outputs.of_invalid(invalid.findings, task=task)
+            raise
     render = agreement_json.render_json if format_ == "json" else agreement_text.render_text
     console.result(render(compared))
-    if report_file is not None:
-        _write_page(report_file, compared, package_path=package_path, allow_outside=allow_outside, quiet=quiet)
+    outputs.of_comparison(compared, package_path=package_path, allow_outside=allow_outside)
     return compared.exit_code
-
-
-def _write_page(
-    path: Path, compared: ComparedRuns, *, package_path: Sequence[Path], allow_outside: bool, quiet: bool
-) -> None:
-    from manipcli.core.whole_file import write_whole
-    from manipcli.logs.agreement_page import ghost_playback
-    from manipcli.report.html.agreement_page import render_page
-
-    with suppress(FileNotFoundError):
-        path.unlink()  # no page of an earlier run is left where writing fails
-    playback, ghosts = ghost_playback(compared, package_path=package_path, allow_outside=allow_outside)
-    write_whole(path, render_page(compared, playback, ghosts).encode())
-    if not quiet:
-        console.talk(f"written: {path}")

@@ -29,6 +29,8 @@ def render_text(compared: ComparedRuns) -> str:
     parts = [f"{FAIL} {describe(found)}" for found in agreement.disagreements]
     parts += [""] if parts else []
     parts += [numbers_table(agreement), "", runs_table(agreement, compared.reports), ""]
+    failed = [run for run in agreement.runs if run.verdict.verdict != "passed"]
+    parts += [f"{FAIL} {run.name}: {run.verdict.text}" for run in failed] + ([""] if failed else [])
     mark = PASS if agreement.agrees and compared.exit_code == 0 else FAIL
     parts.append(f"{mark} {agreement.task}: {short_summary(agreement)}")
     return "\n".join(parts)
