@@ -36,7 +36,8 @@ from manipcli.spec.robot import (
     ToolSpec,
     TransmissionSpec,
 )
-from manipcli.spec.task import BodySpec, FrameSpec, RecordSpec, SimulationSpec, StepSpec
+from manipcli.spec.simulation import SimulationSpec
+from manipcli.spec.task import BodySpec, FrameSpec, RecordSpec, StepSpec
 from manipcli.spec.vary import DistributionSpec, VarySpec
 
 PAGE = Path(__file__).with_name("steps.md")

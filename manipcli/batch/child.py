@@ -98,14 +98,14 @@ def _end_of(job: Job, beats: _Beats) -> End:
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
     from manipcli.batch.failure_report import against_baseline, draw, troubles, write_invalid_page, write_page
-    from manipcli.batch.variants import measured, with_variant
+    from manipcli.batch.variants import measured, with_step
     from manipcli.record.faults import RecordingFailed
 
     beats.activity("loading")
     settings = job.settings
     job.log.parent.mkdir(parents=True, exist_ok=True)
     try:
-        job = with_variant(job)
+        job = with_step(job)
         settings = job.settings
         report = pipeline.run_task(
             job.path,

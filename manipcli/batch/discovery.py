@@ -23,9 +23,10 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
         shown: its name in messages; default `path` itself.
     """
     from manipcli.spec.load import read_bytes
+    from manipcli.spec.simulation import SimulationSpec
     from manipcli.spec.source.tree import MappingNode, ScalarNode, SequenceNode
     from manipcli.spec.source.yaml import parse
-    from manipcli.spec.task import TAG, SimulationSpec
+    from manipcli.spec.task import TAG
 
     name = shown if shown is not None else str(path)
     try:

@@ -133,7 +133,7 @@ class Job:
     def _variant_words(self) -> list[str]:
         """Options that repeat the run, or the runs of an agreement; half the step with the run it is compared to."""
         variants = self.case.compared or ((self.case.variant,) if self.case.variant is not None else ())
-        engines = list(dict.fromkeys(variant.engine for variant in variants))
+        engines = list(dict.fromkeys(variant.engine for variant in self.case.compared))
         words = ["--engines", ",".join(engines)] if len(engines) > 1 else []
         words += ["--set", f"simulation.engine={engines[0]}"] if len(engines) == 1 else []
         return words + (["--check-step"] if any(variant.half_step for variant in variants) else [])

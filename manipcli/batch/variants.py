@@ -4,35 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
-from manipcli.batch.job import Job
+from manipcli.batch.job import Job, Settings
 from manipcli.core.errors import InvalidInput, Place
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.agreement import Agreement, compare
-from manipcli.judge.measured_run import MeasuredRun
+from manipcli.judge.measured_run import MeasuredRun, engine_override
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.agreement.disagreement import message, summary
 from manipcli.report.run_report import RunReport
-from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, troubles_of
+from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Trouble, troubles_of
 
 
-def with_variant(job: Job) -> Job:
-    """The job with the overrides of its variant.
+def in_engine(case: Case, path: Path, settings: Settings) -> Job:
+    """The job of a case, with the override of its engine; runs in the same engine share what a process prepared."""
+    if case.variant is not None:
+        settings = replace(settings, overrides=(*settings.overrides, engine_override(case.variant)))
+    return Job(case, path, settings)
+
+
+def with_step(job: Job) -> Job:
+    """The job with the override of half the step, where its variant has it; called once, in the process of the run.
 
     Raises:
         InvalidInput: the task file is invalid.
     """
-    from manipcli.task.variants import overrides_of
+    from manipcli.task.variants import half_step_override
 
-    if job.case.variant is None:
+    if job.case.variant is None or not job.case.variant.half_step:
         return job
     settings = job.settings
-    chosen = overrides_of(job.case.variant, job.path, overrides=settings.overrides, seed=settings.seed)
-    return replace(job, settings=replace(settings, overrides=chosen))
+    halved = half_step_override(job.path, overrides=settings.overrides, seed=settings.seed)
+    return replace(job, settings=replace(settings, overrides=(*settings.overrides, halved)))
 
 
 def measured(job: Job, report: RunReport) -> MeasuredRun | None:
-    """The numbers of a run `with_variant`, with the displayed name of the file in its places; None without one."""
+    """The numbers of a run with a variant, else None; the places have the displayed name of the file."""
     from manipcli.logs.measure_run import measured_run
     from manipcli.spec import load
     from manipcli.task.vocabulary import task_spec

@@ -178,9 +178,9 @@ class TaskItem(pytest.Item):
     @property
     def jobs(self) -> tuple[Job, ...]:
         """The runs that this test needs: those of an agreement, or its own."""
-        from dataclasses import replace
+        from manipcli.batch.variants import in_engine
 
-        return tuple(replace(self.job, case=case) for case in self._case.runs)
+        return tuple(in_engine(case, self.job.path, self.job.settings) for case in self._case.runs)
 
     @property
     def job(self) -> Job:

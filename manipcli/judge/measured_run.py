@@ -25,6 +25,11 @@ class Variant(NamedTuple):
         return f"{self.engine}-{HALF_STEP}" if self.half_step else self.engine
 
 
+def engine_override(variant: Variant) -> str:
+    """The override that selects the engine of a variant, as after `--set`."""
+    return f"simulation.engine={variant.engine}"
+
+
 class Number(NamedTuple):
     """A value in its SI unit."""
 

@@ -238,16 +238,16 @@ def _surface(surface: Surface, pack: _Pack) -> Json:
 
 
 def _pushes(playback: Playback, poses: Poses, pack: _Pack) -> Json | None:
-    """Rows of point, direction and force, and the first row of each time."""
+    """Rows of point, normal force and friction, and the first row of each time."""
     forces = Forces(playback, poses)
     if not forces.scale:
         return None
     pushes_at = [forces.at(k) for k in range(len(playback.times))]
-    rows = [[*push.point, *push.direction, push.force] for pushes in pushes_at for push in pushes]
+    rows = [[*push.point, *push.normal, *push.friction] for pushes in pushes_at for push in pushes]
     return {
         "first": pack.add(np.cumsum([0, *map(len, pushes_at)]), "I"),
         # Rounded to 1e-6 without -0: further digits differ between processes.
-        "rows": pack.add(np.round(np.array(rows).reshape(-1, 7), 6) + 0.0, "f"),
+        "rows": pack.add(np.round(np.array(rows).reshape(-1, 9), 6) + 0.0, "f"),
         "scale": forces.scale,
         "longest": LONGEST,
     }

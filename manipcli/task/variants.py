@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from manipcli.judge.measured_run import Variant
+from manipcli.judge.measured_run import Variant, engine_override
 from manipcli.spec import load
-from manipcli.spec.task import SimulationSpec
+from manipcli.spec.simulation import SimulationSpec
 from manipcli.task.vocabulary import task_spec
 
 
@@ -30,8 +30,14 @@ def overrides_of(
     Raises:
         InvalidInput: the file is invalid.
     """
-    chosen = (*overrides, f"simulation.engine={variant.engine}")
-    if not variant.half_step:
-        return chosen
-    step = simulation_of(path, overrides=chosen, seed=seed).step
-    return (*chosen, f"simulation.step={step / 2.0!r}")
+    chosen = (*overrides, engine_override(variant))
+    return (*chosen, half_step_override(path, overrides=chosen, seed=seed)) if variant.half_step else chosen
+
+
+def half_step_override(path: Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> str:
+    """The override that halves the physics step of a task.
+
+    Raises:
+        InvalidInput: the file is invalid.
+    """
+    return f"simulation.step={simulation_of(path, overrides=overrides, seed=seed).step / 2.0!r}"

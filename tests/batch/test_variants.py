@@ -11,7 +11,7 @@ import pytest
 
 from manipcli.batch.discovery import read_case, samples_of, variants_of_case
 from manipcli.batch.job import Job, Settings
-from manipcli.batch.variants import agreement_report, measured, with_variant
+from manipcli.batch.variants import agreement_report, in_engine, measured, with_step
 from manipcli.cli.app import main
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
 from manipcli.judge.measured_run import MeasuredRun, Variant
@@ -90,7 +90,7 @@ def test_every_run_has_its_own_files() -> None:
 
 def test_commands_repeat_the_run() -> None:
     def options(case: Case) -> list[str]:
-        return shlex.split(replace(JOB, case=case).command())[3:]
+        return shlex.split(in_engine(case, JOB.path, JOB.settings).command())[3:]
 
     pybullet, halved, mujoco, _, agreement = variants_of_case(CASE, ("pybullet", "mujoco"), check_step=True)
     assert options(pybullet) == ["--set", "simulation.engine=pybullet"]
@@ -106,7 +106,7 @@ def test_half_the_step_keeps_the_control_period(tmp_path: Path) -> None:
     assert overrides_of(Variant("mujoco"), file) == ("simulation.engine=mujoco",)
     halved = overrides_of(Variant("mujoco", half_step=True), file, overrides=("simulation.step=1 ms",))
     assert halved == ("simulation.step=1 ms", "simulation.engine=mujoco", "simulation.step=0.0005")
-    job = with_variant(replace(JOB, path=file, case=replace(CASE, variant=Variant("kinematic", half_step=True))))
+    job = with_step(in_engine(replace(CASE, variant=Variant("kinematic", half_step=True)), file, Settings()))
     assert job.settings.overrides == ("simulation.engine=kinematic", "simulation.step=0.001")
 
 
@@ -170,7 +170,7 @@ def test_places_have_the_shown_name_of_the_file(tmp_path: Path, monkeypatch: pyt
     shown = str(path.relative_to(tmp_path))
     case = replace(read_case(path, shown=shown), variant=Variant("kinematic"))
     report = RunReport(replace(verdict("kinematic", 0.1)), Timing())
-    run = measured(with_variant(Job(case, path, Settings())), report)
+    run = measured(with_step(in_engine(case, path, Settings())), report)
     assert run is not None
     assert {place.file for place in run.places.values()} == {shown}
 
@@ -179,4 +179,4 @@ def test_an_invalid_task_has_no_variant(tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text("task: bad\nrobot: 3\n")
     with pytest.raises(InvalidInput):
-        with_variant(replace(JOB, path=file, case=replace(CASE, variant=Variant("mujoco", half_step=True))))
+        with_step(replace(JOB, path=file, case=replace(CASE, variant=Variant("mujoco", half_step=True))))

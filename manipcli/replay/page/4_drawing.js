@@ -165,6 +165,14 @@ function translucent(where, drawables, colour) {
   gl.disable(gl.POLYGON_OFFSET_FILL);
 }
 
+// A force at a point: the arrow ends there (`before` 1) or begins there (0).
+function push(point, force, before, colour) {
+  const newtons = Math.hypot(...force), length = Math.min(newtons * run.pushes.scale, 2 * run.pushes.longest);
+  if (length < 1e-4) return;
+  const direction = times(force, 1 / newtons);
+  pointer(along(sub(point, times(direction, before * length)), direction), length, 0.0035, colour);
+}
+
 function draw(t) {
   const canvas = gl.canvas, ratio = Math.min(window.devicePixelRatio || 1, 2);
   const wide = Math.round(canvas.clientWidth * ratio), high = Math.round(canvas.clientHeight * ratio);
@@ -220,9 +228,9 @@ function draw(t) {
   if (shows.forces && run.pushes) {
     const k = moment(t)[0];
     for (let j = pushFirst[k]; j < pushFirst[k + 1]; j++) {
-      const [x, y, z, dx, dy, dz, force] = pushes.subarray(7 * j, 7 * j + 7);
-      const length = Math.min(force * run.pushes.scale, 2 * run.pushes.longest), direction = [dx, dy, dz];
-      pointer(along(sub([x, y, z], times(direction, length)), direction), length, 0.0035, [0.86, 0.1, 0.2, 1]);
+      const [x, y, z, ...forces] = pushes.subarray(9 * j, 9 * j + 9);
+      push([x, y, z], forces.slice(0, 3), 1, [0.86, 0.1, 0.2, 1]);
+      push([x, y, z], forces.slice(3), 0, [0.95, 0.6, 0.05, 1]);
     }
   }
   gl.depthMask(false);

@@ -62,6 +62,7 @@ function build() {
     const box = part("show-" + name);
     if (!box) continue;
     box.checked = shows[name];
+    box.disabled = name === "forces" && !run.pushes;
     box.addEventListener("change", () => { shows[name] = box.checked; refresh(); });
   }
   const tables = part("table"), columns = part("column");

@@ -64,7 +64,7 @@ class ContactMerger:
     def __init__(self, parts: Mapping[tuple[int, int], str], *, still: Collection[tuple[int, int]] = ()) -> None:
         self._parts = parts
         self._still = frozenset((a, b, k, m) for a, k in still for b, m in still)
-        self._known: dict[Pair, tuple[str, str]] = {}
+        self._known: dict[Pair, tuple[str, str, float]] = {}
 
     def merged(self, points: Sequence[BulletPoint]) -> tuple[Contact, ...]:
         """One contact per touching pair; points that are apart (positive distance, no force) are dropped."""
