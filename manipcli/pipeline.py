@@ -24,6 +24,7 @@ from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
 from manipcli.preflight.findings import preflight_findings
+from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.logs.verification import Verification
@@ -121,6 +122,9 @@ def compare_runs(
         RecordingFailed: writing a log failed.
         KeyboardInterrupt: a run was interrupted.
     """
+    for where in (variant_log(log, variant) for variant in variants) if log is not None and not force else ():
+        if where.exists():  # before the other runs, not after them
+            raise RecordingRefused(where, "the file exists", hint="choose another name, or pass --force to replace it")
     overrides, seed = options.get("overrides", ()), options.get("seed")
     chosen: list[LoadOptions] = [
         {**options, "overrides": overrides_of(variant, path, overrides=overrides, seed=seed)} for variant in variants

@@ -98,6 +98,7 @@ def test_json_has_every_number_of_every_run(call_cli: RunCli, folder: Path) -> N
     assert [Path(run["log"]).name for run in made["runs"]] == ["x@kinematic.mcap", "x@pybullet.mcap"]
     again = call_cli("run", "nod.yaml", *words, cwd=folder)
     assert again.code == 4, "logs of --log are replaced only with --force"
+    assert "run in " not in again.err, "nothing was run"
     assert call_cli("run", "nod.yaml", *words, "--force", cwd=folder).code == 0
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.core.errors import Diagnostic, Place
+from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.judge.agreement import compare
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.measured_run import MeasuredRun, Variant
@@ -84,7 +84,7 @@ def test_keys_are_those_that_are_written(which: int) -> None:
 
 
 def test_keys_of_compared_runs() -> None:
-    place = {("judged", 0): Place("a.yaml", 9, 5)}
+    place: dict[Loc, Place] = {("judged", 0): Place("a.yaml", 9, 5)}
     failed = MeasuredRun(Variant("pybullet"), VERDICT, 1e-3, 3.0, log="a.mcap", forces={"pick_1": 20.0}, places=place)
     passed = replace(NEAR, outcome="passed", margin=0.01)
     other = MeasuredRun(Variant("mujoco"), replace(VERDICT, expectations=(passed,)), 1e-3, 1.0, log="b.mcap")

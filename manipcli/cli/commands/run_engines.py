@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +43,7 @@ def run_engines(
     """
     from manipcli import pipeline
     from manipcli.cli.progress import StepProgress
-    from manipcli.record.faults import RecordingRefused
+    from manipcli.record.faults import RecordingFailed, RecordingRefused
     from manipcli.report.agreement import agreement_json, agreement_text
 
     outputs = Outputs(report_file, None, others=(task, log), quiet=quiet)
@@ -70,6 +71,10 @@ def run_engines(
             )
         except RecordingRefused:
             raise  # nothing was run; an existing page belongs to the logs that are kept
+        except RecordingFailed as failure:
+            with suppress(OSError):  # the disk may be full for the page, too
+                outputs.of_invalid(failure.findings, task=task, log=failure.partial)
+            raise
         except InvalidInput as invalid:
             outputs.of_invalid(invalid.findings, task=task)
             raise
