@@ -104,12 +104,15 @@ def _end_of(job: Job, beats: _Beats, prepared: Prepared | None = None) -> End:
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
     from manipcli.batch.failure_report import against_baseline, draw, troubles, write_invalid_page, write_page
+    from manipcli.batch.variants import measured, with_step
     from manipcli.record.faults import RecordingFailed
 
     beats.activity("loading")
     settings = job.settings
     job.log.parent.mkdir(parents=True, exist_ok=True)
     try:
+        job = with_step(job)
+        settings = job.settings
         report = pipeline.run_task(
             job.path,
             sample=job.case.sample,
@@ -152,7 +155,7 @@ def _end_of(job: Job, beats: _Beats, prepared: Prepared | None = None) -> End:
     if job.page is not None:
         beats.activity("writing a page")
         notes += _noted("no page", lambda: write_page(job, report, found))
-    return End(report, findings, found, beats.warnings, tuple(notes))
+    return End(report, findings, found, beats.warnings, tuple(notes), measured(job, report))
 
 
 def _noted(what: str, make: Callable[[], None]) -> tuple[str, ...]:

@@ -305,6 +305,7 @@ class Process:
             page=str(job.page) if job.page is not None and job.page.exists() else None,
             output=kept[job.output],
             notes=(*end.notes, *([self._note] if self._note else [])),
+            measured=end.measured,
         )
         return self._with_page(report) if unfinished else report
 

@@ -62,7 +62,7 @@ def log_page(
     if not any(len(span.states.time) for span in recording.spans):  # it ended before the start
         return _page(recording, path, judge_recording(recording, path), end=None)
     playback = open_playback(
-        path, rate=_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
+        path, rate=page_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
     )
     verdict = playback.verdict
     assert verdict is not None, "a log of manipcli has a verdict"
@@ -176,7 +176,8 @@ def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
     return places | {step.id: step.place for step in plan.steps if step.place}, list(plan.judged)
 
 
-def _rate(recording: Recording) -> float:
+def page_rate(recording: Recording) -> float:
+    """Sampling rate of the replay in a page [Hz], which bounds its number of states."""
     last = max((event.time for event in recording.events), default=0.0)
     return min(RATE, FRAMES / last) if last > 0.0 else RATE
 
