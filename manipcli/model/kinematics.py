@@ -96,10 +96,12 @@ class Kinematics:
         R, p = np.array(X.rotation), np.array(X.translation)
         if offset is not None:
             arm = R @ offset.p
+            x, y, z = arm.tolist()
+            wx, wy, wz = J[3:]
             # v_T = v_L + w x arm
-            J[0] += J[4] * arm[2] - J[5] * arm[1]
-            J[1] += J[5] * arm[0] - J[3] * arm[2]
-            J[2] += J[3] * arm[1] - J[4] * arm[0]
+            J[0] += wy * z - wz * y
+            J[1] += wz * x - wx * z
+            J[2] += wx * y - wy * x
             R, p = R @ offset.R, p + arm
         return R, p, J
 

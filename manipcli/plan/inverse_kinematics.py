@@ -210,7 +210,8 @@ class InverseKinematics:
         stalled = 0
         for _ in range(_ITERATIONS):
             error, J, axis_error = self._linearise(X_WT, q)
-            position_error = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+            x, y, z = error.tolist()[:3]
+            position_error = math.sqrt(x * x + y * y + z * z)
             if position_error <= 0.3 * POSITION_TOLERANCE and axis_error <= 0.3 * ANGLE_TOLERANCE:
                 break
             cost = 0.5 * float(error @ error)
@@ -274,7 +275,8 @@ def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array, open_: Open) -> tuple
         error[3:] = rotation_vector(X_WG.R @ R_WT.T)
     elif open_ == "spin":
         error[3:] = rotation_vector(pointed(R_WT, X_WG.R[:, 2]) @ R_WT.T)
-    return error, math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+    x, y, z = error.tolist()[3:]
+    return error, math.sqrt(x * x + y * y + z * z)
 
 
 def pointed(R: Array, z: Array) -> Array:
@@ -288,11 +290,13 @@ def pointed(R: Array, z: Array) -> Array:
 
 def rotation_vector(R: Array) -> Array:
     """log(R) (3,): axis times angle in [0, pi], of a rotation matrix (3, 3)."""
-    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()  # floats of Python: one by one they cost less than numpy's
+    x, y, z = zy - yz, xz - zx, yx - xy
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
+    angle = math.atan2(sine, 0.5 * (xx + yy + zz - 1.0))
     if sine > 1e-7:
-        return np.array([x, y, z]) * (0.5 * angle / sine)
+        scale = 0.5 * angle / sine
+        return np.array([x * scale, y * scale, z * scale])
     if angle < 1.0:
         return np.array([x, y, z]) * 0.5
     # Near pi the antisymmetric part vanishes; the axis is the largest column of R + I = 2 a a^T, normalised.
@@ -308,6 +312,8 @@ def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array,
     H.flat[:: n + 1] += damping
     gradient = J.T @ error
     step = np.linalg.solve(H, gradient)
+    if not _outward(q, step, lower, upper):
+        return np.asarray(step)
     held = np.zeros(n, dtype=bool)
     for _ in range(n):
         outward = ((q <= lower) & (step < 0.0)) | ((q >= upper) & (step > 0.0))
@@ -320,3 +326,11 @@ def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array,
             break
         step[free] = np.linalg.solve(H[np.ix_(free, free)], gradient[free])
     return np.asarray(step)
+
+
+def _outward(q: Array, step: Array, lower: Array, upper: Array) -> bool:
+    """Whether a joint at its limit would be pushed further out; for a few joints quicker than with arrays."""
+    for x, dx, low, high in zip(q.tolist(), step.tolist(), lower.tolist(), upper.tolist(), strict=True):
+        if (dx < 0.0 and x <= low) or (dx > 0.0 and x >= high):
+            return True
+    return False
