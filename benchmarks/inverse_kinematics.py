@@ -25,9 +25,9 @@ from benchmarks.twin import clock
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import configuration, position_limits
+from manipcli.model.kinematics import Kinematics
 from manipcli.plan.claimed_joints import Claims, arm_joints
 from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
-from manipcli.model.kinematics import Kinematics
 from manipcli.task.load_task import load_task
 
 ROOT: Final = Path(__file__).parents[1]
@@ -106,8 +106,8 @@ def ours(given: Problem) -> Solve:
 
 def pinks(given: Problem) -> Solve:
     """Pink's differential inverse kinematics, iterated, with restarts as ours."""
-    import pink  # type: ignore[import-not-found, unused-ignore]  # noqa: PLC0415 (not a dependency)
-    from pink.tasks import FrameTask  # type: ignore[import-not-found, unused-ignore]  # noqa: PLC0415
+    import pink  # type: ignore[import-not-found, unused-ignore]
+    from pink.tasks import FrameTask  # type: ignore[import-not-found, unused-ignore]
 
     model = given.kinematics.model
     tool = given.kinematics.robot.tool

@@ -129,6 +129,7 @@ class InverseKinematics:
         rng: np.random.Generator,
         *,
         refuse: Callable[[Array], object | None] | None = None,
+        tries: int | None = None,
     ) -> Array:
         """Joint positions (n) with the tool at `X_WT`, near `seed`.
 
@@ -140,6 +141,7 @@ class InverseKinematics:
             seed: (n) all moving joints.
             rng: draws the restarts.
             refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count.
+            tries: number of restarts; None for 40.
 
         Raises:
             NotPlannable: no attempt converges; names the least error, the distance to the goal and the joints at their
@@ -157,7 +159,7 @@ class InverseKinematics:
         lower = np.where(np.isfinite(self._lower), self._lower, seed[self._columns] - _UNLIMITED)
         upper = np.where(np.isfinite(self._upper), self._upper, seed[self._columns] + _UNLIMITED)
         found: list[Solution] = []
-        for _ in range(_TRIES):
+        for _ in range(_TRIES if tries is None else tries):
             start = seed.copy()
             start[self._columns] = rng.uniform(lower, upper)
             attempt = self.track(X_WT, start)

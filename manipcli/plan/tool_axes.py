@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,14 +39,25 @@ def too_wide(planner: Planner, state: PlanningState, body: str, opened: str, pos
         ROBOT + link: bool((X_WT.inverse() @ planner.kinematics.forward(q, link)).p[1] > 0.0)
         for link in moved_links(robot, planner.gripper_joints)
     }
-    k = [movable.name for movable in planner.scene.movable].index(body)
+    parts = overlaps(planner, state, body, opened)
     for goal in poses:
-        X_WO = X_WT @ goal.inverse() @ state.bodies[k]  # the body brought to the hand, which needs no arm
-        there = replace(state, bodies=(*state.bodies[:k], X_WO, *state.bodies[k + 1 :]))
-        hits = planner.grasping(there, body).every(q)
-        if len({side[name] for hit in hits for name in (hit.a, hit.b) if name in side}) < 2:
+        if len({side[name] for name in parts(goal) if name in side}) < 2:
             return None
     return f"open the hand further, `open: POSE`: '{body}' is wider than the hand in its pose '{opened}'"
+
+
+def overlaps(planner: Planner, state: PlanningState, body: str, opened: str) -> Callable[[Transform], frozenset[str]]:
+    """The parts that overlap, `body` among them, by the tool pose X_WT, with the hand at its pose `opened`."""
+    q = _posed(planner, state, opened)
+    X_WT = planner.solver.forward(q)
+    k = [movable.name for movable in planner.scene.movable].index(body)
+
+    def parts(goal: Transform) -> frozenset[str]:
+        X_WO = X_WT @ goal.inverse() @ state.bodies[k]  # the body brought to the hand, which needs no arm
+        there = replace(state, bodies=(*state.bodies[:k], X_WO, *state.bodies[k + 1 :]))
+        return frozenset(name for hit in planner.grasping(there, body).every(q) for name in (hit.a, hit.b))
+
+    return parts
 
 
 def _posed(planner: Planner, state: PlanningState, posture: str) -> Array:

@@ -10,9 +10,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, get_args
 
-import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem, unknown_body
@@ -22,6 +21,7 @@ from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, Planner
@@ -29,22 +29,22 @@ from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
-from manipcli.plan.tool_axes import misplaced, too_wide
+from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 
-YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
-"""Candidate rotations of the approach about the vertical, relative to the straight line from robot to object."""
-UPRIGHT = 0.99
-"""Cosine above which two axes count as parallel: upright objects, tools that point straight down."""
-ALIKE = 0.5
-"""Cosine above which two tool directions are similar enough to compare their rotation about them."""
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Candidate slopes of the straight approach: along the hand's axis, or from above it, which folds the arm less."""
-HIGHER = (2 / 3, 5 / 6)
-"""Shares of an object's height at which it is grasped from above if its middle is out of reach: the palm touches."""
+FURTHER = 60
+"""Maximum number of further grasp frames that are tried where none of the usual ones has a plan."""
+ATTEMPTS = 24
+"""Maximum number of plans that are tried for further frames within reach."""
+FEW = 8
+"""Restarts of the inverse kinematics for a further frame, of which there are many."""
+BRANCHES = 6
+"""Maximum number of frames that are tried in another configuration of the arm, if it cannot follow the approach."""
 
 _OTHERWISE = (
     "change the approach, the height of the grasp or the opening of the hand: "
@@ -55,9 +55,6 @@ _AIM = (
     "check `tool: {link: ..., pose: {rpy: ...}}` in the robot file: the tool's +z must point to the object, "
     "and the arm cannot reach that orientation"
 )
-
-
-Direction = Literal["side", "top"]
 
 
 class ApproachSpec(Model):
@@ -97,8 +94,9 @@ class PickSpec(Model):
     """Open the hand, reach an object, approach it straight, and close the hand on it.
 
     The tool's +z is the direction of approach, its y the direction in which the fingers close. If a later step cannot
-    be planned with this grasp, other grasps are tried, as far as `approach` leaves them open: from the other side, with
-    the hand rotated by half a turn, from above.
+    be planned with this grasp, other grasps are tried, as far as `approach` and `height` leave them open: with the hand
+    rotated by half a turn, from above, from the other sides, sloping from above, higher and lower, with other rolls of
+    the hand; at a mesh also at opposite points of its surface.
     """
 
     renamed: ClassVar = RENAMED
@@ -114,7 +112,7 @@ class PickSpec(Model):
 
 
 def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candidates:
-    """Directions, heights and rolls of the hand, distances and slopes of the approach.
+    """Grasp frames, distances and slopes of the approach; last, other configurations of the arm.
 
     Raises:
         NotPlannable: the hand already holds something.
@@ -123,35 +121,40 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     before = _clear(spec, planner, state)
     state = before.end
     planner.free_start(state)
-    X_WO = planner.body_pose(state, spec.object)
     body = planner.scene.body(spec.object)
-    bottom = body.centre[2] - body.size[2] / 2
-    height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
-    rotations = _orientations(spec.approach, X_WO, planner.robot.X_WB, planner.tool_pose(state).R)
-    goals = [(height, R_WT) for R_WT in rotations]
-    if spec.grasp.height is None and body.kind != "sphere" and X_WO.R[2, 2] > UPRIGHT:
-        from_above = [R_WT for R_WT in rotations if R_WT[2, 2] < -UPRIGHT]
-        goals += [(bottom + share * body.size[2], R_WT) for share in HIGHER for R_WT in from_above]
-    out_of_reach: dict[int, NotPlannable | None] = {}
+    frames = GraspFrames(
+        body, planner.body_pose(state, spec.object), planner.robot.X_WB, planner.tool_pose(state).R,
+        direction=spec.approach.direction, yaw=spec.approach.yaw, height=spec.grasp.height,
+    )  # fmt: skip
+    usual = frames.usual()
+    out_of_reach: dict[GraspFrame, NotPlannable | None] = {}
+    lines: dict[GraspFrame, tuple[float, float, Array]] = {}
+    attempts = 0
 
-    def tool_at(k: int) -> Transform:
-        height, R_WT = goals[k]
-        return Transform.of(xyz=X_WO.apply([body.centre[0], body.centre[1], height]), R=R_WT)
-
-    def attempt(k: int, distance: float, slope: float) -> StepPlan:
-        X_WG = tool_at(k)
+    def attempt(frame: GraspFrame, distance: float, slope: float, tries: int | None, avoid: Array | None) -> StepPlan:
+        nonlocal attempts
         builder = MotionBuilder(planner, state)
-        if k not in out_of_reach:  # checked once: it does not depend on distance and slope
-            out_of_reach[k] = builder.unreachable("approach", X_WG, hand=spec.open)
-        refusal = out_of_reach[k]
+        if frame not in out_of_reach:  # checked once: it does not depend on distance and slope
+            out_of_reach[frame] = builder.unreachable("approach", frame.X_WT, hand=spec.open, tries=tries)
+        refusal = out_of_reach[frame]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
             if refusal.reason == "orientation":
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or set ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise refusal.but(hint=hint)
-        builder.reach("reach", backed_off(X_WG, distance, slope), speed=spec.velocity_scaling, hand=spec.open)
-        builder.straight("approach", X_WG, speed=spec.velocity_scaling / 2)
+        attempts += tries is not None
+        before_approach = backed_off(frame.X_WT, distance, slope)
+        others_than = () if avoid is None else (avoid,)
+        builder.reach(
+            "reach", before_approach, speed=spec.velocity_scaling, hand=spec.open, avoid=others_than, tries=tries
+        )
+        try:
+            builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2)
+        except NotPlannable as refusal:
+            if refusal.reason == "line":
+                lines.setdefault(frame, (distance, slope, builder.now.position))
+            raise
         builder.close(
             spec.grasp.posture,
             force=spec.grasp.force,
@@ -162,37 +165,55 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         planned = builder.plan()
         return replace(planned, motions=(*before.motions, *planned.motions))
 
+    def candidate(
+        frame: GraspFrame, distance: float, slope: float, tries: int | None = None, avoid: Array | None = None
+    ) -> Candidate:
+        sloping = f" at a slope of {math.degrees(slope):.0f} deg" if slope else ""
+        branch = "" if avoid is None else ", in another configuration of the arm"
+        name = f"{frame.name}, approach of {readable(distance, 'm')}{sloping}{branch}"
+        return Candidate(partial(attempt, frame, distance, slope, tries, avoid), name=name, grasp=frame.X_WT.R)
+
+    def touched() -> bool:
+        return any(why is None or why.reason == "touches" for why in out_of_reach.values())
+
     def options() -> Iterator[Candidate]:
-        for k, (height, R_WT) in enumerate(goals):
-            if k == len(rotations) and all(
-                why is not None and why.reason != "touches" for why in out_of_reach.values()
-            ):
-                return  # a higher grasp is not nearer
+        for k, frame in enumerate((*usual, *frames.higher())):
+            if k >= len(usual) and not touched():
+                break  # a higher grasp is not nearer
             for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
-                name = _name(R_WT, height - bottom, distance, slope)
-                yield Candidate(partial(attempt, k, distance, slope), name=name, grasp=R_WT)
+                yield candidate(frame, distance, slope)
+        if not touched() and _beyond(planner, state, usual[0].X_WT, spec.open):
+            return  # no other orientation is nearer
+        overlapping = overlaps(planner, state, spec.object, spec.open)
+        for frame in first_fitting(frames.further(), lambda X_WT: not overlapping(X_WT), FURTHER):
+            for distance, slope in _brief(spec.approach.distance):
+                if attempts >= ATTEMPTS:
+                    break
+                yield candidate(frame, distance, slope, FEW)
+                if out_of_reach.get(frame) is not None:
+                    break
+        for frame, (distance, slope, position) in tuple(lines.items())[:BRANCHES]:
+            yield candidate(frame, distance, slope, FEW, position)
 
     def explain(refusal: NotPlannable) -> NotPlannable:
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
-        wide = too_wide(planner, state, spec.object, spec.open, [tool_at(k) for k in range(len(rotations))])
+        wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
         hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
         return refusal.but(hint="; or ".join(hints) or None)
 
     return Candidates(options(), what=f"cannot pick '{spec.object}'", decides="grasp", explain=explain)
 
 
-def _name(R_WT: Array, height: float, distance: float, slope: float) -> str:
-    """The approach, the height above the object's bottom, and the roll of the hand, as told of a candidate."""
-    z = R_WT[:, 2]
-    if abs(z[2]) > UPRIGHT:
-        side, yaw = "from the top", math.atan2(R_WT[1, 0], R_WT[0, 0])
-    else:
-        side, yaw = f"from the side{', rolled' if R_WT[2, 0] > 0.0 else ''}", math.atan2(z[1], z[0])
-    sloping = f" at a slope of {math.degrees(slope):.0f} deg" if slope else ""
-    return (
-        f"{side}, yaw {math.degrees(yaw):.0f} deg, {readable(height, 'm')} above its bottom, "
-        f"approach of {readable(distance, 'm')}{sloping}"
-    )
+def _brief(distance: Range) -> tuple[tuple[float, float], ...]:
+    """(distance [m], slope [rad]) of the approaches to a further frame: fewer than to a usual one."""
+    middle, straight, sloping = spread(distance)[0], *slopes()[:2]
+    return tuple(dict.fromkeys(((middle, straight), (middle, sloping), (distance[0], straight))))
+
+
+def _beyond(planner: Planner, state: PlanningState, X_WT: Transform, opened: str) -> bool:
+    """Whether no orientation of the tool reaches the point of a frame."""
+    refusal = MotionBuilder(planner, state).unreachable("approach", X_WT, hand=opened, leaving="rotation", tries=FEW)
+    return refusal is not None and refusal.reason != "touches"
 
 
 def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
@@ -221,43 +242,6 @@ def backed_off(X_WG: Transform, distance: float, slope: float) -> Transform:
 def slopes() -> tuple[float, ...]:
     """The candidate slopes [rad], the straight one first."""
     return tuple(math.radians(slope) for slope in SLOPES_DEG)
-
-
-def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform, R_WT: Array) -> list[Array]:
-    """Candidate R_WT (3, 3), the preferred first; each also rotated by half a turn about z.
-
-    The one nearer to the present orientation `R_WT` comes first: it leaves more range of the wrist for later steps.
-    """
-    found = []
-    if spec.direction != "top":
-        away = X_WO.p - X_WB.p
-        nominal = math.atan2(away[1], away[0]) if spec.yaw is None else spec.yaw
-        for offset in YAWS_DEG if spec.yaw is None else (0.0,):
-            yaw = nominal + math.radians(offset)
-            z = np.array([math.cos(yaw), math.sin(yaw), 0.0])
-            x = np.array([0.0, 0.0, -1.0])
-            found += _nearer_first(_frame(x, z), _frame(-x, z), R_WT)
-    if spec.direction != "side":
-        nominal = float(X_WO.rpy[2]) if spec.yaw is None else spec.yaw
-        z = np.array([0.0, 0.0, -1.0])
-        both = []
-        for offset in (0.0, 90.0) if spec.yaw is None else (0.0,):
-            yaw = nominal + math.radians(offset)
-            x = np.array([math.cos(yaw), math.sin(yaw), 0.0])
-            both.append(_nearer_first(_frame(x, z), _frame(-x, z), R_WT))
-        found += [pair[k] for k in (0, 1) for pair in both]
-    return found
-
-
-def _nearer_first(first: Array, second: Array, R: Array) -> list[Array]:
-    """Both rotations (3, 3), the second first if `R` has about the same z axis and is clearly nearer to the second."""
-    alike = first[:, 2] @ R[:, 2] > ALIKE
-    return [second, first] if alike and np.sum(second * R) > np.sum(first * R) + 1e-3 else [first, second]
-
-
-def _frame(x: Array, z: Array) -> Array:
-    """The rotation with these two unit axes."""
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
