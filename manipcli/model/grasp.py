@@ -13,7 +13,7 @@ moved in the hand, an interval is the time in which an object is pressed and has
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,8 +22,9 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
-from manipcli.scene.scene import Scene
+from manipcli.scene.scene import Body, Scene
 
 LINK: Final = "robot/"
 GRIP_FORCE: Final = 0.1
@@ -38,6 +39,16 @@ DROPPED: Final = 0.02
 """[m] A lag on the path counts from this motion of the hand on; below it, contacts are still settling."""
 MISPLACED: Final = 0.05
 """[m] An object further than this from its planned pose in the hand is not carried."""
+
+
+def friction_coefficient(robot: RobotModel, body: Body) -> float:
+    """mu of a contact between robot and body: the product of those of the two surfaces, as in Bullet."""
+    return body.friction * robot.friction
+
+
+def friction_load(mu: float, forces: Iterable[float]) -> float:
+    """[N] The largest load that friction carries across level fingers which press with these `forces` [N]: mu sum F."""
+    return mu * sum(forces)
 
 
 def pressing(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:

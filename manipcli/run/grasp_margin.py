@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from manipcli.core.units import readable
-from manipcli.model.grasp import pressing
+from manipcli.model.grasp import friction_coefficient, friction_load, pressing
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.scene.scene import Scene
@@ -43,13 +43,14 @@ class GraspMargin:
             return ""
         pressed = sum(force for force, _ in taken)
         body = self._scene.body(name)
-        friction = body.friction * self._robot.friction
+        friction = friction_coefficient(self._robot, body)
+        carried = friction_load(friction, (force for force, _ in taken))
         weight = body.mass * float(np.linalg.norm(self._scene.gravity))
         grasp = f"grip force {readable(pressed, 'N')}: friction {friction:.3g}"
         shares = f"('{name}' {body.friction:.3g} x hand {self._robot.friction:.3g})"
-        text = f"{grasp} {shares} carries {readable(friction * pressed, 'N')}, its weight is {readable(weight, 'N')}"
-        if friction * pressed > AMPLE * weight:
+        text = f"{grasp} {shares} carries {readable(carried, 'N')}, its weight is {readable(weight, 'N')}"
+        if carried > AMPLE * weight:
             by = ", ".join(f"{link.partition('/')[2]} ({readable(force, 'N')})" for force, link in taken)
             return f"{text}; the force is sufficient, check the contact points: {by}"
-        left = (friction * pressed - weight) / body.mass
+        left = (carried - weight) / body.mass
         return text if left <= 0.0 else f"{text}; maximum lift acceleration before slip: {left:.2g} m/s2"

@@ -97,6 +97,30 @@ def distance(a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: 
     return Proximity(float(result.min_distance), point, np.array(result.normal))
 
 
+def contact_patch(
+    a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: Transform, *, margin: float
+) -> tuple[Array, Array] | None:
+    """Corners (k, 3) [m] of the area in which two shapes touch, and the unit normal (3,) from A to B, in the world.
+
+    The area is a polygon, a line or a point. None where the shapes are further apart than `margin` [m].
+    """
+    import coal
+
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.enable_contact = True
+    request.security_margin = margin
+    placed = _placed(X_WA), _placed(X_WB)
+    coal.collide(a, placed[0], b, placed[1], request, result)
+    if not result.isCollision():
+        return None
+    patches = coal.ContactPatchResult()
+    coal.computeContactPatch(a, placed[0], b, placed[1], result, coal.ContactPatchRequest(), patches)
+    patch = patches.getContactPatch(0)
+    points = [np.array(patch.getPoint(k)) for k in range(patch.size())]
+    contact = result.getContact(0)
+    return np.array(points or [np.array(contact.pos)]), np.array(contact.normal)
+
+
 def overlap(a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: Transform) -> bool:
     """Whether two shapes touch or overlap."""
     import coal

@@ -22,6 +22,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting
+from manipcli.plan.grasp_margin import carries
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, Planner
@@ -46,10 +47,14 @@ FEW = 8
 BRANCHES = 6
 """Maximum number of frames that are tried in another configuration of the arm, if it cannot follow the approach."""
 
+WEAK = 6
+"""Grasps that seem unable to hold the weight are tried last, and at once after so many of them."""
+
 _OTHERWISE = (
     "change the approach, the height of the grasp or the opening of the hand: "
     "`approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`, `open: ...`"
 )
+_STRONGER = "grasp it with more force, `grasp: {force: ...}`, or elsewhere: `grasp: {height: ...}`, `approach: {...}`"
 _HIGHER = "grasp the object where the closing fingers have room, for example higher: `grasp: {height: ...}`"
 _AIM = (
     "check `tool: {link: ..., pose: {rpy: ...}}` in the robot file: the tool's +z must point to the object, "
@@ -130,6 +135,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     out_of_reach: dict[GraspFrame, NotPlannable | None] = {}
     lines: dict[GraspFrame, tuple[float, float, Array]] = {}
     attempts = 0
+    weak: list[Candidate] = []
 
     def attempt(frame: GraspFrame, distance: float, slope: float, tries: int | None, avoid: Array | None) -> StepPlan:
         nonlocal attempts
@@ -163,7 +169,13 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             roomier=_HIGHER,
         )
         planned = builder.plan()
-        return replace(planned, motions=(*before.motions, *planned.motions))
+        planned = replace(planned, motions=(*before.motions, *planned.motions))
+        if spec.grasp.until == "contact" and len(weak) < WEAK and not carries(planner, planned):
+            weak.append(Candidate(lambda: planned, name=f"{frame.name}, by a weak grasp", grasp=frame.X_WT.R))
+            raise NotPlannable(
+                f"close: the contacts of the hand cannot hold the weight of '{spec.object}'", hint=_STRONGER
+            )
+        return planned
 
     def candidate(
         frame: GraspFrame, distance: float, slope: float, tries: int | None = None, avoid: Array | None = None
@@ -177,6 +189,13 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         return any(why is None or why.reason == "touches" for why in out_of_reach.values())
 
     def options() -> Iterator[Candidate]:
+        for one in grasps():
+            yield one
+            if len(weak) == WEAK:
+                break  # the predicted contacts are not as they seem
+        yield from weak
+
+    def grasps() -> Iterator[Candidate]:
         for k, frame in enumerate((*usual, *frames.higher())):
             if k >= len(usual) and not touched():
                 break  # a higher grasp is not nearer

@@ -12,6 +12,7 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.configuration import with_mimics
+from manipcli.model.grasp import friction_coefficient, friction_load
 from manipcli.plan.hand import moved_links
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
@@ -52,8 +53,8 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
         if max(heights) < heights[0] + LIFTED or not _between_two(plan.planner, grasp.end, grasp.joints, gravity / g):
             continue
         force = min(_held_force(subject, name, grasp.force) for name in grasp.joints)
-        friction = body.friction * task.robot.friction
-        carried, weight = 2.0 * friction * force, body.mass * g
+        friction = friction_coefficient(task.robot, body)
+        carried, weight = friction_load(friction, (force, force)), body.mass * g
         if carried < RESERVE * weight:
             message = f"step '{grasp.step}': friction carries {carried:.3g} N, '{body.name}' "
             message += (
