@@ -25,6 +25,7 @@ from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
+from manipcli.spec.plan import PlanSpec
 from manipcli.spec.quantity import Unit
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.robot import (
@@ -56,6 +57,7 @@ ELSEWHERE: dict[type, str] = {
     DistributionSpec: "one of the first four",
     BaselineSpec: "a [mapping](task.md#baseline)",
     AgreeSpec: "a [mapping](task.md#agree)",
+    PlanSpec: "a [mapping](task.md#plan)",
     GroupSpec: "[groups](robot.md#groups)",
     ToolSpec: "a [mapping](robot.md#tool)",
     LimitsSpec: "[limits](robot.md#limits)",

@@ -230,10 +230,14 @@ class InverseKinematics:
         """Unit of the position of the solver's joint with this index."""
         return "rad" if self._turning[joint] else "m"
 
+    def manipulability(self, q: npt.ArrayLike) -> float:
+        """The smallest singular value of the tool's Jacobian over the solver's joints at `q` (n)."""
+        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
+        return float(np.linalg.svd(J, compute_uv=False)[-1])
+
     def singularity(self, q: npt.ArrayLike) -> str:
         """The smallest singular value of the tool's Jacobian at `q` (n), as text."""
-        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
-        return f"smallest singular value {np.linalg.svd(J, compute_uv=False)[-1]:.3f}"
+        return f"smallest singular value {self.manipulability(q):.3f}"
 
     def _solution(self, X_WT: Transform, q: Array) -> Solution:
         X_WC = self.forward(q)

@@ -16,7 +16,7 @@ from typing import Final
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.plan.candidates import Attempts, Candidates, Chosen
-from manipcli.plan.motion import PlanningState
+from manipcli.plan.motion import PlanningState, StepPlan
 
 MOST: Final = 7
 """Maximum number of plans of one step before its failure is passed on."""
@@ -53,19 +53,35 @@ class Solved:
 
 
 def search_task(
-    opens: Opens, count: int, start: PlanningState, *, on_step: Callable[[int, bool], None] = lambda *_: None
+    opens: Opens,
+    count: int,
+    start: PlanningState,
+    *,
+    on_step: Callable[[int, bool], None] = lambda *_: None,
+    optimise: int = 0,
+    cost: Callable[[PlanningState, StepPlan], float] = lambda _, plan: plan.duration,
 ) -> tuple[Solved, ...]:
-    """The first plan of all `count` steps.
+    """The first plan of all `count` steps, or the cheapest of it and `optimise` further ones.
 
     Args:
         opens: gives the candidates of each step.
         count: number of steps.
         start: the state before the first.
         on_step: called before a step is planned, with its index and whether it takes another candidate.
+        optimise: number of further candidates to compare.
+        cost: of the plan of a step from a state.
 
     Raises:
         NotPlannable: there is none; the refusal of the latest step that was reached.
     """
+    nodes = _search(opens, count, start, on_step)
+    if optimise:
+        nodes = _cheapest(opens, nodes, on_step, optimise, cost)
+    return tuple(Solved(node.chosen, tuple(node.attempts.excluded)) for node in nodes if node.chosen is not None)
+
+
+def _search(opens: Opens, count: int, start: PlanningState, on_step: Callable[[int, bool], None]) -> list[Node]:
+    """The first plan of all `count` steps; raises NotPlannable."""
     done: list[Node] = []
     latest = -1, NotPlannable("there is no step")
     grasps: dict[int, int] = {}
@@ -93,7 +109,57 @@ def search_task(
             node.taken += 1
             done.append(node)
             resumed = None
-    return tuple(Solved(node.chosen, tuple(node.attempts.excluded)) for node in done if node.chosen is not None)
+    return done
+
+
+def _cheapest(
+    opens: Opens,
+    nodes: list[Node],
+    on_step: Callable[[int, bool], None],
+    most: int,
+    cost: Callable[[PlanningState, StepPlan], float],
+) -> list[Node]:
+    """The cheapest of a plan and of `most` further ones.
+
+    Each takes the next candidate of one step, in turn from the last to the first, and plans the later steps again. A
+    cheaper plan replaces the present one at once: its later steps then have candidates of their own.
+    """
+
+    def total(plan: Sequence[Node]) -> float:
+        return sum(cost(node.start, node.chosen.plan) for node in plan if node.chosen is not None)
+
+    spent = [total([node]) for node in nodes]
+    left = set(range(len(nodes)))
+    looked, k = 0, len(nodes)
+    while looked < most and left:
+        k = max((j for j in left if j < k), default=max(left))
+        node = nodes[k]
+        on_step(k, True)
+        try:
+            chosen = node.attempts.take()
+        except NotPlannable:
+            left.discard(k)
+            continue
+        looked += 1
+        other = Node(node.start, node.attempts, chosen)
+        after = k + 1
+
+        def later(j: int, state: PlanningState, first: int = after) -> Candidates:
+            return opens(first + j, state)
+
+        def on_later(j: int, again: bool, first: int = after) -> None:
+            on_step(first + j, again)
+
+        try:
+            tail = [other, *_search(later, len(nodes) - after, chosen.plan.end, on_later)]
+        except NotPlannable:
+            continue
+        costs = [total([each]) for each in tail]
+        if sum(costs) < sum(spent[k:]) - 1e-9:
+            nodes = [*nodes[:k], *tail]
+            spent[k:] = costs
+            left |= set(range(after, len(nodes)))
+    return nodes
 
 
 def _counted(refusal: NotPlannable, grasps: int) -> NotPlannable:

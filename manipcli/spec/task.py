@@ -18,6 +18,7 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
+from manipcli.spec.plan import PlanSpec
 from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
@@ -294,6 +295,7 @@ class TaskSpec(Model):
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
     baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")
+    plan: PlanSpec = Field(PlanSpec(), description="How the plan is chosen.")
     agree: AgreeSpec = Field(AgreeSpec(), description="Allowed differences between the runs of several engines.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")
     expect: tuple[ExpectationSpec, ...] = Field(

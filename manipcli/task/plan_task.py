@@ -15,6 +15,7 @@ from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.configuration import configuration
 from manipcli.plan.candidates import Candidates, first
 from manipcli.plan.claimed_joints import Claims
+from manipcli.plan.cost import step_cost
 from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.outline import PlanOutline, StepOutline
@@ -171,7 +172,14 @@ def _steps(
     def on_step(k: int, again: bool) -> None:
         on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
 
-    solved = search_task(opens, len(steps), start, on_step=on_step)
+    solved = search_task(
+        opens,
+        len(steps),
+        start,
+        on_step=on_step,
+        optimise=task.spec.plan.optimise,
+        cost=lambda state, plan: step_cost(planner, state, plan).total,
+    )
     return tuple(
         PlannedStep(str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps)
         for k, (step, one) in enumerate(zip(steps, solved, strict=True))

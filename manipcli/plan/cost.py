@@ -1,0 +1,127 @@
+"""Cost of a plan, to compare whole plans of a task; everything in seconds.
+
+    cost = duration
+         + CLEARANCE_WEIGHT   (1 - min(d, ROOM) / ROOM)              per step; d: clearance of its free motions [m]
+         + LIMIT_WEIGHT       (1 - min(l, LIMIT_ROOM) / LIMIT_ROOM)  per step; l: share of a joint's range to its limit
+         + SINGULARITY_WEIGHT (1 - min(s, SINGULAR) / SINGULAR)      per step; s: smallest singular value of the tool
+         + GRASP_WEIGHT       min(1, 1 / r)                          per grasp; r: weights that it holds (grasp_margin)
+
+Each term but the first is 0 where there is ample room, and its weight at the worst: how many seconds longer a plan may
+take that avoids it. Motions are sampled at `SAMPLES` points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.configuration import position_limits, with_mimics
+from manipcli.plan.grasp_margin import grasp_margin
+from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.planner import Planner
+
+CLEARANCE_WEIGHT: Final = 1.0
+"""[s] for a step whose free motion comes within the planner's clearance of something."""
+ROOM: Final = 0.05
+"""[m] More clearance than this is not better."""
+LIMIT_WEIGHT: Final = 0.5
+"""[s] for a step with a joint at its limit."""
+LIMIT_ROOM: Final = 0.1
+"""Share of a joint's range: further from its limit than this is not better."""
+SINGULARITY_WEIGHT: Final = 0.5
+"""[s] for a step with the arm in a singularity."""
+SINGULAR: Final = 0.1
+"""Smallest singular value of the tool's Jacobian (metres and radians) above which more is not better."""
+GRASP_WEIGHT: Final = 5.0
+"""[s] for a grasp that holds just the weight; half of it for one that holds two weights."""
+SAMPLES: Final = 8
+"""Points of a motion that are looked at."""
+FREE: Final = frozenset({"move", "reach", "carry", "home"})
+"""Labels of motions that keep away from everything; the others are meant to touch or to come near."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepCost:
+    """The cost of a step [s], by term."""
+
+    duration: float
+    clearance: float = 0.0
+    limits: float = 0.0
+    singularity: float = 0.0
+    grasp: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """[s]."""
+        return self.duration + self.clearance + self.limits + self.singularity + self.grasp
+
+
+def step_cost(planner: Planner, start: PlanningState, plan: StepPlan) -> StepCost:
+    """The cost of the plan of a step that begins in `start`."""
+    near, limit, singular = ROOM, LIMIT_ROOM, SINGULAR
+    for state, label, positions in _sampled(planner, start, plan):
+        limit = min(limit, _to_limit(planner, positions))
+        singular = min(singular, *(planner.solver.manipulability(q) for q in positions))
+        if label in FREE:
+            near = min(near, _clearance(planner, state, positions))
+    margin = grasp_margin(planner, plan)
+    return StepCost(
+        duration=plan.duration,
+        clearance=CLEARANCE_WEIGHT * (1.0 - max(near, 0.0) / ROOM),
+        limits=LIMIT_WEIGHT * (1.0 - limit / LIMIT_ROOM),
+        singularity=SINGULARITY_WEIGHT * (1.0 - singular / SINGULAR),
+        grasp=0.0 if margin is None else GRASP_WEIGHT * min(1.0, 1.0 / max(margin.ratio, 1.0)),
+    )
+
+
+def _sampled(
+    planner: Planner, start: PlanningState, plan: StepPlan
+) -> Iterator[tuple[PlanningState, str, list[Array]]]:
+    """(state, label, (n) positions) of each motion of the arm; the state has what the hand carries meanwhile."""
+    state, q = start, np.array(start.position)
+    for motion in plan.motions:
+        if motion.trajectory is not None:
+            chosen = np.unique(np.linspace(0, len(motion.trajectory.times) - 1, SAMPLES).round().astype(int))
+            columns = planner.robot.indices(motion.trajectory.names)
+            positions = []
+            for row in motion.trajectory.positions[chosen]:
+                q[columns] = row
+                positions.append(np.array(with_mimics(planner.robot, q)))
+            yield state, motion.label, positions
+        if motion.grip is not None:
+            q[planner.robot.indices(motion.grip.joints)] = motion.grip.target
+            q = np.array(with_mimics(planner.robot, q))
+            if motion.grip.force is not None or motion.label == "open":
+                state = replace(state, carried=plan.end.carried, bodies=plan.end.bodies)
+
+
+def _clearance(planner: Planner, state: PlanningState, positions: list[Array]) -> float:
+    """[m] Least distance of the robot, and of what it holds, from everything it must not touch; at most `ROOM`."""
+    allowed = frozenset() if state.carried is None else planner.hand_contacts(state.carried.body)
+    gone = () if state.carried is None else planner.contents(state, state.carried.body)
+    query = planner.checker.at(state.bodies, carried=state.carried, ignore=allowed, margin=ROOM, absent=gone)
+    at_first = {(hit.a, hit.b): hit.distance for hit in query.every(positions[0])}
+    # Parts that are near each other by construction, such as neighbouring links, say nothing: only what comes nearer.
+    return min(
+        (
+            hit.distance
+            for q in positions[1:]
+            for hit in query.every(q)
+            if hit.distance < at_first.get((hit.a, hit.b), np.inf) - 1e-6
+        ),
+        default=ROOM,
+    )
+
+
+def _to_limit(planner: Planner, positions: list[Array]) -> float:
+    """Least distance of a joint of the arm from its limits, as a share of its range; inf without limits."""
+    solver = planner.solver
+    lower, upper = position_limits(planner.robot.joint(name) for name in solver.joints)
+    width = upper - lower
+    arm = np.array(positions)[:, list(solver.columns)]
+    share = np.minimum(arm - lower, upper - arm)[:, np.isfinite(width)] / width[np.isfinite(width)]
+    return max(0.0, float(share.min())) if share.size else np.inf
