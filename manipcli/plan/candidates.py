@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -60,11 +61,12 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """A candidate, its plan, and the candidates that were refused before it."""
+    """A candidate, its plan, the candidates that were refused before it, and its `index` among all."""
 
     candidate: Candidate
     plan: StepPlan
     dropped: tuple[Dropped, ...] = ()
+    index: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,14 +83,15 @@ class Attempts:
     Args:
         candidates: of the step.
         exclude: grasps, R_WT (3, 3) each; candidates near one of them are skipped.
+        prefer: index of the candidate that is tried before all others.
     """
 
-    def __init__(self, candidates: Candidates, exclude: Iterable[Array] = ()) -> None:
+    def __init__(self, candidates: Candidates, exclude: Iterable[Array] = (), *, prefer: int = 0) -> None:
         self.decides = candidates.decides
         self.excluded = [*exclude]
         self.dropped: list[Dropped] = []
         self._candidates = candidates
-        self._options: Iterator[Candidate] = iter(candidates.options)
+        self._options = _preferring(enumerate(candidates.options), prefer)
 
     def take(self) -> Chosen:
         """The next candidate with a plan.
@@ -96,14 +99,22 @@ class Attempts:
         Raises:
             NotPlannable: no other candidate has one; with the commonest reasons of all refused ones.
         """
-        for candidate in self._options:
+        for index, candidate in self._options:
             if candidate.grasp is not None and any(alike(candidate.grasp, R_WT) for R_WT in self.excluded):
                 continue
             try:
-                return Chosen(candidate, candidate.plan(), tuple(self.dropped))
+                return Chosen(candidate, candidate.plan(), tuple(self.dropped), index)
             except NotPlannable as refusal:
                 self.dropped.append(Dropped(candidate.name, refusal))
         raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
+
+
+def _preferring(options: Iterator[tuple[int, Candidate]], index: int) -> Iterator[tuple[int, Candidate]]:
+    """The same with the option of this index first."""
+    skipped = list(itertools.islice(options, index))
+    yield from itertools.islice(options, 1)
+    yield from skipped
+    yield from options
 
 
 def first(candidates: Candidates, exclude: Iterable[Array] = ()) -> StepPlan:

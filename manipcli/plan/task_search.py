@@ -80,8 +80,14 @@ def search_task(
     return tuple(Solved(node.chosen, tuple(node.attempts.excluded)) for node in nodes if node.chosen is not None)
 
 
-def _search(opens: Opens, count: int, start: PlanningState, on_step: Callable[[int, bool], None]) -> list[Node]:
-    """The first plan of all `count` steps; raises NotPlannable."""
+def _search(
+    opens: Opens,
+    count: int,
+    start: PlanningState,
+    on_step: Callable[[int, bool], None],
+    prefer: Sequence[int] = (),
+) -> list[Node]:
+    """The first plan of all `count` steps; raises NotPlannable. `prefer`: index of the first candidate, by step."""
     done: list[Node] = []
     latest = -1, NotPlannable("there is no step")
     grasps: dict[int, int] = {}
@@ -92,7 +98,7 @@ def _search(opens: Opens, count: int, start: PlanningState, on_step: Callable[[i
         node = resumed
         try:
             if node is None:
-                node = Node(state, Attempts(opens(k, state)))
+                node = Node(state, Attempts(opens(k, state), prefer=prefer[k] if prefer else 0))
             node.chosen = node.attempts.take()
         except NotPlannable as refusal:
             if refusal.loc:
@@ -121,8 +127,9 @@ def _cheapest(
 ) -> list[Node]:
     """The cheapest of a plan and of `most` further ones.
 
-    Each takes the next candidate of one step, in turn from the last to the first, and plans the later steps again. A
-    cheaper plan replaces the present one at once: its later steps then have candidates of their own.
+    Each takes the next candidate of one step, in turn from the last to the first, and plans the later steps again, with
+    the candidates of the present plan first. A cheaper plan replaces the present one at once: its later steps then have
+    candidates of their own.
     """
 
     def total(plan: Sequence[Node]) -> float:
@@ -151,7 +158,8 @@ def _cheapest(
             on_step(first + j, again)
 
         try:
-            tail = [other, *_search(later, len(nodes) - after, chosen.plan.end, on_later)]
+            same = [each.chosen.index for each in nodes[after:] if each.chosen is not None]
+            tail = [other, *_search(later, len(nodes) - after, chosen.plan.end, on_later, same)]
         except NotPlannable:
             continue
         costs = [total([each]) for each in tail]

@@ -16,7 +16,8 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried
 from manipcli.pipeline import run_task
 from manipcli.plan.candidates import Candidate, Candidates, Decision
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.cost import CLEARANCE_WEIGHT, GRASP_WEIGHT, LIMIT_WEIGHT, SINGULARITY_WEIGHT, step_cost
+from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.plan.task_search import MOST, search_task
 from manipcli.run import replan
@@ -192,3 +193,70 @@ def test_the_block_that_was_taken_otherwise_lies_in_the_bin(tmp_path: Path) -> N
     task_of(tmp_path, PICK + LIFT + PLACE + "expect:\n  - inside: {object: block, of: bin}\n")
     report = run_task(tmp_path / "task.yaml", log=tmp_path / "log.mcap", allow_outside=True)
     assert report.verdict.verdict == "passed", report.verdict.text
+
+
+def costly(durations: Sequence[float], decides: Decision = "nothing") -> Candidates:
+    """Candidates whose plans take these times; a negative one has no plan."""
+
+    def plan(duration: float) -> StepPlan:
+        if duration < 0.0:
+            raise NotPlannable("no plan")
+        return StepPlan((Motion("wait", None, None, duration),), PlanningState(np.zeros(1), (), at_start=False))
+
+    return Candidates([Candidate(partial(plan, duration)) for duration in durations], what="no", decides=decides)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_many_further_candidates_find_the_cheapest_plan_and_few_never_a_dearer_one(seed: int) -> None:
+    """Steps whose costs are independent: the cheapest plan is the sum of the least durations."""
+    rng = np.random.default_rng(seed)
+    tables = [np.round(rng.uniform(-2.0, 9.0, int(rng.integers(1, 6))), 3) for _ in range(4)]
+    for table in tables:
+        table[-1] = abs(table[-1])
+    start = PlanningState(np.zeros(1), ())
+
+    def total(optimise: int) -> float:
+        solved = search_task(lambda k, _: costly(tables[k]), len(tables), start, optimise=optimise)
+        return sum(one.chosen.plan.duration for one in solved)
+
+    found = [total(optimise) for optimise in (0, 1, 3, 10, 1000)]
+    assert found == sorted(found, reverse=True)
+    assert found[0] == pytest.approx(sum(next(x for x in table if x >= 0.0) for table in tables))
+    assert found[-1] == pytest.approx(sum(min(x for x in table if x >= 0.0) for table in tables))
+
+
+def test_a_further_candidate_is_followed_by_plans_of_its_own_for_the_later_steps() -> None:
+    """The second step is quick only after the slow candidate of the first; after the third there is no plan at all."""
+
+    def ends(value: float, duration: float) -> Candidate:
+        state = PlanningState(np.array([value]), (), at_start=False)
+        return Candidate(lambda: StepPlan((Motion("wait", None, None, duration),), state))
+
+    def opens(k: int, state: PlanningState) -> Candidates:
+        if k == 0:
+            return Candidates([ends(0.0, 1.0), ends(1.0, 2.0), ends(2.0, 0.1)], what="first")
+        before = float(state.position[0])
+        if before == 2.0:
+            return Candidates([], what="nothing follows")
+        return Candidates([ends(before, 1.0 if before == 1.0 else 5.0)], what="second")
+
+    def durations(optimise: int) -> list[float]:
+        solved = search_task(opens, 2, PlanningState(np.zeros(1), ()), optimise=optimise)
+        return [one.chosen.plan.duration for one in solved]
+
+    assert durations(0) == [1.0, 5.0]
+    assert durations(5) == [2.0, 1.0]
+
+
+def test_a_task_is_planned_cheaper_and_twice_the_same(tmp_path: Path) -> None:
+    plans = [plan_task(task_of(tmp_path, PICK, head=f"plan: {{optimise: {n}}}\n")) for n in (0, 8, 8)]
+    costs = [step_cost(plan.planner, plan.start, plan.steps[0].plan) for plan in plans]
+    assert costs[1].total < costs[0].total
+    ends = [plan.steps[0].plan.end.position for plan in plans]
+    assert np.array_equal(ends[1], ends[2])
+    for cost in costs:
+        assert cost.total >= cost.duration > 0.0
+        assert 0.0 <= cost.clearance <= CLEARANCE_WEIGHT
+        assert 0.0 <= cost.limits <= LIMIT_WEIGHT
+        assert 0.0 <= cost.singularity <= SINGULARITY_WEIGHT
+        assert 0.0 < cost.grasp <= GRASP_WEIGHT
