@@ -35,7 +35,7 @@ Open = Literal["nothing", "spin", "rotation"]
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
 _ITERATIONS = 40  # of one try; fewer than 30 cost more restarts than they save
-_TRIES = 40  # random restarts; after these a pose counts as unreachable
+_TRIES = 40  # random restarts by default; after these a pose counts as unreachable
 _ENOUGH = 3  # solutions, the nearest to the seed is used
 _AT_LIMIT = 1e-6  # rad or m
 _TURNED = math.radians(60.0)  # an orientation missed by more is out of the arm's reach
@@ -105,11 +105,18 @@ class InverseKinematics:
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
         self._open: Open = "nothing"
+        self._tries = _TRIES
 
     def leaving(self, open_: Open) -> InverseKinematics:
         """The same solver for goals that leave this part of the orientation open."""
         other = copy(self)
         other._open = open_
+        return other
+
+    def trying(self, tries: int) -> InverseKinematics:
+        """The same solver with this number of restarts."""
+        other = copy(self)
+        other._tries = tries
         return other
 
     def drawn_in(self, margin: Array) -> InverseKinematics:
@@ -129,19 +136,18 @@ class InverseKinematics:
         rng: np.random.Generator,
         *,
         refuse: Callable[[Array], object | None] | None = None,
-        tries: int | None = None,
     ) -> Array:
         """Joint positions (n) with the tool at `X_WT`, near `seed`.
 
         The first attempt starts from `seed` and is used if it converges. Further attempts start from uniformly random
-        positions inside the limits, until three converge or 40 are made; the nearest (Euclidean) to `seed` is used.
+        positions inside the limits, until three converge or 40 are made (see `trying`); the nearest (Euclidean) to `seed`
+        is used.
 
         Args:
             X_WT: the goal.
             seed: (n) all moving joints.
             rng: draws the restarts.
             refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count.
-            tries: number of restarts; None for 40.
 
         Raises:
             NotPlannable: no attempt converges; names the least error, the distance to the goal and the joints at their
@@ -159,7 +165,7 @@ class InverseKinematics:
         lower = np.where(np.isfinite(self._lower), self._lower, seed[self._columns] - _UNLIMITED)
         upper = np.where(np.isfinite(self._upper), self._upper, seed[self._columns] + _UNLIMITED)
         found: list[Solution] = []
-        for _ in range(_TRIES if tries is None else tries):
+        for _ in range(self._tries):
             start = seed.copy()
             start[self._columns] = rng.uniform(lower, upper)
             attempt = self.track(X_WT, start)
@@ -334,7 +340,7 @@ def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array,
     return np.asarray(step)
 
 
-def _outward(q: Array, step: Array, lower: Array, upper: Array) -> bool:
+def _outward(q: Array, step: npt.NDArray[np.floating], lower: Array, upper: Array) -> bool:
     """Whether a joint at its limit would be pushed further out; for a few joints quicker than with arrays."""
     for x, dx, low, high in zip(q.tolist(), step.tolist(), lower.tolist(), upper.tolist(), strict=True):
         if (dx < 0.0 and x <= low) or (dx > 0.0 and x >= high):

@@ -99,18 +99,14 @@ class MotionBuilder:
             trajectory = self._rest_to_rest(arm, [values[name] for name in arm], speed) if arm else None
         self._add(label, trajectory, self._grip({name: values[name] for name in names if name in hand}))
 
-    def unreachable(
-        self, label: str, X_WT: Transform, *, hand: str, leaving: Open = "nothing", tries: int | None = None
-    ) -> NotPlannable | None:
+    def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
         """Why no free configuration of the arm has the tool at `X_WT` and the hand at its pose `hand`; None if any has.
 
-        Adds no motion: it checks whether the end of a path can be reached, before the path is planned. `tries`:
-        restarts of the inverse kinematics, None for its own number.
+        Adds no motion: it checks whether the end of a path can be reached, before the path is planned.
         """
         try:
             with self._labelled(label):
-                solver = self._planner.solver.leaving(leaving)
-                self._solved(X_WT, self._grip(self._posture(hand)), solver, tries=tries)
+                self._solved(X_WT, self._grip(self._posture(hand)), self._planner.solver)
         except NotPlannable as refusal:
             return refusal
         return None
@@ -125,7 +121,6 @@ class MotionBuilder:
         free: bool = False,
         leaving: Open = "nothing",
         avoid: Sequence[Array] = (),
-        tries: int | None = None,
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
@@ -137,7 +132,7 @@ class MotionBuilder:
         solver = self._planner.solver.leaving(leaving)
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
-            goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid, tries=tries)
+            goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid)
             trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
         self._add(label, trajectory, grip)
 
@@ -315,7 +310,6 @@ class MotionBuilder:
         *,
         free: bool = False,
         avoid: Sequence[Array] = (),
-        tries: int | None = None,
     ) -> Array:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
@@ -333,7 +327,7 @@ class MotionBuilder:
             blocked = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
             return None if blocked is None else f"{planner.in_the_way(blocked)}, on the path there"
 
-        return solver.solve(X_WT, seed, planner.rng, refuse=refuse, tries=tries)
+        return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
     def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
         return self._planner.query(self._now, allowed | self._allowed)

@@ -6,6 +6,7 @@ A step queries the `Planner` about a state, and builds its motions with a `Motio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import combinations
 
 import numpy as np
@@ -102,6 +103,12 @@ class Planner:
                 )
             self._solver = InverseKinematics(self.kinematics, joints, tool.link, X_LT=tool.X_LT)
         return self._solver
+
+    def trying(self, tries: int) -> Planner:
+        """The same planner with fewer restarts of the inverse kinematics, to look at many poses."""
+        other = copy(self)
+        other._solver = self.solver.trying(tries)
+        return other
 
     @property
     def tool_link(self) -> str:

@@ -195,7 +195,7 @@ def test_the_block_that_was_taken_otherwise_lies_in_the_bin(tmp_path: Path) -> N
     assert report.verdict.verdict == "passed", report.verdict.text
 
 
-def costly(durations: Sequence[float], decides: Decision = "nothing") -> Candidates:
+def costly(durations: Sequence[float] | Array, decides: Decision = "nothing") -> Candidates:
     """Candidates whose plans take these times; a negative one has no plan."""
 
     def plan(duration: float) -> StepPlan:

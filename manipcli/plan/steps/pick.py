@@ -136,12 +136,13 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     lines: dict[GraspFrame, tuple[float, float, Array]] = {}
     attempts = 0
     weak: list[Candidate] = []
+    hasty = planner.trying(FEW)
 
-    def attempt(frame: GraspFrame, distance: float, slope: float, tries: int | None, avoid: Array | None) -> StepPlan:
+    def attempt(frame: GraspFrame, distance: float, slope: float, further: bool, avoid: Array | None) -> StepPlan:
         nonlocal attempts
-        builder = MotionBuilder(planner, state)
+        builder = MotionBuilder(hasty if further else planner, state)
         if frame not in out_of_reach:  # checked once: it does not depend on distance and slope
-            out_of_reach[frame] = builder.unreachable("approach", frame.X_WT, hand=spec.open, tries=tries)
+            out_of_reach[frame] = builder.unreachable("approach", frame.X_WT, hand=spec.open)
         refusal = out_of_reach[frame]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
@@ -149,16 +150,19 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or set ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise refusal.but(hint=hint)
-        attempts += tries is not None
+        attempts += further
         before_approach = backed_off(frame.X_WT, distance, slope)
-        others_than = () if avoid is None else (avoid,)
         builder.reach(
-            "reach", before_approach, speed=spec.velocity_scaling, hand=spec.open, avoid=others_than, tries=tries
+            "reach",
+            before_approach,
+            speed=spec.velocity_scaling,
+            hand=spec.open,
+            avoid=() if avoid is None else (avoid,),
         )
         try:
             builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2)
-        except NotPlannable as refusal:
-            if refusal.reason == "line":
+        except NotPlannable as bent:
+            if bent.reason == "line":
                 lines.setdefault(frame, (distance, slope, builder.now.position))
             raise
         builder.close(
@@ -178,12 +182,12 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         return planned
 
     def candidate(
-        frame: GraspFrame, distance: float, slope: float, tries: int | None = None, avoid: Array | None = None
+        frame: GraspFrame, distance: float, slope: float, further: bool = False, avoid: Array | None = None
     ) -> Candidate:
         sloping = f" at a slope of {math.degrees(slope):.0f} deg" if slope else ""
         branch = "" if avoid is None else ", in another configuration of the arm"
         name = f"{frame.name}, approach of {readable(distance, 'm')}{sloping}{branch}"
-        return Candidate(partial(attempt, frame, distance, slope, tries, avoid), name=name, grasp=frame.X_WT.R)
+        return Candidate(partial(attempt, frame, distance, slope, further, avoid), name=name, grasp=frame.X_WT.R)
 
     def touched() -> bool:
         return any(why is None or why.reason == "touches" for why in out_of_reach.values())
@@ -201,18 +205,18 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                 break  # a higher grasp is not nearer
             for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
                 yield candidate(frame, distance, slope)
-        if not touched() and _beyond(planner, state, usual[0].X_WT, spec.open):
+        if not touched() and _beyond(hasty, state, usual[0].X_WT):
             return  # no other orientation is nearer
         overlapping = overlaps(planner, state, spec.object, spec.open)
         for frame in first_fitting(frames.further(), lambda X_WT: not overlapping(X_WT), FURTHER):
             for distance, slope in _brief(spec.approach.distance):
                 if attempts >= ATTEMPTS:
                     break
-                yield candidate(frame, distance, slope, FEW)
+                yield candidate(frame, distance, slope, True)
                 if out_of_reach.get(frame) is not None:
                     break
         for frame, (distance, slope, position) in tuple(lines.items())[:BRANCHES]:
-            yield candidate(frame, distance, slope, FEW, position)
+            yield candidate(frame, distance, slope, True, position)
 
     def explain(refusal: NotPlannable) -> NotPlannable:
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
@@ -229,10 +233,13 @@ def _brief(distance: Range) -> tuple[tuple[float, float], ...]:
     return tuple(dict.fromkeys(((middle, straight), (middle, sloping), (distance[0], straight))))
 
 
-def _beyond(planner: Planner, state: PlanningState, X_WT: Transform, opened: str) -> bool:
+def _beyond(planner: Planner, state: PlanningState, X_WT: Transform) -> bool:
     """Whether no orientation of the tool reaches the point of a frame."""
-    refusal = MotionBuilder(planner, state).unreachable("approach", X_WT, hand=opened, leaving="rotation", tries=FEW)
-    return refusal is not None and refusal.reason != "touches"
+    try:
+        planner.solver.leaving("rotation").solve(X_WT, state.position, planner.rng)
+    except NotPlannable:
+        return True
+    return False
 
 
 def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
