@@ -68,6 +68,8 @@ def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
     X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
+    poured = frozenset((name, spec.into) for name in planner.contents(state, spec.object))
+
     def attempt(candidate: tuple[float, float, float]) -> StepPlan:
         clearance, yaw, sense = candidate
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
@@ -76,7 +78,7 @@ def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
         lip = mouth + clearance * UP
         R_tilt = matrix_from_axis_angle(a, theta)
         p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
-        builder = MotionBuilder(planner, state)
+        builder = MotionBuilder(planner, state, allowed=poured)
         builder.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
         builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
         builder.dwell("dwell", spec.dwell)
