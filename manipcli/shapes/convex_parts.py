@@ -27,7 +27,7 @@ from manipcli.shapes.primitives import ConvexPart
 Faces = npt.NDArray[np.int64]
 
 SOLID: Final = 0.9
-"""A closed mesh that fills at least this share of its convex hull counts as the hull by default."""
+"""A mesh that fills at least this share of its convex hull counts as the hull by default."""
 CONVEX: Final = 0.99
 """A separate part that fills at least this share of its hull is not decomposed."""
 MOST_PARTS: Final = 128
@@ -40,9 +40,11 @@ HULL_HINT: Final = "install it: pip install 'manipcli[coacd]'; or use the convex
 
 
 def concave(path: Path) -> bool:
-    """Whether a mesh is not a closed surface that fills its convex hull by the share `SOLID`.
+    """Whether a mesh fills less than the share `SOLID` of its convex hull.
 
-    False for a file that cannot be used as a mesh, which has no parts either.
+    Small holes of a scanned surface count for little: what is behind a hole, seen from the middle, counts as empty. An
+    open box fills 5/6, half a sphere without a lid 13/16. False for a file that cannot be used as a mesh, which has no
+    parts either.
     """
     try:
         return _concave(read_mesh(path))
@@ -55,7 +57,7 @@ def _concave(mesh: TriangleMesh) -> bool:
     """Cached, like `_parts`."""
     points, faces = _welded(mesh)
     hull = _hull(points)
-    return hull is not None and not (_closed(faces) and _volume(points, faces) >= SOLID * hull[2])
+    return hull is not None and abs(_volume(points, faces, hull[0].mean(axis=0))) < SOLID * hull[2]
 
 
 def convex_parts(path: Path) -> tuple[ConvexPart, ...]:
@@ -207,9 +209,9 @@ def _closed(faces: Faces) -> bool:
     return bool(np.array_equal(forward, backward)) and not bool((forward[1:] == forward[:-1]).all(axis=1).any())
 
 
-def _volume(points: Array, faces: Faces) -> float:
-    """Signed volume of a closed surface, by the divergence theorem."""
-    a, b, c = (points[faces[:, k]] - points[0] for k in range(3))
+def _volume(points: Array, faces: Faces, about: Array | None = None) -> float:
+    """Signed volume between the triangles and a point, by default any: a closed surface encloses the same from all."""
+    a, b, c = (points[faces[:, k]] - (points[0] if about is None else about) for k in range(3))
     return float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
 
 

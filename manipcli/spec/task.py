@@ -72,7 +72,7 @@ MeshCollision = Literal["hull", "parts"]
 """The shape for contact of a mesh: its convex hull, or convex parts of it."""
 _COLLISION: Final = (
     "Shape of a mesh for contact: `hull`, its convex hull; `parts`, its convex parts, so that a bowl is hollow (needs "
-    "`manipcli[coacd]`). Default: `hull` for a closed mesh that fills at least 90 % of its hull, else `parts`."
+    "`manipcli[coacd]`). Default: `hull` for a mesh that fills at least 90 % of its hull, else `parts`."
 )
 
 

@@ -106,11 +106,13 @@ def test_a_solid_is_not_concave_also_inside_out(tmp_path: Path, mirrored: bool) 
     assert surface(part).volume == pytest.approx(abs(ball.volume), rel=1e-4)
 
 
-def test_a_mesh_with_a_hole_counts_as_concave(tmp_path: Path) -> None:
-    box = trimesh.creation.box((1.0, 1.0, 1.0))
-    box.update_faces(np.arange(len(box.faces)) > 0)
+@pytest.mark.parametrize(("missing", "found"), [(0, False), (1, False), (2, True)])
+def test_an_open_box_is_concave_and_one_with_a_hole_is_not(tmp_path: Path, missing: int, found: bool) -> None:
+    box = trimesh.creation.box((1.0, 2.0, 3.0))
+    top = np.flatnonzero(box.face_normals[:, 2] > 0.5)[:missing]  # each triangle hides 1/12 of the box
+    box.update_faces(~np.isin(np.arange(len(box.faces)), top))
     box.export(tmp_path / "open.stl")
-    assert concave(tmp_path / "open.stl")
+    assert concave(tmp_path / "open.stl") == found
 
 
 def test_a_bowl_is_hollow_and_its_wall_is_not(tmp_path: Path, cache: Path) -> None:
