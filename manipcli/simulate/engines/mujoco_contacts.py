@@ -98,7 +98,9 @@ class Contacts:
                 points[names].append(point)
                 if distance < depths[names]:
                     depths[names] = distance
-        self._geoms, self._pairs = geoms.tobytes(), frozenset(points)
+        # A pair without force gets one without any change of the geoms: then `changed` compares the pairs.
+        self._geoms = geoms.tobytes() if contact.efc_address.min() >= 0 else b""
+        self._pairs = frozenset(points)
         self._knock = KNOCK * greatest + KNOCK_LEAST
         contacts = [
             Contact(a, b, sum([point.force for point in between]), depths[a, b], tuple(between))
