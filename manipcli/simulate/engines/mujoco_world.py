@@ -31,7 +31,7 @@ MIN_INERTIA: Final = 1e-12
 
 
 class ContactLaw(NamedTuple):
-    """How contacts give way: time constant [s], and the depth [m] at which they reach their full impedance."""
+    """Compliance of contacts: time constant [s], and the depth [m] at which they reach their full impedance."""
 
     time: float
     depth: float
