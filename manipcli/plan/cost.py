@@ -12,16 +12,16 @@ take that avoids it. Motions are sampled at `SAMPLES` points.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.model.clearance import least_distance
 from manipcli.model.configuration import position_limits, with_mimics
 from manipcli.plan.grasp_margin import grasp_margin
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.motion import Motion, StepPlan
 from manipcli.plan.planner import Planner
 
 CLEARANCE_WEIGHT: Final = 1.0
@@ -60,14 +60,17 @@ class StepCost:
         return self.duration + self.clearance + self.limits + self.singularity + self.grasp
 
 
-def step_cost(planner: Planner, start: PlanningState, plan: StepPlan) -> StepCost:
-    """The cost of the plan of a step that begins in `start`."""
+def step_cost(planner: Planner, plan: StepPlan) -> StepCost:
+    """The cost of the plan of a step."""
     near, limit, singular = ROOM, LIMIT_ROOM, SINGULAR
-    for state, label, positions in _sampled(planner, start, plan):
+    for motion in plan.motions:
+        positions = _sampled(planner, motion)
+        if not positions:
+            continue
         limit = min(limit, _to_limit(planner, positions))
         singular = min(singular, *(planner.solver.manipulability(q) for q in positions))
-        if label in FREE:
-            near = min(near, _clearance(planner, state, positions))
+        if motion.label in FREE:
+            near = min(near, _clearance(planner, motion, positions))
     margin = grasp_margin(planner, plan)
     return StepCost(
         duration=plan.duration,
@@ -78,43 +81,25 @@ def step_cost(planner: Planner, start: PlanningState, plan: StepPlan) -> StepCos
     )
 
 
-def _sampled(
-    planner: Planner, start: PlanningState, plan: StepPlan
-) -> Iterator[tuple[PlanningState, str, list[Array]]]:
-    """(state, label, (n) positions) of each motion of the arm; the state has what the hand carries meanwhile."""
-    state, q = start, np.array(start.position)
-    for motion in plan.motions:
-        if motion.trajectory is not None:
-            chosen = np.unique(np.linspace(0, len(motion.trajectory.times) - 1, SAMPLES).round().astype(int))
-            columns = planner.robot.indices(motion.trajectory.names)
-            positions = []
-            for row in motion.trajectory.positions[chosen]:
-                q[columns] = row
-                positions.append(np.array(with_mimics(planner.robot, q)))
-            yield state, motion.label, positions
-        if motion.grip is not None:
-            q[planner.robot.indices(motion.grip.joints)] = motion.grip.target
-            q = np.array(with_mimics(planner.robot, q))
-            if motion.grip.force is not None or motion.label == "open":
-                state = replace(state, carried=plan.end.carried, bodies=plan.end.bodies)
+def _sampled(planner: Planner, motion: Motion) -> list[Array]:
+    """(n) positions of all joints in a motion of the arm; empty for any other motion."""
+    if motion.trajectory is None or motion.begins is None:
+        return []
+    chosen = np.unique(np.linspace(0, len(motion.trajectory.times) - 1, SAMPLES).round().astype(int))
+    columns = planner.robot.indices(motion.trajectory.names)
+    positions = []
+    for row in motion.trajectory.positions[chosen]:
+        q = np.array(motion.begins.position)
+        q[columns] = row
+        positions.append(np.array(with_mimics(planner.robot, q)))
+    return positions
 
 
-def _clearance(planner: Planner, state: PlanningState, positions: list[Array]) -> float:
-    """[m] Least distance of the robot, and of what it holds, from everything it must not touch; at most `ROOM`."""
-    allowed = frozenset() if state.carried is None else planner.hand_contacts(state.carried.body)
-    gone = () if state.carried is None else planner.contents(state, state.carried.body)
-    query = planner.checker.at(state.bodies, carried=state.carried, ignore=allowed, margin=ROOM, absent=gone)
-    at_first = {(hit.a, hit.b): hit.distance for hit in query.every(positions[0])}
-    # Parts that are near each other by construction, such as neighbouring links, say nothing: only what comes nearer.
-    return min(
-        (
-            hit.distance
-            for q in positions[1:]
-            for hit in query.every(q)
-            if hit.distance < at_first.get((hit.a, hit.b), np.inf) - 1e-6
-        ),
-        default=ROOM,
-    )
+def _clearance(planner: Planner, motion: Motion, positions: list[Array]) -> float:
+    """[m] Least distance of the robot, and of what it holds, from everything it must not touch."""
+    assert motion.begins is not None  # of a motion with positions
+    found = least_distance(planner.query(motion.begins, motion.allowed), np.array(positions))
+    return ROOM if found is None else found[1].distance
 
 
 def _to_limit(planner: Planner, positions: list[Array]) -> float:

@@ -59,7 +59,7 @@ def search_task(
     *,
     on_step: Callable[[int, bool], None] = lambda *_: None,
     optimise: int = 0,
-    cost: Callable[[PlanningState, StepPlan], float] = lambda _, plan: plan.duration,
+    cost: Callable[[StepPlan], float] = lambda plan: plan.duration,
 ) -> tuple[Solved, ...]:
     """The first plan of all `count` steps, or the cheapest of it and `optimise` further ones.
 
@@ -69,7 +69,7 @@ def search_task(
         start: the state before the first.
         on_step: called before a step is planned, with its index and whether it takes another candidate.
         optimise: number of further candidates to compare.
-        cost: of the plan of a step from a state.
+        cost: of the plan of a step.
 
     Raises:
         NotPlannable: there is none; the refusal of the latest step that was reached.
@@ -123,7 +123,7 @@ def _cheapest(
     nodes: list[Node],
     on_step: Callable[[int, bool], None],
     most: int,
-    cost: Callable[[PlanningState, StepPlan], float],
+    cost: Callable[[StepPlan], float],
 ) -> list[Node]:
     """The cheapest of a plan and of `most` further ones.
 
@@ -133,7 +133,7 @@ def _cheapest(
     """
 
     def total(plan: Sequence[Node]) -> float:
-        return sum(cost(node.start, node.chosen.plan) for node in plan if node.chosen is not None)
+        return sum(cost(node.chosen.plan) for node in plan if node.chosen is not None)
 
     spent = [total([node]) for node in nodes]
     left = set(range(len(nodes)))

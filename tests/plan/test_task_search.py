@@ -250,7 +250,7 @@ def test_a_further_candidate_is_followed_by_plans_of_its_own_for_the_later_steps
 
 def test_a_task_is_planned_cheaper_and_twice_the_same(tmp_path: Path) -> None:
     plans = [plan_task(task_of(tmp_path, PICK, head=f"plan: {{optimise: {n}}}\n")) for n in (0, 8, 8)]
-    costs = [step_cost(plan.planner, plan.start, plan.steps[0].plan) for plan in plans]
+    costs = [step_cost(plan.planner, plan.steps[0].plan) for plan in plans]
     assert costs[1].total < costs[0].total
     ends = [plan.steps[0].plan.end.position for plan in plans]
     assert np.array_equal(ends[1], ends[2])
