@@ -114,7 +114,7 @@ class InverseKinematics:
         return other
 
     def trying(self, tries: int) -> InverseKinematics:
-        """The same solver with this number of restarts."""
+        """The same solver with this number of restarts instead of 40."""
         other = copy(self)
         other._tries = tries
         return other
@@ -140,8 +140,7 @@ class InverseKinematics:
         """Joint positions (n) with the tool at `X_WT`, near `seed`.
 
         The first attempt starts from `seed` and is used if it converges. Further attempts start from uniformly random
-        positions inside the limits, until three converge or 40 are made (see `trying`); the nearest (Euclidean) to `seed`
-        is used.
+        positions inside the limits, until three converge or 40 are made; the nearest (Euclidean) to `seed` is used.
 
         Args:
             X_WT: the goal.
