@@ -11,6 +11,7 @@ A free edge keeps the margin m at the checked configurations, and m - s between 
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from typing import Final
 
@@ -27,6 +28,8 @@ LEVELS: Final = 0.0, 0.01, 0.04, 0.16
 """[m] Distances beyond the margin at which a check may be made, for the part that moves most."""
 _SEGMENTS: Final = 4.0  # per radian of all joints together: the bound is then about a third above the motion
 _MOST: Final = 48  # segments
+_FIRST: Final = 0.5, 0.25, 0.75  # shares of an edge that are checked before its bounds are computed
+_SHORT: Final = 0.2  # rad or m, of all joints together: below, they are not
 
 
 class EdgeCheck:
@@ -36,6 +39,7 @@ class EdgeCheck:
         self._query = query
         self._inflated = query.inflated(LEVELS)
         self._slack = max(LEAST, SLACK * query.margin)
+        self._covered = self._slack + np.array(LEVELS)[:, None, None] * self._inflated.weights
         self.blocked: Array | None = None
         """(n) the configuration in collision that the last check found."""
 
@@ -45,21 +49,32 @@ class EdgeCheck:
 
     def free(self, a: Array, b: Array) -> bool:
         """Whether the line between two free configurations (n) is free."""
-        count = int(min(_MOST, np.ceil(_SEGMENTS * float(np.abs(b - a).sum()))))
-        if count == 0:
+        total = float(np.abs(b - a).sum())
+        if total == 0.0:
             return True
-        return self.free_polyline(a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)) is None
+        if total > _SHORT:
+            for share in _FIRST:
+                q = a + share * (b - a)
+                if self._inflated.touches(q, 0):
+                    self.blocked = q
+                    return False
+        segments = min(_MOST, math.ceil(_SEGMENTS * total))
+        moved = self._inflated.bound.along(a, b, segments)
+        return self._uncovered(a + np.linspace(0.0, 1.0, segments + 1)[:, None] * (b - a), moved) is None
 
     def free_polyline(self, points: Array) -> float | None:
         """None where a polyline (k, n) between two free configurations is free.
 
         Else where it is blocked: the index of a point, and the share of the segment behind it.
         """
-        inflated = self._inflated
-        # Row c of `covered`: the motion along the polyline in units of what one check at level c covers.
-        moved = inflated.bound.lengths(points) @ inflated.summed
-        rates = [np.max(moved / (self._slack + c * inflated.weights), axis=1) for c in LEVELS]
-        lines = [np.concatenate(([0.0], np.cumsum(rate))).tolist() for rate in rates]
+        return self._uncovered(points, self._inflated.bound.lengths(points))
+
+    def _uncovered(self, points: Array, lengths: Array) -> float | None:
+        """See `free_polyline`; `lengths` (k - 1, movers) are bounds of the motion on each segment."""
+        moved = lengths @ self._inflated.summed
+        # Along the polyline at every level: the motion in units of what one check at that level covers.
+        rates = np.max(moved / self._covered, axis=2, initial=0.0)
+        lines = np.concatenate((np.zeros((len(LEVELS), 1)), np.cumsum(rates, axis=1)), axis=1).tolist()
         last = len(points) - 1
 
         def at(x: float) -> Array:

@@ -58,16 +58,29 @@ class MotionBound:
         for k in range(n):
             self._above[k] = self._above[self._before[k]] if self._before[k] >= 0 else False
             self._above[k, k] = True
-        self._joint = np.array([mover.joint - 1 for mover in movers], dtype=np.intp)
-        self._centre = np.array([mover.centre for mover in movers]).reshape(-1, 3)
+        # Several movers are the same ball, seen from different links.
+        balls: dict[tuple[int, bytes], int] = {}
+        self._ball = np.array(
+            [balls.setdefault((m.joint - 1, m.centre.tobytes()), len(balls)) for m in movers], dtype=np.intp
+        )
+        self._joint = np.array([joint for joint, _ in balls], dtype=np.intp)
+        self._centre = np.array([np.frombuffer(centre) for _, centre in balls]).reshape(-1, 3, 1)
         self._radius = np.array([mover.radius for mover in movers])
         seen = [self._above[m.seen_from - 1] if m.seen_from else np.zeros(n, dtype=bool) for m in movers]
-        own = self._above[self._joint] if len(movers) else np.zeros((0, n), dtype=bool)
-        self._between = (own & ~np.array(seen).reshape(-1, n)).astype(np.float64)  # (P, n)
+        own = self._above[[mover.joint - 1 for mover in movers]] if len(movers) else np.zeros((0, n), dtype=bool)
+        self._between = (own & ~np.array(seen, dtype=bool).reshape(-1, n)).astype(np.float64)  # (P, n)
         self.reach = self._between * np.array([self._reach(mover) for mover in movers]).reshape(-1, n)
         """(P, n) the largest distance [m] of each mover from each axis that moves it; 1 for a prismatic joint."""
         bends = [self._second(row, between) for row, between in zip(self.reach, self._between, strict=True)]
         self._bend = np.array(bends).reshape(-1, n, n)
+
+    def along(self, a: Array, b: Array, segments: int) -> Array:
+        """`lengths` of the straight line from a to b (n), cut into equal segments: (segments, P)."""
+        dq = (b - a) / segments
+        size = np.abs(dq)
+        middle = a + (np.arange(segments) + 0.5)[:, None] * dq
+        speed = self._speed(middle, dq)
+        return np.asarray(np.minimum(speed + 0.5 * ((size @ self._bend) @ size), self.reach @ size))
 
     def lengths(self, points: Array) -> Array:
         """(k - 1, P) no point of a mover moves further [m] on each segment of the polyline `points` (k, n).
@@ -75,22 +88,24 @@ class MotionBound:
         On a part of a segment it moves at most that share of it.
         """
         dq = np.diff(points, axis=0)
-        middle = points[:-1] + 0.5 * dq
-        R, p = self._forward(middle)
-        k, n = dq.shape
-        z = (R @ self._axes[:, :, None])[..., 0]
-        twist = np.zeros((k, n, 6))  # velocity at the world's origin, angular velocity
-        twist[:, :, :3] = np.where(self._revolute[:, None], _cross(p, z), z)
-        twist[:, :, 3:] = np.where(self._revolute[:, None], z, 0.0)
-        twist *= dq[:, :, None]
-        moved = np.matmul(self._between, twist)  # (k, P, 6)
-        v, w = moved[..., :3], moved[..., 3:]
-        c = (R[:, self._joint] @ self._centre[:, :, None])[..., 0] + p[:, self._joint]
-        at_c = v + _cross(w, c)
-        speed = np.sqrt(np.einsum("kpi,kpi->kp", at_c, at_c)) + self._radius * np.sqrt(np.einsum("kpi,kpi->kp", w, w))
         size = np.abs(dq)
         bend = np.einsum("pki,ki->kp", size @ self._bend, size)
-        return np.asarray(np.minimum(speed + 0.5 * bend, size @ self.reach.T))
+        return np.asarray(np.minimum(self._speed(points[:-1] + 0.5 * dq, dq) + 0.5 * bend, size @ self.reach.T))
+
+    def _speed(self, q: Array, dq: Array) -> Array:
+        """(k, P) |v_c| + |w| r at configurations q (k, n) for joint velocities dq (n) or (k, n)."""
+        R, p = self._forward(q)
+        z = (R @ self._axes[:, :, None])[..., 0] * dq[..., None]
+        if self._revolute.all():
+            v, w = _cross(p, z), z
+        else:
+            v = np.where(self._revolute[:, None], _cross(p, z), z)
+            w = np.where(self._revolute[:, None], z, 0.0)
+        v, w = self._between @ v, self._between @ w  # of the world's origin: (k, P, 3) each
+        centres = ((R[:, self._joint] @ self._centre)[..., 0] + p[:, self._joint])[:, self._ball]
+        at_c = v + _cross(w, centres)
+        speed = np.sqrt(np.einsum("kpi,kpi->kp", at_c, at_c))
+        return np.asarray(speed + self._radius * np.sqrt(np.einsum("kpi,kpi->kp", w, w)))
 
     def _forward(self, q: Array) -> tuple[Array, Array]:
         """Rotations (k, n, 3, 3) and positions (k, n, 3) of the joints' frames in the world at `q` (k, n)."""

@@ -16,6 +16,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
+from manipcli.plan.free_motion import around, branches
 from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
@@ -26,7 +27,7 @@ from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.sweep import grip_time, refuse_collision
+from manipcli.plan.sweep import blocked, first_hit, grip_time, refuse_collision, swept
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
 
@@ -76,8 +77,11 @@ class MotionBuilder:
         empty = replace(self._now, carried=None, closed=False)
         return empty if grip is None else empty.moved(self._with(grip.joints, grip.target))
 
-    def joints(self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0) -> None:
-        """Move straight in joint space; joints of the hand are moved by their own controller at the same time.
+    def joints(
+        self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0, free: bool = True
+    ) -> None:
+        """Move straight in joint space, or with `free` around obstacles; joints of the hand are moved by their own
+        controller at the same time.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.
@@ -93,9 +97,11 @@ class MotionBuilder:
                 f"joint '{named}' belongs to the hand, which {what}",
                 hint=f"open the hand with `release`{'' if carried is None else ' or `place`'}",
             )
-        with self._labelled(label):
-            trajectory = self._rest_to_rest(arm, [values[name] for name in arm], speed) if arm else None
-        self._add(label, trajectory, self._grip({name: values[name] for name in names if name in hand}))
+        grip = self._grip({name: values[name] for name in names if name in hand})
+        if arm:
+            self._free(label, arm, [values[name] for name in arm], speed, grip, searched=free)
+        else:
+            self._add(label, None, grip)
 
     def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
         """Why no free configuration of the arm has the tool at `X_WT` and the hand at its pose `hand`; None if any has.
@@ -117,12 +123,14 @@ class MotionBuilder:
         speed: float = 1.0,
         hand: str | None = None,
         free: bool = False,
+        searched: bool = True,
         leaving: Open = "nothing",
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
         Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
-        path is. Part of the orientation may be left open.
+        path is. Part of the orientation may be left open. Where no straight path is free, one is searched to any
+        configuration, unless the arm must take the nearest (`searched`).
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
@@ -130,8 +138,23 @@ class MotionBuilder:
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free)
-            trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
-        self._add(label, trajectory, grip)
+        self._free(label, solver.joints, goal[list(solver.columns)], speed, grip, X_WT, solver, searched=searched)
+
+    def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
+        """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
+
+        What holds contents is only moved on the line, which keeps it upright.
+        """
+        planner, carried = self._planner, self._now.carried
+        try:
+            self.straight(label, X_WT, speed=speed)
+        except NotPlannable as refusal:
+            if carried is None or planner.contents(self._now, carried.body) or planner.searching() is None:
+                raise
+            try:
+                self.reach(label, X_WT, speed=speed)
+            except NotPlannable as other:
+                raise (other if other.reason == "in_the_way" else refusal) from None
 
     def straight(
         self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
@@ -311,8 +334,10 @@ class MotionBuilder:
                 return None if hit is None else planner.in_the_way(hit)
             count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
             share = np.linspace(0.0, 1.0, count + 1)
-            blocked = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
-            return None if blocked is None else f"{planner.in_the_way(blocked)}, on the path there"
+            hit = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
+            if hit is None or planner.searching() is not None:
+                return None
+            return f"{planner.in_the_way(hit)}, on the path there"
 
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
@@ -332,6 +357,36 @@ class MotionBuilder:
         trajectory = rest_to_rest(start, target, limits, period=self._planner.period)
         verify(trajectory, limits)
         return trajectory
+
+    def _free(
+        self,
+        label: str,
+        names: Sequence[str],
+        target: npt.ArrayLike,
+        speed: float,
+        grip: Grip | None,
+        X_WT: Transform | None = None,
+        solver: InverseKinematics | None = None,
+        *,
+        searched: bool,
+    ) -> None:
+        """Add a motion straight to `target`; else, if `searched`, around obstacles to it or to another branch."""
+        planner, query, limits = self._planner, self._query(), self._limits(names, speed)
+        with self._labelled(label):
+            trajectory = self._rest_to_rest(names, target, speed)
+        hit = first_hit(planner, self._now, query, trajectory, grip)
+        if hit is not None:
+            refusal = blocked(planner, self._now, hit, label, move=self._verb == "move")
+            end = swept(planner, self._now, trajectory, grip)[1][-1]
+            search = planner.searching() if searched and hit.time > 0.0 and not query.touches(end) else None
+            if search is None:
+                raise refusal
+            goals = np.asarray(target, dtype=np.float64)[None]
+            if X_WT is not None and solver is not None:
+                goals = branches(solver, X_WT, end, search.rng, query=query, limits=limits)
+            with self._labelled(label):
+                trajectory = around(planner, search, self._now, query, goals, limits, grip)
+        self._add(label, trajectory, grip)
 
     def _straight(
         self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"

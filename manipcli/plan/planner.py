@@ -5,7 +5,7 @@ A step queries the `Planner` about a state, and builds its motions with a `Motio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -18,10 +18,13 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.motion import PlanningState
+from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
+from manipcli.plan.path_search import PathSearch
 from manipcli.scene.scene import Interior, Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.shapes.primitives import Cylinder
+from manipcli.spec.planner import PlannerSpec
 
 Pairs = frozenset[Pair]
 """Pairs of parts that may touch; a part is a body, or `robot/<link>`."""
@@ -32,7 +35,7 @@ CLEARANCE = 0.004
 TOUCHING = 0.0045
 """[m] Bodies nearer than this count as touching: what a held object may leave or approach. It is above the clearance,
 so that every body within the clearance is exempt."""
-NO_WAY_AROUND = "first `move` to a pose from which the path is free (no path around obstacles is searched)"
+NO_WAY_AROUND = "first `move` to a pose from which the path is free"
 """The hint for a motion that is in collision."""
 PUT_APART = "move them apart: set `start: POSE` in the task, or `mount` in the robot file to move its base"
 """The hint for a robot that is too near to something before it moves."""
@@ -57,6 +60,7 @@ class Planner:
         rng: np.random.Generator,
         gripper_joints: tuple[str, ...],
         gripper_speed: float,
+        paths: PlannerSpec | None = None,
     ) -> None:
         """
         Args:
@@ -65,6 +69,7 @@ class Planner:
             rng: draws the restarts of the inverse kinematics.
             gripper_joints: joints that a gripper controller moves; all others follow trajectories.
             gripper_speed: of the hand's references [rad/s or m/s].
+            paths: settings of the search for paths around obstacles; None: the defaults.
         """
         self.robot = robot
         self.scene = scene
@@ -80,6 +85,32 @@ class Planner:
         self.checker = CollisionChecker(self.kinematics, scene, ignore=ignore)
         self._solver: InverseKinematics | None = None
         self._queries: dict[tuple[object, ...], CollisionQuery] = {}
+        self._paths = RrtConnectSpec() if paths is None else paths
+        self._search: PathSearch | None = None
+        self._obstructed = False
+
+    def straight_first(self, plan: Callable[[], StepPlan]) -> StepPlan:
+        """The plan of a step with straight paths only; where a free motion is obstructed, with searched paths.
+
+        Raises:
+            NotPlannable: neither has a plan; the refusal of the latter if it was tried.
+        """
+        self._obstructed = False
+        try:
+            return plan()
+        except NotPlannable:
+            if not (self._obstructed and self._paths.samples):
+                raise
+        self._search = PathSearch.of(self._paths, self.rng)
+        try:
+            return plan()
+        finally:
+            self._search = None
+
+    def searching(self) -> PathSearch | None:
+        """The search for a motion that is not free on its straight path; None while only those are tried."""
+        self._obstructed = True
+        return self._search
 
     @property
     def solver(self) -> InverseKinematics:

@@ -137,8 +137,9 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
         if state.at_start:
             planner.outside(state)
         if grasps and member.alternative is not None:
-            return member.alternative(step.body, planner, state, grasps)
-        return member.plan(step.body, planner, state)
+            alternative = member.alternative
+            return planner.straight_first(lambda: alternative(step.body, planner, state, grasps))
+        return planner.straight_first(lambda: member.plan(step.body, planner, state))
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
 
@@ -190,4 +191,5 @@ def _planner(task: Task) -> Planner:
         rng=np.random.default_rng(task.spec.simulation.seed),
         gripper_joints=Claims.of(task.controllers).hand,
         gripper_speed=min(speeds, default=SPEED),
+        paths=task.spec.planner,
     )

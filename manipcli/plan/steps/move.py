@@ -74,8 +74,8 @@ class MoveSpec(Model):
     path: Literal["free", "joint", "linear"] = Field(
         "free",
         description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
-        "configuration. `free`: the same, or to another configuration if the path to the nearest one is not free. "
-        "Default `free`.",
+        "configuration. `free`: the same; if that is not free, straight to another configuration, else around "
+        "obstacles. Default `free`.",
     )
     velocity_scaling: VelocityScaling = 1.0
     touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
@@ -122,16 +122,21 @@ def plan(spec: MoveSpec, planner: Planner, state: PlanningState) -> StepPlan:
         values = dict(zip(pose.joints, pose.positions, strict=True))
         arm = {name: value for name, value in values.items() if name not in planner.gripper_joints}
         chosen = arm if state.closed and arm else values
-        builder.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling)
+        builder.joints(
+            "move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling, free=spec.path == "free"
+        )
     elif spec.to is not None:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
-        builder.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling)
+        builder.joints(
+            "move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling, free=spec.path == "free"
+        )
     else:
         X_WT, leaving = _goal(spec, planner, state)
         if spec.path == "linear":
             builder.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
         else:
-            builder.reach("move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving)
+            free = spec.path == "free"
+            builder.reach("move", X_WT, speed=spec.velocity_scaling, free=free, searched=free, leaving=leaving)
     planned = builder.plan()
     (motion,) = planned.motions
     end = planned.end
