@@ -217,7 +217,7 @@ class CollisionQuery:
         """The same query with larger margins [m]; see `InflatedQuery`."""
         key = tuple(levels)
         if key not in self._inflated:
-            self._inflated[key] = InflatedQuery(self._kinematics, self._geometry, self._parts, self.margin, key)
+            self._inflated[key] = InflatedQuery(self, key)
         return self._inflated[key]
 
     def check_trajectory(
@@ -246,7 +246,8 @@ class CollisionQuery:
 
 
 class InflatedQuery:
-    """A query with several margins: at level c every pair has its margin, plus `levels[c]` times the pair's weight.
+    """A query with several margins: at level c every pair has its margin, plus `levels[c]` times the pair's weight; the
+    first of the levels is 0.
 
     The weight is the pair's motion for equal speeds of all joints, relative to the pair that moves most.
 
@@ -259,34 +260,39 @@ class InflatedQuery:
 
     def __init__(
         self,
-        kinematics: Kinematics,
-        geometry: pin.GeometryModel,
-        parts: Sequence[_Part],
-        margin: float,
+        query: CollisionQuery,
         levels: Sequence[float],
     ) -> None:
-        import pinocchio as pin
-
-        self._pin, self._kinematics, self._geometry = pin, kinematics, geometry
+        self._query = query
+        self._pin, self._kinematics, self._geometry = query._pin, query._kinematics, query._geometry
+        parts, kinematics, geometry = query._parts, query._kinematics, query._geometry
         self._data = kinematics.model.createData()
+        moves = _moves(kinematics.model)
         movers: dict[tuple[int, int], int] = {}
         columns: dict[tuple[int, ...], int] = {}
         self._column: list[int] = []  # of every pair
         for pair in geometry.collisionPairs:
-            ends = ((pair.first, parts[pair.second].joint), (pair.second, parts[pair.first].joint))
-            rows = [movers.setdefault(end, len(movers)) for end in ends if _moves(kinematics.model, parts, *end)]
+            i, j = pair.first, pair.second
+            a, b = parts[i].joint, parts[j].joint
+            rows = []
+            if moves[a][b]:
+                rows.append(movers.setdefault((i, b), len(movers)))
+            if moves[b][a]:
+                rows.append(movers.setdefault((j, a), len(movers)))
             self._column.append(columns.setdefault(tuple(rows), len(columns)))
         self.bound = MotionBound(kinematics, [_mover(parts[k], seen_from) for k, seen_from in movers])
         self.summed = np.zeros((len(movers), len(columns)))
-        for rows, column in columns.items():
-            self.summed[list(rows), column] = 1.0
+        for key, column in columns.items():
+            self.summed[list(key), column] = 1.0
         reach = self.bound.reach.sum(axis=1) @ self.summed
         self.weights = np.maximum(reach / max(1e-9, float(reach.max(initial=0.0))), _LIGHTEST)
-        self._margins = [margin + c * self.weights for c in levels]
+        self._margins = [query.margin + c * self.weights for c in levels]
         self._levels: list[tuple[pin.GeometryData, object] | None] = [None] * len(levels)
 
     def touches(self, q: Array, level: int) -> bool:
         """Whether any parts are closer than their margin of this level."""
+        if level == 0:
+            return self._query.touches(q)
         made = self._levels[level]
         if made is None:
             made = self._levels[level] = self._make(self._margins[level])
@@ -312,12 +318,12 @@ class _Part:
     shape: CollisionGeometry
 
 
-def _moves(model: pin.Model, parts: Sequence[_Part], part: int, seen_from: int) -> bool:
-    """Whether a joint moves a part relative to what is fixed to the joint `seen_from` (0: the world)."""
-    joint, other = parts[part].joint, seen_from
-    while other > joint:
-        other = model.parents[other]
-    return bool(joint != other)
+def _moves(model: pin.Model) -> list[list[bool]]:
+    """[a][b]: whether some joint moves what is fixed to joint a relative to what is fixed to b (0: the world)."""
+    chains: list[set[int]] = [set()]
+    for k in range(1, model.njoints):
+        chains.append({*chains[model.parents[k]], k})
+    return [[not a <= b for b in chains] for a in chains]
 
 
 def _mover(part: _Part, seen_from: int) -> Mover:

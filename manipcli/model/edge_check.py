@@ -29,6 +29,7 @@ LEVELS: Final = 0.0, 0.01, 0.04, 0.16
 _SEGMENTS: Final = 4.0  # per radian of all joints together: the bound is then about a third above the motion
 _MOST: Final = 48  # segments
 _FIRST: Final = 0.5, 0.25, 0.75  # shares of an edge that are checked before its bounds are computed
+_CHORD: Final = 0.1  # of the slack: how far points of a polyline may be off its simplification
 _SHORT: Final = 0.2  # rad or m, of all joints together: below, they are not
 
 
@@ -39,7 +40,7 @@ class EdgeCheck:
         self._query = query
         self._inflated = query.inflated(LEVELS)
         self._slack = max(LEAST, SLACK * query.margin)
-        self._covered = self._slack + np.array(LEVELS)[:, None, None] * self._inflated.weights
+        self._covered = (1.0 - _CHORD) * self._slack + np.array(LEVELS)[:, None, None] * self._inflated.weights
         self.blocked: Array | None = None
         """(n) the configuration in collision that the last check found."""
 
@@ -67,7 +68,27 @@ class EdgeCheck:
 
         Else where it is blocked: the index of a point, and the share of the segment behind it.
         """
-        return self._uncovered(points, self._inflated.bound.lengths(points))
+        kept = self._corners(points)
+        where = self._uncovered(points[kept], self._inflated.bound.lengths(points[kept]))
+        return None if where is None else float(np.interp(where, np.arange(len(kept)), kept))
+
+    def _corners(self, points: Array) -> list[int]:
+        """Indices of points (k, n) whose chords keep within `_CHORD` of the slack of all points, for every part."""
+        reach = self._inflated.bound.reach.max(axis=0, initial=0.0)
+        kept, spans = [0], [(0, len(points) - 1)]
+        while spans:
+            low, high = spans.pop()
+            chord = points[high] - points[low]
+            square = float(chord @ chord)
+            away = points[low + 1 : high] - points[low]
+            share = np.clip(away @ chord / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(away))
+            off = np.abs(away - share[:, None] * chord) @ reach
+            if high - low > 1 and float(off.max()) > _CHORD * self._slack:
+                middle = (low + high) // 2
+                spans += [(middle, high), (low, middle)]
+            else:
+                kept.append(high)
+        return kept
 
     def _uncovered(self, points: Array, lengths: Array) -> float | None:
         """See `free_polyline`; `lengths` (k - 1, movers) are bounds of the motion on each segment."""

@@ -59,20 +59,23 @@ class MotionBound:
             self._above[k] = self._above[self._before[k]] if self._before[k] >= 0 else False
             self._above[k, k] = True
         # Several movers are the same ball, seen from different links.
-        balls: dict[tuple[int, bytes], int] = {}
-        self._ball = np.array(
-            [balls.setdefault((m.joint - 1, m.centre.tobytes()), len(balls)) for m in movers], dtype=np.intp
-        )
-        self._joint = np.array([joint for joint, _ in balls], dtype=np.intp)
-        self._centre = np.array([np.frombuffer(centre) for _, centre in balls]).reshape(-1, 3, 1)
+        balls: dict[tuple[int, bytes, float], int] = {}
+        keys = [(mover.joint - 1, mover.centre.tobytes(), mover.radius) for mover in movers]
+        self._ball = np.array([balls.setdefault(key, len(balls)) for key in keys], dtype=np.intp)
+        self._joint = np.array([joint for joint, _, _ in balls], dtype=np.intp)
+        self._centre = np.array([np.frombuffer(centre) for _, centre, _ in balls]).reshape(-1, 3, 1)
         self._radius = np.array([mover.radius for mover in movers])
         seen = [self._above[m.seen_from - 1] if m.seen_from else np.zeros(n, dtype=bool) for m in movers]
         own = self._above[[mover.joint - 1 for mover in movers]] if len(movers) else np.zeros((0, n), dtype=bool)
         self._between = (own & ~np.array(seen, dtype=bool).reshape(-1, n)).astype(np.float64)  # (P, n)
-        self.reach = self._between * np.array([self._reach(mover) for mover in movers]).reshape(-1, n)
+        whose = dict(zip(self._ball.tolist(), movers, strict=True))
+        self.reach = (
+            self._between * np.array([self._reach(whose[k]) for k in range(len(whose))]).reshape(-1, n)[self._ball]
+        )
         """(P, n) the largest distance [m] of each mover from each axis that moves it; 1 for a prismatic joint."""
-        bends = [self._second(row, between) for row, between in zip(self.reach, self._between, strict=True)]
-        self._bend = np.array(bends).reshape(-1, n, n)
+        # Joints are ordered from the base outwards along every branch: the outer one of a pair has the greater index.
+        inner = np.triu((self._between * self._revolute)[:, :, None] * self.reach[:, None, :])
+        self._bend = inner + np.swapaxes(np.triu(inner, 1), 1, 2)  # (P, n, n) h_max(i,j); 0 for a prismatic inner one
 
     def along(self, a: Array, b: Array, segments: int) -> Array:
         """`lengths` of the straight line from a to b (n), cut into equal segments: (segments, P)."""
@@ -140,17 +143,6 @@ class MotionBound:
     def _rest(self, k: int) -> Array:
         """(3, 3) orientation of joint k's frame in its parent's at zero."""
         return np.asarray(self._fixed[k] + self._cosine[k])
-
-    def _second(self, reach: Array, between: Array) -> Array:
-        """(n, n) h_max(i,j) of a mover: 0 where the inner joint is prismatic, or one does not move it."""
-        n = len(reach)
-        h = np.zeros((n, n))
-        for i in range(n):
-            for j in range(i, n):
-                # Joints are ordered from the base outwards along every branch.
-                if between[i] and between[j] and self._revolute[i]:
-                    h[i, j] = h[j, i] = reach[j]
-        return h
 
 
 def _axes_of(kinematics: Kinematics) -> Array:

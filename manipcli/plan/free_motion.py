@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Final
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.collision import CollisionQuery
+from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limit_check import verify
 from manipcli.plan.motion import Grip, PlanningState
@@ -18,7 +20,7 @@ from manipcli.plan.path_search import PathSearch
 from manipcli.plan.path_smoothing import rounded
 from manipcli.plan.planner import Planner
 from manipcli.plan.retimer import retime
-from manipcli.plan.sweep import first_hit
+from manipcli.plan.sweep import blocked, first_hit, swept
 from manipcli.plan.trajectory import JointTrajectory
 
 BRANCHES: Final = 8
@@ -27,6 +29,69 @@ _TRIES: Final = 24  # random starts of the inverse kinematics
 _OTHER: Final = 0.05  # rad or m: least difference of two branches
 _FINER: Final = 1.0, 0.25, 0.06, 0.015  # shares of the deviation, tried in this order
 _ROUNDS: Final = 3  # paths: the hand may be elsewhere than where the search assumed it
+
+
+Goals = Callable[[np.random.Generator], Array]
+"""Draws the goals (k, m) of a search."""
+
+
+def free_trajectory(
+    planner: Planner,
+    state: PlanningState,
+    query: CollisionQuery,
+    straight: JointTrajectory,
+    grip: Grip | None,
+    limits: MotionLimits,
+    label: str,
+    verb: str,
+    goals: Goals | None,
+) -> JointTrajectory:
+    """The `straight` motion where it is free; else around obstacles, if `goals` are given and paths are searched.
+
+    Raises:
+        NotPlannable: both are obstructed.
+    """
+    hit = first_hit(planner, state, query, straight, grip)
+    if hit is None:
+        return straight
+    refusal = blocked(planner, state, hit, label, move=verb == "move")
+    end = swept(planner, state, straight, grip)[1][-1]
+    search = planner.searching() if goals is not None and hit.time > 0.0 and not query.touches(end) else None
+    if search is None or goals is None:
+        raise refusal
+    with labelled(label, verb):
+        return around(planner, search, state, query, goals(search.rng), limits, grip)
+
+
+def refusing(planner: Planner, query: CollisionQuery, start: Array, *, free: bool) -> Callable[[Array], object | None]:
+    """Why a solution (n) of the inverse kinematics is rejected: a collision, with `free` also on its straight path.
+
+    Where paths are searched, that path need not be free.
+    """
+
+    def refuse(q: Array) -> object | None:
+        hit = query.check(q)
+        if hit is not None or not free:
+            return None if hit is None else planner.in_the_way(hit)
+        count = max(1, int(np.ceil(float(np.max(np.abs(q - start))) / RESOLUTION)))
+        share = np.linspace(0.0, 1.0, count + 1)
+        hit = query.check_trajectory(range(len(q)), start, share, start + share[:, None] * (q - start))
+        if hit is None or planner.searching() is not None:
+            return None
+        return f"{planner.in_the_way(hit)}, on the path there"
+
+    return refuse
+
+
+@contextmanager
+def labelled(label: str, verb: str) -> Iterator[None]:
+    """Prefixes refusals with the label of their motion, unless it is the whole step of this `verb`."""
+    try:
+        yield
+    except NotPlannable as refusal:
+        if label == verb:
+            raise
+        raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint, reason=refusal.reason) from refusal
 
 
 def around(

@@ -5,8 +5,8 @@ Every motion is timed, verified against the limits and free of collisions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
-from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
+from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
-from manipcli.plan.free_motion import around, branches
-from manipcli.plan.hand import closed_on, pressing
+from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing
+from manipcli.plan.hand import closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk, timed_line
@@ -27,7 +27,7 @@ from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.sweep import blocked, first_hit, grip_time, refuse_collision, swept
+from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
 
@@ -99,7 +99,8 @@ class MotionBuilder:
             )
         grip = self._grip({name: values[name] for name in names if name in hand})
         if arm:
-            self._free(label, arm, [values[name] for name in arm], speed, grip, searched=free)
+            goal = np.array([values[name] for name in arm])
+            self._free(label, self._limits(arm, speed), goal, grip, goals=(lambda _: goal[None]) if free else None)
         else:
             self._add(label, None, grip)
 
@@ -138,7 +139,12 @@ class MotionBuilder:
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free)
-        self._free(label, solver.joints, goal[list(solver.columns)], speed, grip, X_WT, solver, searched=searched)
+        limits = self._limits(solver.joints, speed)
+
+        def goals(rng: np.random.Generator) -> Array:
+            return branches(solver, X_WT, goal, rng, query=self._query(), limits=limits)
+
+        self._free(label, limits, goal[list(solver.columns)], grip, goals=goals if searched else None)
 
     def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
         """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
@@ -253,7 +259,7 @@ class MotionBuilder:
         planner = self._planner
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
-            raise _no_gripper(posture)
+            raise no_gripper(posture)
         duration = grip_time(self._planner, self._now, grip)
         if body is None:
             self._accept(CLOSING, None, grip, duration)
@@ -288,7 +294,7 @@ class MotionBuilder:
         """
         grip = self._grip(self._posture(posture))
         if grip is None:
-            raise _no_gripper(posture)
+            raise no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
             held = self._now.carried.body
@@ -312,33 +318,14 @@ class MotionBuilder:
         """Predict the contents of the carried object on the floor of the container `into`."""
         self._now = spilled(self._planner, self._now, into)
 
-    @contextmanager
-    def _labelled(self, label: str) -> Iterator[None]:
-        """Prefixes refusals with the label of their motion."""
-        try:
-            yield
-        except NotPlannable as refusal:
-            if label == self._verb:
-                raise
-            raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint, reason=refusal.reason) from refusal
+    def _labelled(self, label: str) -> AbstractContextManager[None]:
+        return labelled(label, self._verb)
 
     def _solved(self, X_WT: Transform, grip: Grip | None, solver: InverseKinematics, *, free: bool = False) -> Array:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        query = self._query()
-
-        def refuse(q: Array) -> object | None:
-            hit = query.check(q)
-            if hit is not None or not free:
-                return None if hit is None else planner.in_the_way(hit)
-            count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
-            share = np.linspace(0.0, 1.0, count + 1)
-            hit = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
-            if hit is None or planner.searching() is not None:
-                return None
-            return f"{planner.in_the_way(hit)}, on the path there"
-
+        refuse = refusing(planner, self._query(), seed, free=free)
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
     def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
@@ -351,42 +338,24 @@ class MotionBuilder:
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
 
-    def _rest_to_rest(self, names: Sequence[str], target: npt.ArrayLike, speed: float) -> JointTrajectory:
-        limits = self._limits(names, speed)
-        start = self._now.position[self._planner.robot.indices(tuple(names))]
+    def _rest_to_rest(self, limits: MotionLimits, target: npt.ArrayLike) -> JointTrajectory:
+        start = self._now.position[self._planner.robot.indices(limits.names)]
         trajectory = rest_to_rest(start, target, limits, period=self._planner.period)
         verify(trajectory, limits)
         return trajectory
 
     def _free(
-        self,
-        label: str,
-        names: Sequence[str],
-        target: npt.ArrayLike,
-        speed: float,
-        grip: Grip | None,
-        X_WT: Transform | None = None,
-        solver: InverseKinematics | None = None,
-        *,
-        searched: bool,
+        self, label: str, limits: MotionLimits, target: npt.ArrayLike, grip: Grip | None, *, goals: Goals | None
     ) -> None:
-        """Add a motion straight to `target`; else, if `searched`, around obstacles to it or to another branch."""
-        planner, query, limits = self._planner, self._query(), self._limits(names, speed)
+        """Add a motion straight to `target`; where it is in collision and `goals` are given, around obstacles."""
         with self._labelled(label):
-            trajectory = self._rest_to_rest(names, target, speed)
-        hit = first_hit(planner, self._now, query, trajectory, grip)
-        if hit is not None:
-            refusal = blocked(planner, self._now, hit, label, move=self._verb == "move")
-            end = swept(planner, self._now, trajectory, grip)[1][-1]
-            search = planner.searching() if searched and hit.time > 0.0 and not query.touches(end) else None
-            if search is None:
-                raise refusal
-            goals = np.asarray(target, dtype=np.float64)[None]
-            if X_WT is not None and solver is not None:
-                goals = branches(solver, X_WT, end, search.rng, query=query, limits=limits)
-            with self._labelled(label):
-                trajectory = around(planner, search, self._now, query, goals, limits, grip)
-        self._add(label, trajectory, grip)
+            straight = self._rest_to_rest(limits, target)
+        query = self._query()
+        self._add(
+            label,
+            free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals),
+            grip,
+        )
 
     def _straight(
         self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
@@ -432,10 +401,3 @@ class MotionBuilder:
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
         return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
-
-
-def _no_gripper(posture: str) -> NotPlannable:
-    return NotPlannable(
-        f"pose '{posture}' has no joint that a gripper controller moves",
-        hint="add a controller of type `gripper` for the hand's joints to the controllers file",
-    )

@@ -93,7 +93,12 @@ def _task_model(steps: Members, conditions: Members, engines: Members, planners:
         __base__=TaskSpec,
         __doc__=TaskSpec.__doc__,
         simulation=(simulation, Field(simulation(), description=TaskSpec.model_fields["simulation"].description)),
-        planner=(planner, Field(planners[0][1](), description=TaskSpec.model_fields["planner"].description)),
+        planner=(
+            planner,
+            Field(  # type: ignore[arg-type]
+                planners[0][1](), description=TaskSpec.model_fields["planner"].description
+            ),
+        ),
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
         watch=(tuple[_watches([name for name, _ in conditions], condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
