@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,8 @@ def _problem(robot: RobotModel, kind: str, number: int, rng: np.random.Generator
         name: BodySpec.model_validate({"box": {"size": list(size)}, "pose": {"xyz": list(xyz)}, "fixed": True})
         for name, (size, xyz) in boxes.items()
     }
-    scene = build_scene(TaskSpec.model_construct(scene=bodies))
+    fields: dict[str, Any] = {"scene": bodies}
+    scene = build_scene(TaskSpec.model_construct(**fields))
     planner = Planner(robot, scene, period=1e-3, rng=rng, gripper_joints=(HAND,), gripper_speed=0.1)
     start, goal = _configuration(planner, rng, starts), _configuration(planner, rng, goals)
     return None if start is None or goal is None else Problem(kind, number, scene, planner, start, goal)

@@ -191,6 +191,12 @@ class CollisionQuery:
             kinematics.model, self._geometry, self._state
         )
 
+    @property
+    def pairs(self) -> frozenset[Pair]:
+        """The pairs of parts that are checked."""
+        names = self._names
+        return frozenset((names[pair.first], names[pair.second]) for pair in self._geometry.collisionPairs)
+
     def check(self, q: npt.ArrayLike) -> CollisionHit | None:
         """The deepest touching pair at joint positions `q` (n) of all moving joints; None without a contact."""
         return min(self.every(q), key=lambda hit: hit.distance) if self.touches(q) else None

@@ -63,14 +63,17 @@ class EdgeCheck:
         moved = self._inflated.bound.along(a, b, segments)
         return self._uncovered(a + np.linspace(0.0, 1.0, segments + 1)[:, None] * (b - a), moved) is None
 
-    def free_polyline(self, points: Array) -> float | None:
-        """None where a polyline (k, n) between two free configurations is free.
-
-        Else where it is blocked: the index of a point, and the share of the segment behind it.
+    def free_polyline(self, points: Array) -> int | None:
+        """None where a polyline (k, n) between two free configurations is free; else the index of a point nearest to
+        where it is blocked.
         """
         kept = self._corners(points)
         where = self._uncovered(points[kept], self._inflated.bound.lengths(points[kept]))
-        return None if where is None else float(np.interp(where, np.arange(len(kept)), kept))
+        if where is None or self.blocked is None:
+            return None
+        low = min(int(where), len(kept) - 2)
+        near = points[kept[low] : kept[low + 1] + 1]
+        return kept[low] + int(np.argmin(np.abs(near - self.blocked).sum(axis=1)))
 
     def _corners(self, points: Array) -> list[int]:
         """Indices of points (k, n) whose chords keep within `_CHORD` of the slack of all points, for every part."""
@@ -91,7 +94,10 @@ class EdgeCheck:
         return kept
 
     def _uncovered(self, points: Array, lengths: Array) -> float | None:
-        """See `free_polyline`; `lengths` (k - 1, movers) are bounds of the motion on each segment."""
+        """None where the polyline is free; else where it is blocked: the index of a point, and the share behind it.
+
+        `lengths` (k - 1, movers) are bounds of the motion on each segment.
+        """
         moved = lengths @ self._inflated.summed
         # Along the polyline at every level: the motion in units of what one check at that level covers.
         rates = np.max(moved / self._covered, axis=2, initial=0.0)

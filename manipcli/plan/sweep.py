@@ -93,7 +93,7 @@ def first_hit(
     assert check.blocked is not None
     near = query.check(check.blocked)
     assert near is not None
-    return replace(near, time=float(np.interp(where, np.arange(len(times)), times)))
+    return replace(near, time=float(times[where]))
 
 
 def blocked(
