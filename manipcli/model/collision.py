@@ -167,6 +167,8 @@ class CollisionQuery:
         self.margin = margin
         self._inflated: dict[tuple[float, ...], InflatedQuery] = {}
         self._parts = tuple(parts)
+        self._made = (kinematics, self._parts, near, allowed)
+        self._only = only
         self._names = [part.name for part in parts]
         self._geometry = pin.GeometryModel()
         for k, part in enumerate(parts):
@@ -218,6 +220,10 @@ class CollisionQuery:
                 depth = min(float(contact.penetration_depth) for contact in result.getContacts())
                 deepest[a, b] = min(depth, deepest.get((a, b), np.inf))
         return tuple(CollisionHit(a=a, b=b, distance=depth) for (a, b), depth in sorted(deepest.items()))
+
+    def with_margin(self, margin: float) -> CollisionQuery:
+        """The same query with another margin [m]."""
+        return CollisionQuery(*self._made, margin, only=self._only)
 
     def inflated(self, levels: Sequence[float]) -> InflatedQuery:
         """The same query with larger margins [m]; see `InflatedQuery`."""

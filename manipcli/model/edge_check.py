@@ -36,10 +36,10 @@ _SHORT: Final = 0.2  # rad or m, of all joints together: below, they are not
 class EdgeCheck:
     """Edges in the obstacles, load and margin of a query."""
 
-    def __init__(self, query: CollisionQuery) -> None:
-        self._query = query
+    def __init__(self, query: CollisionQuery, *, slack: float | None = None) -> None:
+        """`slack` [m]: what may be missing of the margin between checked configurations; by default `SLACK` of it."""
         self._inflated = query.inflated(LEVELS)
-        self._slack = max(LEAST, SLACK * query.margin)
+        self._slack = max(LEAST, SLACK * query.margin) if slack is None else slack
         self._covered = (1.0 - _CHORD) * self._slack + np.array(LEVELS)[:, None, None] * self._inflated.weights
         self.blocked: Array | None = None
         """(n) the configuration in collision that the last check found."""

@@ -80,8 +80,7 @@ class MotionBuilder:
     def joints(
         self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0, free: bool = True
     ) -> None:
-        """Move straight in joint space, or with `free` around obstacles; joints of the hand are moved by their own
-        controller at the same time.
+        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.
@@ -214,7 +213,7 @@ class MotionBuilder:
             names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
             velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
         )  # fmt: skip
-        self._accept(label, trajectory, None, trajectory.duration)
+        self._accept(label, trajectory, None)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
         """Follow given points from the end of the last motion, sampled at every control tick and at their end.
@@ -260,9 +259,8 @@ class MotionBuilder:
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
-        duration = grip_time(self._planner, self._now, grip)
         if body is None:
-            self._accept(CLOSING, None, grip, duration)
+            self._accept(CLOSING, None, grip)
             self._now = replace(self._now, closed=True)
             return
         query = planner.grasping(self._now, body)
@@ -280,7 +278,7 @@ class MotionBuilder:
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
-        self._motions.append(Motion(CLOSING, trajectory=None, grip=grip, duration=duration))
+        self._motions.append(Motion(CLOSING, trajectory=None, grip=grip, duration=grip_time(planner, self._now, grip)))
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
@@ -350,12 +348,9 @@ class MotionBuilder:
         """Add a motion straight to `target`; where it is in collision and `goals` are given, around obstacles."""
         with self._labelled(label):
             straight = self._rest_to_rest(limits, target)
-        query = self._query()
-        self._add(
-            label,
-            free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals),
-            grip,
-        )
+        query, verb = self._query(), self._verb
+        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, verb, goals)
+        self._accept(label, free, grip)
 
     def _straight(
         self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
@@ -375,11 +370,13 @@ class MotionBuilder:
         """Accept a motion if it is free of collisions."""
         query, move = self._query(allowed), self._verb == "move"
         refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
-        duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
-        self._accept(label, trajectory, grip, duration if trajectory is None else max(duration, trajectory.duration))
+        self._accept(label, trajectory, grip)
 
-    def _accept(self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, duration: float) -> None:
+    def _accept(self, label: str, trajectory: JointTrajectory | None, grip: Grip | None) -> None:
         before = self._now
+        duration = 0.0 if grip is None else grip_time(self._planner, before, grip)
+        if trajectory is not None:
+            duration = max(duration, trajectory.duration)
         if grip is not None:
             self._now = self._now.moved(self._with(grip.joints, grip.target))
         if trajectory is not None:

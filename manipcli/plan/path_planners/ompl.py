@@ -28,7 +28,7 @@ class OmplSpec(PlannerSpec):
     (`BITstar`, `RRTstar`, ...) uses all of them.
     """
 
-    type: Literal["ompl"] = "ompl"
+    type: Literal["ompl"] = Field("ompl", description="For OMPL's planners.")
     algorithm: str = Field(
         "RRTConnect", description="A planner of `ompl.geometric`: `RRTConnect`, `BITstar`, ... Default RRTConnect."
     )

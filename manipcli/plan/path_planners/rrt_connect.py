@@ -16,25 +16,17 @@ from manipcli.plan.path_planner import PathFailure, PathPlannerMember, PathProbl
 from manipcli.spec.planner import PlannerSpec
 
 _MET = 1e-9
-_SHARE = 0.2  # of the diagonal of the bounds: the longest step by default
+_SHARE = 0.1  # of the diagonal of the bounds: the longest step by default
 _FIRST = 64  # nodes; the memory of a tree doubles when it is full
 
 
 class RrtConnectSpec(PlannerSpec):
     """RRT-Connect: two trees that grow towards each other."""
 
-    type: Literal["rrt_connect"] = "rrt_connect"
-    range: (
-        Annotated[
-            float,
-            Field(
-                gt=0,
-                le=1000,
-                description="Longest step of a tree [rad or m]. Default: a fifth of the bounds' diagonal.",
-            ),
-        ]
-        | None
-    ) = None
+    type: Literal["rrt_connect"] = Field("rrt_connect", description="Default rrt_connect.")
+    range: Annotated[float, Field(gt=0, le=1000)] | None = Field(
+        None, description="Longest step of a tree [rad or m]. Default: a tenth of the diagonal of the joints' ranges."
+    )
 
 
 class RrtConnect:
