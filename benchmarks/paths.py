@@ -20,7 +20,6 @@ from benchmarks.parts_in_pybullet import collides
 from benchmarks.path_problems import COUNT, KINDS, Problem, problems
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import position_limits
 from manipcli.plan.free_motion import around
 from manipcli.plan.free_space import FreeSpace
@@ -43,6 +42,7 @@ HEAD = (
     "OMPL",
     "ratio",
     "shortened in",
+    "OMPL's simplification",
     "motion in all",
     "length to OMPL's",
 )
@@ -56,6 +56,7 @@ class Tally:
     own: list[float] = field(default_factory=list)
     ompl: list[float] = field(default_factory=list)
     shortening: list[float] = field(default_factory=list)
+    simplifying: list[float] = field(default_factory=list)
     ratios: list[float] = field(default_factory=list)
     motions: list[float] = field(default_factory=list)
     obstructed: int = 0
@@ -64,23 +65,34 @@ class Tally:
     tried: int = 0
 
 
-def measure(problem: Problem, tally: Tally, ompl: tuple[ModuleType, ModuleType] | None) -> None:
-    """Solves one problem with both planners."""
+def measure(problem: Problem, tally: Tally, ompl: tuple[ModuleType, ModuleType] | None, rounds: int) -> None:
+    """Solves one problem with both planners, `rounds` times in turn, and plans its motion once."""
     tally.tried += 1
     planner = problem.planner
     names, columns = planner.solver.joints, list(planner.solver.columns)
     query = planner.checker.at(margin=CLEARANCE)
     straight = np.linspace(problem.start, problem.goal, 2)
     tally.obstructed += collides(planner, query.pairs, straight) > 0
-    solution = _own(problem, query, tally)
-    if ompl is not None:
-        base, geometric = ompl
-        task = _problem(problem, FreeSpace(planner.robot, query, names, [problem.start]))
+    task = _problem(problem, FreeSpace(planner.robot, query, names, [problem.start]))
+    task.edge(task.start, task.start + 0.3)  # what is made at the first edge belongs to no planner
+    for seed in range(rounds):
+        rng = np.random.default_rng(seed)
         began = clock()
-        found = Ompl(OmplSpec()).plan(task, np.random.default_rng(problem.number))
-        tally.ompl.append(clock() - began)
-        if not isinstance(found, PathFailure) and solution is not None:
-            tally.ratios.append(length_of(solution) / length_of(_simplified(base, geometric, task, found)))
+        found = RrtConnect(RrtConnectSpec()).plan(task, rng)
+        tally.own.append(clock() - began)
+        own = None
+        if not isinstance(found, PathFailure):
+            began = clock()
+            own = shortened(found, task, rng, attempts=SHORTCUTS)
+            tally.shortening.append(clock() - began)
+        if ompl is not None:
+            began = clock()
+            found = Ompl(OmplSpec()).plan(task, rng)
+            tally.ompl.append(clock() - began)
+            if seed == 0 and own is not None and not isinstance(found, PathFailure):
+                began = clock()
+                tally.ratios.append(length_of(own) / length_of(_simplified(*ompl, task, found)))
+                tally.simplifying.append(clock() - began)
     state = PlanningState(problem.start, ())
     limits = MotionLimits.of(planner.robot, names)
     search = PathSearch.of(RrtConnectSpec(), np.random.default_rng(problem.number))
@@ -95,22 +107,6 @@ def measure(problem: Problem, tally: Tally, ompl: tuple[ModuleType, ModuleType] 
     whole = np.tile(problem.start, (len(motion.positions), 1))
     whole[:, columns] = motion.positions
     tally.hits += collides(planner, query.pairs, whole) > 0
-
-
-def _own(problem: Problem, query: CollisionQuery, tally: Tally) -> Array | None:
-    planner = problem.planner
-    task = _problem(problem, FreeSpace(planner.robot, query, planner.solver.joints, [problem.start]))
-    rng = np.random.default_rng(problem.number)
-    task.edge(task.start, task.start + 0.3)  # what is made at the first edge belongs to no planner
-    began = clock()
-    found = RrtConnect(RrtConnectSpec()).plan(task, rng)
-    tally.own.append(clock() - began)
-    if isinstance(found, PathFailure):
-        return None
-    began = clock()
-    short = shortened(found, task, rng, attempts=SHORTCUTS)
-    tally.shortening.append(clock() - began)
-    return short
 
 
 def _problem(problem: Problem, free: FreeSpace) -> PathProblem:
@@ -138,6 +134,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.paths", description=__doc__)
     parser.add_argument("kinds", nargs="*", default=list(KINDS), help="of problems (default: all)")
     parser.add_argument("--count", type=int, default=COUNT, help=f"problems of each kind (default {COUNT})")
+    parser.add_argument("--rounds", type=int, default=3, help="first paths of each problem (default 3)")
     options = parser.parse_args()
     try:
         from ompl import base, geometric, util
@@ -152,7 +149,7 @@ def main() -> None:
     for kind in options.kinds:
         tally = Tally()
         for problem in problems(kind, options.count):
-            measure(problem, tally, ompl)
+            measure(problem, tally, ompl, options.rounds)
         own, other = 1e3 * statistics.median(tally.own), 1e3 * statistics.median(tally.ompl or [np.nan])
         cells = (
             kind,
@@ -163,6 +160,7 @@ def main() -> None:
             f"{other:.1f} ms",
             f"{own / other:.2f}",
             f"{1e3 * statistics.median(tally.shortening or [np.nan]):.0f} ms",
+            f"{1e3 * statistics.median(tally.simplifying or [np.nan]):.0f} ms",
             f"{1e3 * statistics.median(tally.motions or [np.nan]):.0f} ms",
             f"{statistics.mean(tally.ratios or [np.nan]):.3f}",
         )
