@@ -20,7 +20,8 @@ from manipcli.plan.path_shortening import shortened
 from manipcli.spec.planner import PlannerSpec
 
 STEP = 2
-"""A step may use this many times the samples of one search, for all of its candidates."""
+"""A step may use this many times the samples of one search. Each search may use this part of what is left: all for the
+first candidate, half for the second, a quarter for the third."""
 _UNLIMITED = np.pi  # rad or m beyond start and goals: samples of a joint without limits
 
 
@@ -31,6 +32,8 @@ class PathSearch:
     spec: PlannerSpec
     rng: np.random.Generator
     left: int
+    failed: NotPlannable | None = None
+    """The latest refusal, which is repeated when no sample is left."""
 
     @staticmethod
     def of(spec: PlannerSpec, rng: np.random.Generator) -> PathSearch:
@@ -52,12 +55,8 @@ class PathSearch:
         Raises:
             NotPlannable: there is none; names the narrowest place that was found.
         """
-        if self.left <= 0:
-            raise NotPlannable(
-                "no path was searched: the step's samples are used up",
-                hint=f"raise them: `planner: {{samples: {2 * self.spec.samples}}}`",
-                reason="in_the_way",
-            )
+        if self.failed is not None and self.left <= 0:
+            raise self.failed
         columns = list(robot.indices(tuple(names)))
         space = FreeSpace(robot, query, names, _hands(robot, state.position, grip))
         start = np.array(state.position[columns])
@@ -72,13 +71,14 @@ class PathSearch:
             valid=space.valid,
             edge=space.edge,
         )
-        samples = min(self.left, self.spec.samples)
+        samples = max(1, -(-self.left // STEP))
         member = PATH_PLANNERS[self.spec.type]
         settings = member.spec.model_validate({**self.spec.model_dump(), "samples": samples})
         found = member.make(settings).plan(problem, self.rng)
         if isinstance(found, PathFailure):
-            self.left -= found.samples
-            raise self._refusal(space, found)
+            self.left -= max(1, found.samples)
+            self.failed = self._refusal(space, found)
+            raise self.failed
         return shortened(found, problem, self.rng, attempts=self.spec.shortcuts)
 
     def _refusal(self, space: FreeSpace, failure: PathFailure) -> NotPlannable:

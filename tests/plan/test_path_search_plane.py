@@ -12,8 +12,9 @@ import pytest
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.model.build_robot import build_robot
-from manipcli.model.collision import CollisionChecker
+from manipcli.model.collision import CollisionChecker, CollisionQuery
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_search import PathSearch
@@ -33,9 +34,7 @@ GANTRY = f"""<robot name="gantry">
 Wall = tuple[float, float, float, float]  # x from, x to, y from, y to
 
 
-def searched(
-    folder: Path, walls: dict[str, Wall], start: tuple[float, float], goal: tuple[float, float], *, samples: int = 2000
-) -> Array:
+def made(folder: Path, walls: dict[str, Wall]) -> tuple[RobotModel, CollisionQuery]:
     (folder / "robot.urdf").write_text(GANTRY)
     robot, _ = build_robot(RobotSpec(robot="gantry", description="robot.urdf"), file=folder / "robot.yaml")
     bodies = {
@@ -49,7 +48,13 @@ def searched(
         for name, (x0, x1, y0, y1) in walls.items()
     }
     fields: dict[str, Any] = {"scene": bodies, "floor": False}
-    query = CollisionChecker(Kinematics(robot), build_scene(TaskSpec.model_construct(**fields))).at(margin=MARGIN)
+    return robot, CollisionChecker(Kinematics(robot), build_scene(TaskSpec.model_construct(**fields))).at(margin=MARGIN)
+
+
+def searched(
+    folder: Path, walls: dict[str, Wall], start: tuple[float, float], goal: tuple[float, float], *, samples: int = 2000
+) -> Array:
+    robot, query = made(folder, walls)
     search = PathSearch.of(RrtConnectSpec(samples=samples), np.random.default_rng(1))
     return search.path(robot, PlanningState(np.array(start), ()), query, ("x", "y"), np.array([goal]), None)
 
@@ -94,19 +99,19 @@ def test_a_refusal_names_the_narrowest_place_and_what_blocks_most(tmp_path: Path
     assert refusal.value.reason == "in_the_way"
 
 
-def test_the_samples_of_a_step_are_used_up(tmp_path: Path) -> None:
-    """Two searches of a step may use all of them; then there is no third."""
-    search = PathSearch.of(RrtConnectSpec(samples=10), np.random.default_rng(0))
-    search.left = 0
-    robot, _ = build_robot(
-        RobotSpec(robot="gantry", description="robot.urdf"), file=_described(tmp_path) / "robot.yaml"
-    )
-    fields: dict[str, Any] = {"scene": {}, "floor": False}
-    query = CollisionChecker(Kinematics(robot), build_scene(TaskSpec.model_construct(**fields))).at(margin=MARGIN)
-    with pytest.raises(NotPlannable, match="samples are used up"):
-        search.path(robot, PlanningState(np.zeros(2), ()), query, ("x", "y"), np.ones((1, 2)), None)
-
-
-def _described(folder: Path) -> Path:
-    (folder / "robot.urdf").write_text(GANTRY)
-    return folder
+def test_later_searches_of_a_step_get_less_and_the_last_refusal_is_repeated(
+    tmp_path: Path,
+) -> None:
+    walls = {"wall": (-0.01, 0.01, -1.1, 1.1)}
+    robot, query = made(tmp_path, walls)
+    search = PathSearch.of(RrtConnectSpec(samples=40), np.random.default_rng(0))
+    state, used, refusals = PlanningState(np.array([-0.5, 0.0]), ()), [], []
+    for _ in range(12):
+        left = search.left
+        with pytest.raises(NotPlannable) as refusal:
+            search.path(robot, state, query, ("x", "y"), np.array([[0.5, 0.0]]), None)
+        used.append(left - search.left)
+        refusals.append(refusal.value)
+    assert used[:4] == [40, 20, 10, 5]
+    assert search.left == 0
+    assert refusals[-1] is refusals[-2]
