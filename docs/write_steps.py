@@ -20,6 +20,7 @@ from pydantic.fields import FieldInfo
 from manipcli.core.units import readable
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps import STEPS
+from manipcli.spec.agree import AgreeSpec
 from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
@@ -36,7 +37,8 @@ from manipcli.spec.robot import (
     ToolSpec,
     TransmissionSpec,
 )
-from manipcli.spec.task import BodySpec, FrameSpec, RecordSpec, SimulationSpec, StepSpec
+from manipcli.spec.simulation import SimulationSpec
+from manipcli.spec.task import BodySpec, FrameSpec, RecordSpec, StepSpec
 from manipcli.spec.vary import DistributionSpec, VarySpec
 
 PAGE = Path(__file__).with_name("steps.md")
@@ -55,6 +57,7 @@ ELSEWHERE: dict[type, str] = {
     VarySpec: "[distributions](task.md#vary)",
     DistributionSpec: "one of the first four",
     BaselineSpec: "a [mapping](task.md#baseline)",
+    AgreeSpec: "a [mapping](task.md#agree)",
     GroupSpec: "[groups](robot.md#groups)",
     ToolSpec: "a [mapping](robot.md#tool)",
     LimitsSpec: "[limits](robot.md#limits)",

@@ -107,6 +107,7 @@ def runs_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of tests and baselines are in threads, which take a second less than processes."""
     names = SimpleNamespace(Popen=_Thread, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
     monkeypatch.setattr("manipcli.batch.process.subprocess", names)
+    monkeypatch.setattr("manipcli.batch.forks.available", lambda: False)
 
 
 @dataclass(frozen=True)
@@ -168,8 +169,8 @@ def rewrite_log() -> Rewrite:
     """Writes a log once more with the mcap library, all its checksums valid.
 
     `message(topic, message)` gives the bytes that take the place of a message's, or None to leave it out;
-    `attachment(name, data)` and `metadata(name, values)` give what takes the place of those, or None. What is said
-    besides goes to the library's `Writer`.
+    `schema(name, text)` the text of a type; `attachment(name, data)` and `metadata(name, values)` give what takes the
+    place of those, or None. What is said besides goes to the library's `Writer`.
     """
 
     def rewrite(
@@ -179,6 +180,7 @@ def rewrite_log() -> Rewrite:
         message: Callable[[str, Message], bytes | None] = lambda _, one: one.data,
         attachment: Callable[[str, bytes], bytes | None] = lambda _, data: data,
         metadata: Callable[[str, dict[str, str]], dict[str, str] | None] = lambda _, values: values,
+        schema: Callable[[str, bytes], bytes] = lambda _, text: text,
         **writing: Any,
     ) -> Path:
         with source.open("rb") as file, target.open("wb") as out:
@@ -187,7 +189,8 @@ def rewrite_log() -> Rewrite:
             assert summary is not None
             writer.start(profile=header.profile, library=header.library)
             schemas = {
-                k: writer.register_schema(one.name, one.encoding, one.data) for k, one in summary.schemas.items()
+                k: writer.register_schema(one.name, one.encoding, schema(one.name, one.data))
+                for k, one in summary.schemas.items()
             }
             channels = {
                 k: writer.register_channel(one.topic, one.message_encoding, schemas[one.schema_id], one.metadata)

@@ -202,6 +202,7 @@ def open_other(
         body_position=frozen(p),
         body_quat_xyzw=frozen(q),
         contacts=((),) * len(times),
+        contact_times=((),) * len(times),
         lost=topics.lost,
         notes=tuple(notes),
     )

@@ -83,6 +83,9 @@ def _open_own(
         body_quat_xyzw = frozen(np.broadcast_to([X_WO.quat_xyzw for X_WO in start], body_quat_xyzw.shape))
         notes = (*notes, f"{TF} not recorded: bodies are drawn at their start poses")
     notes = (*notes, *(recording.unknown(topic) for topic in recording.silent))
+    touching = [contact for each in contacts.found for contact in each]
+    if touching and not any(contact.points for contact in touching):
+        notes = (*notes, "the log has no contact points: contact forces are not drawn")
     return Playback(
         name=verdict.task or path.name,
         robot=robot,
@@ -95,7 +98,8 @@ def _open_own(
         reference=references(span.controllers, recording.joint_names, len(states.time)),
         body_position=body_position,
         body_quat_xyzw=body_quat_xyzw,
-        contacts=contacts,
+        contacts=tuple(contacts.found),
+        contact_times=tuple(contacts.times),
         steps=playback_steps(verdict, recording.events, end=float(states.time[-1])),
         verdict=verdict,
         lost=recording.lost,

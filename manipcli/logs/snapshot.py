@@ -15,7 +15,6 @@ from manipcli.judge.measures.reference import references
 from manipcli.judge.steps import step_outcomes
 from manipcli.logs.recorded_files import recorded_robot
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.state import Contact
 from manipcli.record.attachments import URDF
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
@@ -25,7 +24,7 @@ from manipcli.record.foreign.snapshot import snapshot
 from manipcli.record.foreign.topics import Topics, open_topics
 from manipcli.record.messages import WORLD
 from manipcli.record.read.reading import open_recording
-from manipcli.record.recording import Recording, Span, TaskEvent
+from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
 from manipcli.report.logs.snapshot import JointMoment, Moment, PoseMoment
 
 
@@ -108,9 +107,10 @@ def _ours(path: Path, time: float) -> Moment:
         phase=phase,
         joints=joints,
         poses=poses,
-        contacts=None if recording.unknown(CONTACTS) else touched,
+        contacts=None if recording.unknown(CONTACTS) else touched.contacts if touched is not None else (),
         missing=tuple(missing),
         tool=_tool(recording, path, states.position[k], states.velocity[k]),
+        contacts_time=None if touched is None else touched.time,
     )
 
 
@@ -128,10 +128,11 @@ def _tool(recording: Recording, path: Path, q: Array, v: Array) -> PoseMoment | 
     return PoseMoment("tool", WORLD, kinematics.forward(q, link) @ X_LT, speed)
 
 
-def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Contact, ...], float]:
-    """The span with the last state until `time`, the row of that state, its contacts, and the end of the log [s]."""
+def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, ContactSnapshot | None, float]:
+    """The span with the last state until `time`, the row of that state, its recorded contacts, and the end of the log
+    [s]."""
     chosen, k, end = None, 0, 0.0
-    touched: tuple[Contact, ...] = ()
+    touched: ContactSnapshot | None = None
     for span in spans:
         if not len(span.states.time):
             continue
@@ -142,7 +143,7 @@ def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Con
         k = int(np.searchsorted(span.states.time, time + ROUNDING, side="right")) - 1
         for change in span.contacts:
             if change.time <= time + ROUNDING:
-                touched = change.contacts
+                touched = change
     return chosen, k, touched, end
 
 

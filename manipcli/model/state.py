@@ -64,10 +64,27 @@ class WorldState:
         return WorldState(*(change(getattr(self, name)) for name in self.__slots__ if name != "block"))
 
 
+class ContactPoint(NamedTuple):
+    """One point at which two parts touch; all vectors in the world.
+
+    Attributes:
+        position: (3,) [m].
+        normal: (3,) unit vector out of `b` towards `a`: the normal force on `a` is `force * normal`.
+        force: normal force [N].
+        friction: (3,) [N] friction force on `a`.
+    """
+
+    position: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    force: float
+    friction: tuple[float, float, float]
+
+
 class Contact(NamedTuple):
     """Two touching parts. `a` and `b` are a body or `robot/<link>`, with a <= b.
 
     `force` [N]: sum of the normal forces between the two; `distance` [m]: the deepest, negative for penetration.
+    `points`: where they touch, as the physics computed them; empty in logs without points.
     A named tuple, because many are created per control tick and a dataclass takes three times as long.
     """
 
@@ -75,6 +92,7 @@ class Contact(NamedTuple):
     b: str
     force: float
     distance: float
+    points: tuple[ContactPoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

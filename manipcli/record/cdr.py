@@ -123,6 +123,11 @@ class CdrReader:
         self.offset = start + size
         return start
 
+    def take(self, size: int, align: int) -> memoryview:
+        """The next `size` bytes, aligned to `align`."""
+        start = self.skip(size, align)
+        return self._data[start : start + size]
+
     def u32(self) -> int:
         return int(_U32.unpack_from(self._data, self.skip(4, 4))[0])
 

@@ -13,8 +13,8 @@ RECORD = "recording"
 REPAIR = "repair"
 """Name of the metadata record of a repaired file, with what it `lost`."""
 
-FORMAT = 1
-"""Version of the layout of a recording."""
+FORMAT = 2
+"""Version of the layout of a recording. Contacts of format 1 have no contact points."""
 
 
 MAX_STRIDE = 1 << 20
@@ -60,7 +60,7 @@ def contents(values: Mapping[str, str]) -> Contents:
         ValueError: a later format, or an invalid record; see the message.
     """
     version = values.get("format", "")
-    if version != str(FORMAT):
+    if version not in (str(number) for number in range(1, FORMAT + 1)):
         if version.isdecimal() and int(version) > FORMAT:
             raise ValueError(f"has format {version}; this manipcli reads up to {FORMAT}")
         raise ValueError(f"has the unknown format '{version}'")

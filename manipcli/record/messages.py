@@ -15,6 +15,9 @@ from manipcli.scene.scene import Scene
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
 
 WORLD = "world"
+ALIGN = 8
+"""Largest alignment of a number [byte]."""
+_STAMP, _COUNT, _NUMBERS = struct.Struct("<iI"), struct.Struct("<I"), struct.Struct("<ddI")
 GREY = (0.7, 0.7, 0.7, 1.0)
 CUBE, SPHERE, CYLINDER, MESH_RESOURCE = 1, 2, 3, 10
 INFO, WARN, ERROR = 20, 30, 40
@@ -132,44 +135,40 @@ def log_message(ns: int, event: TaskEvent) -> bytes:
 
 
 class ContactEncoder:
-    """Encoder of manipcli_msgs/Contacts. The constant bytes of each set of pairs are built once, because sets can
+    """Encoder of manipcli_msgs/Contacts. The constant bytes of each pair are built once, because sets of pairs can
     alternate at the control rate while fingers close."""
 
-    MAX_SETS = 512
-
     def __init__(self) -> None:
-        self._known: dict[tuple[tuple[str, str], ...], tuple[struct.Struct, tuple[bytes, ...]]] = {}
+        writer = CdrWriter()
+        self._stamp = writer.header(0, WORLD)
+        writer.u32(0)
+        self._head = writer.data[:-4]
+        self._known: dict[tuple[str, str, int], bytes] = {}
 
     def encode(self, ns: int, contacts: Sequence[Contact]) -> bytes:
-        pairs = tuple((contact.a, contact.b) for contact in contacts)
-        known = self._known.get(pairs)
-        if known is None:
-            if len(self._known) >= self.MAX_SETS:
-                self._known.clear()
-            known = self._known[pairs] = self._template(pairs)
-        packer, pieces = known
-        values: list[bytes | float] = []
-        for piece, contact in zip(pieces[2:], contacts, strict=True):
-            values += (piece, contact.force, contact.distance)
-        return packer.pack(pieces[0], *divmod(ns, NS_PER_S), pieces[1], *values)
+        data = bytearray(self._head)
+        _STAMP.pack_into(data, self._stamp, *divmod(ns, NS_PER_S))
+        data += _COUNT.pack(len(contacts))
+        for a, b, force, distance, points in contacts:
+            key = (a, b, len(data) % ALIGN)
+            data += self._known.get(key) or self._names(key)
+            data += _NUMBERS.pack(force, distance, len(points))
+            if points:
+                numbers: list[float] = []
+                for position, normal, press, friction in points:
+                    numbers += (*position, *normal, press, *friction)
+                data += struct.pack(f"<4x{len(numbers)}d", *numbers)  # 4 bytes align the first number
+        return bytes(data)
 
-    @staticmethod
-    def _template(pairs: tuple[tuple[str, str], ...]) -> tuple[struct.Struct, tuple[bytes, ...]]:
+    def _names(self, key: tuple[str, str, int]) -> bytes:
+        """The names of a pair that begin at this remainder of `ALIGN`, and the alignment of its numbers."""
+        a, b, begin = key
         writer = CdrWriter()
-        stamp = writer.header(0, WORLD)
-        writer.u32(len(pairs))
-        cuts = [stamp + 8, len(writer.data)]
-        layout, ends = "", []
-        for a, b in pairs:
-            writer.text(a)
-            writer.text(b)
-            offset = writer.f64s((0.0, 0.0))
-            ends.append(offset)
-        data = writer.data
-        pieces = [data[:stamp], data[cuts[0] : cuts[1]]]
-        start = cuts[1]
-        for end in ends:
-            pieces.append(data[start:end])
-            layout += f"{end - start}sdd"
-            start = end + 16
-        return struct.Struct(f"<{stamp}siI{cuts[1] - cuts[0]}s{layout}"), tuple(pieces)
+        while len(writer.data) % ALIGN != begin:
+            writer.u8(0)
+        start = len(writer.data)
+        writer.text(a)
+        writer.text(b)
+        end = writer.f64(0.0)
+        names = self._known[key] = writer.data[start:end]
+        return names

@@ -22,6 +22,15 @@ MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 CONTACTS = "manipcli_msgs/msg/Contacts"
 TASK_EVENT = "manipcli_msgs/msg/TaskEvent"
 
+_CONTACT = (
+    "# Two touching parts: names of scene bodies, or robot/<link>; a <= b.\n"
+    "string a\nstring b\n"
+    "# Sum of the normal forces between the two [N].\n"
+    "float64 force\n"
+    "# Distance at the deepest point [m], negative when they penetrate.\n"
+    "float64 distance\n"
+)
+
 DEFINITIONS: dict[str, str] = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
     "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec\n",
@@ -120,13 +129,21 @@ DEFINITIONS: dict[str, str] = {
         "string mesh_resource\nvisualization_msgs/MeshFile mesh_file\nbool mesh_use_embedded_materials\n"
     ),
     "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers\n",
-    "manipcli_msgs/Contact": (
-        "# Two touching parts: names of scene bodies, or robot/<link>; a <= b.\n"
-        "string a\nstring b\n"
-        "# Sum of the normal forces between the two [N].\n"
+    "manipcli_msgs/ContactPoint": (
+        "# A point at which parts a and b touch, at the time of the message; all vectors in the world.\n"
+        "# [m]\n"
+        "geometry_msgs/Point position\n"
+        "# Unit vector out of b towards a: the normal force on a is force * normal.\n"
+        "geometry_msgs/Vector3 normal\n"
+        "# Normal force [N].\n"
         "float64 force\n"
-        "# Distance at the deepest point [m], negative when they penetrate.\n"
-        "float64 distance\n"
+        "# Friction force on a [N].\n"
+        "geometry_msgs/Vector3 friction\n"
+    ),
+    "manipcli_msgs/Contact": (
+        f"{_CONTACT}"
+        "# All points at which they touch, as the physics computed them; those without force included.\n"
+        "manipcli_msgs/ContactPoint[] points\n"
     ),
     "manipcli_msgs/Contacts": (
         "# Everything that touches from this time on, until the next message.\n"
@@ -137,6 +154,13 @@ DEFINITIONS: dict[str, str] = {
         "std_msgs/Header header\nstring kind\nstring step\nstring verb\nstring outcome\nstring text\nstring place\n"
     ),
 }
+
+CONTACTS_WITHOUT_POINTS = (
+    f"std_msgs/Header header\nmanipcli_msgs/Contact[] contacts\n"
+    f"{'=' * 80}\nMSG: std_msgs/Header\n{DEFINITIONS['std_msgs/Header']}"
+    f"{'=' * 80}\nMSG: manipcli_msgs/Contact\n{_CONTACT}"
+)
+"""The text of `CONTACTS` in logs of format 1."""
 
 
 def schema_text(type_name: str) -> str:

@@ -12,7 +12,7 @@ from manipcli.model.state import Contact
 from manipcli.record.recording import ContactSnapshot, Recording, Span, joined
 
 
-def sampled(recording: Recording, *, rate: float) -> tuple[Span, tuple[tuple[Contact, ...], ...]] | None:
+def sampled(recording: Recording, *, rate: float) -> tuple[Span, SampledContacts] | None:
     """The ticks nearest to multiples of 1 / rate, and the last one; one span in memory at a time.
 
     Args:
@@ -20,11 +20,10 @@ def sampled(recording: Recording, *, rate: float) -> tuple[Span, tuple[tuple[Con
         rate: sampling rate [Hz]; above the rate of the recording, every tick is taken.
 
     Returns:
-        The ticks as one span without contacts, and for each tick the contacts since the previous one with the largest
-        force of each pair; None for a recording without ticks.
+        The ticks as one span without contacts, and the contacts of each tick; None for a recording without ticks.
     """
     chosen: list[Span] = []
-    gathered = _Contacts()
+    gathered = SampledContacts()
     before = -1.0
     for span in recording.spans:
         times = span.states.time
@@ -42,7 +41,7 @@ def sampled(recording: Recording, *, rate: float) -> tuple[Span, tuple[tuple[Con
     if last.states.time[0] not in chosen[-1].states.time:
         chosen.append(last)
         gathered.add((), last.states.time)
-    return joined(chosen), tuple(gathered.found)
+    return joined(chosen), gathered
 
 
 def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:
@@ -53,27 +52,35 @@ def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:
     )
 
 
-class _Contacts:
-    """Contacts since the previous time, for a growing number of times."""
+class SampledContacts:
+    """Contacts since the previous time, with the largest force of each pair, for a growing number of times.
+
+    Attributes:
+        found: the contacts of each time.
+        times: when they were recorded [s].
+    """
 
     def __init__(self) -> None:
-        self._now: tuple[Contact, ...] = ()
+        self._now: tuple[tuple[float, Contact], ...] = ()
         self._waiting: list[ContactSnapshot] = []
         self.found: list[tuple[Contact, ...]] = []
+        self.times: list[tuple[float, ...]] = []
 
     def add(self, snapshots: Iterable[ContactSnapshot], times: Array) -> None:
         self._waiting += snapshots
         for time in times.tolist():
-            strongest = {(contact.a, contact.b): contact for contact in self._now}
+            strongest = {contact[:2]: (since, contact) for since, contact in self._now}
             taken = 0
             for snapshot in self._waiting:
                 if snapshot.time > time:
                     break
                 taken += 1
-                self._now = snapshot.contacts
-                for contact in snapshot.contacts:
-                    known = strongest.get((contact.a, contact.b))
-                    if known is None or contact.force >= known.force:
-                        strongest[contact.a, contact.b] = contact
+                self._now = tuple((snapshot.time, contact) for contact in snapshot.contacts)
+                for since, contact in self._now:
+                    known = strongest.get(contact[:2])
+                    if known is None or contact.force >= known[1].force:
+                        strongest[contact[:2]] = since, contact
             del self._waiting[:taken]
-            self.found.append(tuple(strongest[pair] for pair in sorted(strongest)))
+            chosen = [strongest[pair] for pair in sorted(strongest)]
+            self.found.append(tuple(contact for _, contact in chosen))
+            self.times.append(tuple(since for since, _ in chosen))

@@ -77,6 +77,7 @@ class Playback:
         body_position: (T, m, 3) [m] positions of `Scene.movable` in the world.
         body_quat_xyzw: (T, m, 4) orientations.
         contacts: for each time the contacts since the previous time, with the largest force of each pair.
+        contact_times: for each time when these contacts were recorded [s], not after it.
         steps: steps in the order of their start.
         verdict: the verdict; None if the log cannot be judged.
         lost: why the end of the log is missing, or None.
@@ -96,6 +97,7 @@ class Playback:
     body_position: Array
     body_quat_xyzw: Array
     contacts: tuple[tuple[Contact, ...], ...]
+    contact_times: tuple[tuple[float, ...], ...]
     steps: tuple[PlaybackStep, ...] = ()
     verdict: Verdict | None = None
     lost: str | None = None

@@ -208,7 +208,7 @@ class Session:
         if not (slow or before or self._touching):
             return
         forces = [0.0] * len(self._contact_force)
-        for a, b, force, _ in self._touching:
+        for a, b, force, _, _ in self._touching:
             joint_a, joint_b = self._joint_of_part.get(a), self._joint_of_part.get(b)
             if joint_a is None:
                 if joint_b is not None:

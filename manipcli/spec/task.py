@@ -13,60 +13,25 @@ from typing import Annotated, Final, Literal, get_args
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from manipcli.core.text import escape
-from manipcli.core.units import EARTH_GRAVITY
+from manipcli.spec.agree import AgreeSpec
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
 from manipcli.spec.planner import PlannerSpec
-from manipcli.spec.quantity import Acceleration, Frequency, Length, Mass, Pause, Time, Turn
+from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
+from manipcli.spec.simulation import SimulationSpec
 from manipcli.spec.vary import VarySpec
 
 __all__ = [
     "BodySpec", "BoxSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "RatesSpec",
-    "RecordSpec", "SimulationSpec", "Size", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
+    "RecordSpec", "Size", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
 ]  # fmt: skip
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
-
-
-class SimulationSpec(Model):
-    """Engine and clock. `control_period` is a whole multiple of `step`; `settle` is simulated before the start."""
-
-    # `unions.task_model` adds the settings of each engine, in a field with its name.
-    engine: str = Field("pybullet", description="Engine. Default pybullet.")
-    step: Annotated[Time, Field(ge=1e-6, le=0.02, description="Physics step, 1 us to 20 ms. Default 1 ms.")] = 0.001
-    control_period: Annotated[
-        Time, Field(gt=0, le=0.05, description="Control period, a whole multiple of `step`, up to 50 ms. Default 1 ms.")
-    ] = 0.001
-    seed: Annotated[int, Field(ge=0, description="Seed of the planner and of samples, 0 or more. Default 0.")] = 0
-    gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
-        EARTH_GRAVITY, description="Gravity in the world frame [m/s^2]. Default [0, 0, -9.81]."
-    )
-    settle: Annotated[
-        Time, Field(ge=0, le=60, description="Time simulated before the start, 0 to 60 s. Default 0.5 s.")
-    ] = 0.5
-
-    @property
-    def own(self) -> Model | None:
-        """The selected engine's own settings; None for an engine without any, or an unknown engine."""
-        own = getattr(self, self.engine, None) if self.engine in type(self).model_fields else None
-        return own if isinstance(own, Model) else None
-
-    @model_validator(mode="after")
-    def _whole_steps(self) -> SimulationSpec:
-        steps = self.control_period / self.step
-        if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
-            message = (
-                f"control_period ({self.control_period:g} s) must be a whole multiple of step ({self.step:g} s), "
-                f"not {steps:.6g} times"
-            )
-            below = max(1, round(steps)) * self.step
-            raise problem("conflict", message, at=("control_period",), hint=f"write {below:g}, or change `step`")
-        return self
 
 
 class BoxSpec(Model):
@@ -333,6 +298,7 @@ class TaskSpec(Model):
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
     baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")
+    agree: AgreeSpec = Field(AgreeSpec(), description="Allowed differences between the runs of several engines.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")
     expect: tuple[ExpectationSpec, ...] = Field(
         (), description="What must hold: at the end, at all times, or in a step."

@@ -31,7 +31,8 @@ from manipcli.spec.condition import (
 )
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.task import SimulationSpec, StepSpec, TaskSpec
+from manipcli.spec.simulation import SimulationSpec
+from manipcli.spec.task import StepSpec, TaskSpec
 
 
 class SpecMember(Protocol):

@@ -13,7 +13,7 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
 from manipcli.model.robot import RobotModel
-from manipcli.model.state import Contact, WorldState
+from manipcli.model.state import Contact, ContactPoint, WorldState
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.write.recorder import Recorder
 from manipcli.scene.scene import Body, Frame, Scene
@@ -148,7 +148,15 @@ def _run(ticks: int) -> Run:
         body_angular=np.zeros((ticks, 2, 3)),
     )
     outputs = tuple(tuple(rng.normal(size=(ticks, len(c.joints))) for _ in range(4)) for c in CONTROLLERS)
-    contacts = (Contact("ball", "cup", 0.25, 0.0), Contact("cup", "robot/wheel", 1.5, -0.0002))
+    points = tuple(
+        ContactPoint(tuple(p), tuple(n), force, tuple(f))
+        for force, (p, n, f) in zip((1.25, 0.0, 0.25), rng.normal(size=(3, 3, 3)).tolist(), strict=True)
+    )
+    contacts = (
+        Contact("ball", "cup", 0.25, 0.0, points[2:]),
+        Contact("cup", "desk", 0.0, -0.0001),
+        Contact("cup", "robot/wheel", 1.5, -0.0002, points),
+    )
     return Run(robot, scene, states, outputs, contacts)
 
 

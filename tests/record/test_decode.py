@@ -73,6 +73,7 @@ def test_elements_are_called_by_the_names_beside_them(make_run: Callable[[int], 
     assert "transforms[cup].transform.rotation.w" in names["tf2_msgs/msg/TFMessage"]
     assert "reference.positions[shoulder]" in names["control_msgs/msg/JointTrajectoryControllerState"]
     assert "contacts[ball+cup].force" in names["manipcli_msgs/msg/Contacts"]
+    assert "contacts[cup+robot/wheel].points[2].normal.z" in names["manipcli_msgs/msg/Contacts"]
 
 
 TEXT = "string[] name\nfloat64[] position\nint32 count\nfloat32[2] pair\n"

@@ -76,7 +76,8 @@ def run(**changes: object) -> Playback:
     verdict = Verdict("demo", "failed", 1, "kinematic", 2.0, OUTCOMES, (), text="step 'drop_1' failed: it fell")
     made = Playback(
         name="demo", robot=None, scene=SCENE, joint_names=(), times=times, position=none, velocity=none, effort=none,
-        reference=none, body_position=position, body_quat_xyzw=quat, contacts=((),) * 101, steps=STEPS, verdict=verdict,
+        reference=none, body_position=position, body_quat_xyzw=quat, contacts=((),) * 101,
+        contact_times=((),) * 101, steps=STEPS, verdict=verdict,
     )  # fmt: skip
     return replace(made, **changes)
 

@@ -25,7 +25,7 @@ from manipcli.pipeline import run_task
 from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
-from manipcli.replay.display_sampling import _Contacts, sampled
+from manipcli.replay.display_sampling import SampledContacts, sampled
 from manipcli.replay.drawing import draw
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.player import player_page
@@ -154,11 +154,12 @@ def test_no_touch_between_two_times_is_lost() -> None:
     def touch(time: float, *forces: tuple[str, float]) -> ContactSnapshot:
         return ContactSnapshot(time, tuple(Contact("a", b, force, 0.0) for b, force in forces))
 
-    gathered = _Contacts()
+    gathered = SampledContacts()
     gathered.add([touch(0.0, ("b", 1.0)), touch(0.011, ("b", 9.0), ("c", 2.0)), touch(0.012)], np.array([0.0, 0.02]))
     gathered.add([touch(0.05, ("c", 3.0))], np.array([0.04, 0.06]))
     found = [[(one.b, one.force) for one in each] for each in gathered.found]
     assert found == [[("b", 1.0)], [("b", 9.0), ("c", 2.0)], [], [("c", 3.0)]]
+    assert gathered.times == [(0.0,), (0.011, 0.011), (), (0.05,)]
 
 
 def test_a_log_that_was_cut_is_shown_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:

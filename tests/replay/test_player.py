@@ -16,9 +16,8 @@ import pytest
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import RobotModel, Tool
-from manipcli.model.state import Contact
+from manipcli.model.state import Contact, ContactPoint
 from manipcli.replay.drawing import draw
-from manipcli.replay.forces import LONGEST, Forces
 from manipcli.replay.playback import Phase, Playback, PlaybackStep
 from manipcli.replay.player import player_html, player_page
 from manipcli.scene.scene import Body, Scene
@@ -55,7 +54,12 @@ def playback() -> Playback:
     position = np.stack([np.sin(times), 0.2 * times], axis=1)
     ball = np.tile([1.0, 2.0, 0.6, 0.0, 0.0, 0.0, 1.0], (26, 1, 1))
     ball[:, 0, 0] += 0.1 * times
-    lies = Contact("ball", "table", 5.0, 0.0)
+    points = (
+        ContactPoint((1.0, 2.0, 0.5), (0.0, 0.0, 1.0), 4.0, (0.5, 0.0, 0.0)),
+        ContactPoint((1.01, 2.0, 0.5), (0.0, 0.0, 1.0), 1.0, (0.0, 0.25, 0.0)),
+        ContactPoint((1.02, 2.0, 0.5), (0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 0.0)),
+    )
+    lies = Contact("ball", "table", 5.0, 0.0, points)
     return Playback(
         name=HOSTILE,
         robot=_robot(),
@@ -73,6 +77,7 @@ def playback() -> Playback:
         body_position=ball[..., :3],
         body_quat_xyzw=ball[..., 3:],
         contacts=((lies,),) * 26,
+        contact_times=((0.0,),) * 26,
         steps=(
             PlaybackStep("one", "move", "one", 0.0, 0.2, "done", phases=(Phase("move", 0.0, 0.2),)),
             PlaybackStep("b", "wait", HOSTILE, 0.2, 0.5, "failed", text=HOSTILE),
@@ -169,18 +174,16 @@ def test_what_is_too_large_for_the_browser_is_as_large_as_its_numbers_get(playba
     assert np.isfinite(values[3]).all() and values[3].max() > 1e38
 
 
-def test_a_push_is_where_the_shapes_touch_and_towards_what_can_move(playback: Playback) -> None:
-    forces = Forces(playback, playback.poses())
-    for k in (0, 25):
-        (push,) = forces.at(k)
-        np.testing.assert_allclose(push.point, [1.0 + 0.1 * playback.times[k], 2.0, 0.5], atol=1e-6)
-        np.testing.assert_allclose(push.direction, [0.0, 0.0, 1.0], atol=1e-6)
-        assert push.force * forces.scale == pytest.approx(LONGEST)
+def test_the_page_has_the_force_and_the_friction_of_each_point(playback: Playback) -> None:
+    head, data, _ = _Elements(player_page(playback)).scripts
+    pushes = json.loads(head)["pushes"]
+    first, rows = _array(pushes["first"], data), _array(pushes["rows"], data).reshape(-1, 9)
+    assert first.tolist() == list(range(0, 53, 2))
+    np.testing.assert_allclose(rows[0], [1.0, 2.0, 0.5, 0.0, 0.0, 4.0, 0.5, 0.0, 0.0])
+    x = 1.01 + 0.1 * playback.times[25]
+    np.testing.assert_allclose(rows[-1], [x, 2.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.25, 0.0], atol=1e-6)
 
 
-def test_a_push_between_robot_and_world_is_on_the_robot(playback: Playback) -> None:
-    stands = Contact("robot/base", "table", 3.0, 0.0)
-    one = replace(playback, contacts=((stands,),) * 26)
-    (push,) = Forces(one, one.poses()).at(0)
-    assert push.direction[2] == pytest.approx(1.0)
-    assert push.point[2] == pytest.approx(0.5)
+def test_a_page_without_points_has_no_pushes(playback: Playback) -> None:
+    bare = tuple(tuple(one._replace(points=()) for one in each) for each in playback.contacts)
+    assert json.loads(_Elements(player_page(replace(playback, contacts=bare))).scripts[0])["pushes"] is None

@@ -27,8 +27,8 @@ class RestsOnSpec(Model):
 def monitor(spec: RestsOnSpec, world: World) -> Monitor:
     """The normal force between the two minus `share` m g [N], g the scene's gravity.
 
-    Contacts have only a normal force, without direction: an object pressed hard against a wall also counts as resting
-    on it. Where units differ, the margin is divided by `share` m g.
+    Only the magnitude of the normal force counts, not its direction: an object pressed hard against a wall also counts
+    as resting on it. Where units differ, the margin is divided by `share` m g.
     """
     weight = world.scene.body(spec.object).mass * float(np.linalg.norm(world.scene.gravity))
     wanted = spec.share * weight

@@ -20,6 +20,7 @@ _OF_JOINTS = {
 _FORCE = {"rad": "N m", "m": "N"}
 _BY_NAME = {
     "manipcli_msgs/Contact": {"force": "N", "distance": "m"},
+    "manipcli_msgs/ContactPoint": {"force": "N"},
     "sensor_msgs/Temperature": {"temperature": "°C"},
     "sensor_msgs/FluidPressure": {"fluid_pressure": "Pa"},
     "sensor_msgs/BatteryState": {"voltage": "V", "current": "A", "temperature": "°C"},
@@ -28,6 +29,7 @@ _BY_NAME = {
 }
 _VECTORS = {
     "translation": "m", "position": "m", "linear": "m/s", "angular": "rad/s", "force": "N", "torque": "N m",
+    "friction": "N",
     "angular_velocity": "rad/s", "linear_acceleration": "m/s²", "magnetic_field": "T",
 }  # fmt: skip
 _ACCELERATIONS = {"linear": "m/s²", "angular": "rad/s²"}

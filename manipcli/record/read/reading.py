@@ -19,6 +19,7 @@ from manipcli.record.channels import ControllerChannel
 from manipcli.record.contents import RECORD, REPAIR, Contents, contents
 from manipcli.record.faults import BadRecording
 from manipcli.record.read.chunk import indexed, open_chunk, singly, walked
+from manipcli.record.read.contacts import have_points
 from manipcli.record.read.scan import MAX_NAMED, Record, Scan, guarded
 from manipcli.record.read.spans import FileSpans
 from manipcli.record.recording import Recording, TaskEvent
@@ -65,6 +66,7 @@ class _Reader:
         self._named = 0
         self._attached = 0
         self._schemas: dict[int, str] = {}
+        self._points = True
         self._channels: dict[int, tuple[str, str]] = {}
         self._metadata: dict[str, dict[str, str]] = {}
         self._attachments: dict[str, bytes] = {}
@@ -96,6 +98,11 @@ class _Reader:
         elif record.opcode == SCHEMA:
             schema = records.Schema.read(stream)
             self._schemas[schema.id] = schema.name
+            if schema.name == schemas.CONTACTS:
+                try:
+                    self._points = have_points(schema.data.decode())
+                except ValueError as error:
+                    raise BadRecording(self._path, str(error)) from error
         elif record.opcode == CHANNEL:
             channel = records.Channel.read(stream)
             kind = self._schemas.get(channel.schema_id, "") if channel.message_encoding == "cdr" else ""
@@ -203,6 +210,7 @@ class _Reader:
                 channels={channel: topic for channel, (topic, _) in self._channels.items()},
                 chunks=tuple(self._chunks),
                 cut=lost is not None,
+                points=self._points,
             ),
             events=tuple(self._events),
             metadata=self._metadata,

@@ -10,10 +10,10 @@ from typing import BinaryIO
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.state import Contact, WorldState
+from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import schemas
-from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.cdr import CdrError
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.contents import Contents
 from manipcli.record.decode import Int
@@ -26,6 +26,7 @@ from manipcli.record.read.columns import (
     controller_state_runs,
     joint_state_runs,
 )
+from manipcli.record.read.contacts import read_contacts
 from manipcli.record.read.differences import body_velocities
 from manipcli.record.read.scan import Record, chunk_at, guarded, readable
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
@@ -42,6 +43,7 @@ class FileSpans:
         channels: channel id -> topic.
         chunks: offsets of its chunks.
         cut: whether parts of the file are missing, so that messages of some ticks can be missing.
+        points: whether contacts have contact points.
     """
 
     path: Path
@@ -49,6 +51,7 @@ class FileSpans:
     channels: Mapping[int, str]
     chunks: tuple[int, ...]
     cut: bool
+    points: bool
 
     def __iter__(self) -> Iterator[Span]:
         """
@@ -65,7 +68,7 @@ class FileSpans:
         yield _with_velocities(before, span, None)
 
     def _without_velocities(self) -> Iterator[Span]:
-        reader = _SpanReader(self.contents, self.channels, gaps=self.cut)
+        reader = _SpanReader(self.contents, self.channels, gaps=self.cut, points=self.points)
         empty = True
         with readable(self.path), self.path.open("rb") as file:
             for start in self.chunks:
@@ -99,10 +102,10 @@ class _Apart(Exception):
 class _SpanReader:
     """Collects the messages of successive chunks into complete ticks.
 
-    `gaps`: ticks can be missing.
+    `gaps`: ticks can be missing; `points`: contacts have contact points.
     """
 
-    def __init__(self, contents: Contents, channels: Mapping[int, str], *, gaps: bool) -> None:
+    def __init__(self, contents: Contents, channels: Mapping[int, str], *, gaps: bool, points: bool) -> None:
         n, m = len(contents.joints), len(contents.bodies)
         self._channels = channels
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
@@ -126,6 +129,7 @@ class _SpanReader:
         self._strided = len(set(strides.values())) > 1
         self._contacts: list[ContactSnapshot] = []
         self._gaps = gaps
+        self._points = points
         self._last = -1
         self._number: int | None = None
 
@@ -150,7 +154,10 @@ class _SpanReader:
                     self._columns[topic].add(data, common)
             elif topic == topics.CONTACTS:
                 self._follow(sequences(data, found))
-                self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in singly(data, found)]
+                self._contacts += [
+                    ContactSnapshot(ns / 1e9, read_contacts(reader, points=self._points))
+                    for ns, reader in singly(data, found)
+                ]
 
     def _follow(self, numbers: Int) -> None:
         """Detect missing contact messages by their sequence numbers, which another program can restart at 0 or set to
@@ -220,14 +227,6 @@ def _with_velocities(before: Span | None, span: Span, after: Span | None) -> Spa
     mine = slice(first, first + len(span.states.time))
     states = replace(span.states, body_linear=_settled(linear[mine]), body_angular=_settled(angular[mine]))
     return replace(span, states=states)
-
-
-def _contacts(reader: CdrReader) -> tuple[Contact, ...]:
-    reader.header()
-    return tuple(
-        Contact(a=reader.text(), b=reader.text(), force=reader.f64(), distance=reader.f64())
-        for _ in range(reader.count(16))
-    )
 
 
 def _settled(values: Array) -> Array:

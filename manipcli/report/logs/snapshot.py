@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from manipcli.core.geometry import Transform
-from manipcli.model.state import Contact
+from manipcli.model.state import Contact, ContactPoint
 from manipcli.report.display_quantity import CUSTOMARY
 from manipcli.report.json import Json, dumps, number
 from manipcli.report.table import table
@@ -57,6 +57,7 @@ class Moment:
         missing: parts that are not known, one sentence each.
         ours: whether manipcli wrote the log.
         tool: pose of the tool frame; None if the log does not define it.
+        contacts_time: when the contacts were recorded [s]; their points are those of this time.
     """
 
     log: str
@@ -72,6 +73,7 @@ class Moment:
     missing: tuple[str, ...]
     ours: bool = True
     tool: PoseMoment | None = None
+    contacts_time: float | None = None
 
 
 def render_text(moment: Moment) -> str:
@@ -100,7 +102,14 @@ def render_json(moment: Moment) -> str:
     contacts: Json = None
     if moment.contacts is not None:
         contacts = [
-            {"a": c.a, "b": c.b, "force": number(c.force), "distance": number(c.distance)} for c in moment.contacts
+            {
+                "a": c.a,
+                "b": c.b,
+                "force": number(c.force),
+                "distance": number(c.distance),
+                "points": [_point_json(point) for point in c.points],
+            }
+            for c in moment.contacts
         ]
     return dumps(
         {
@@ -125,10 +134,20 @@ def render_json(moment: Moment) -> str:
             ],
             "tool": None if moment.tool is None else _pose_json(moment.tool),
             "poses": [_pose_json(pose) for pose in moment.poses],
+            "contacts_time": number(moment.contacts_time),
             "contacts": contacts,
             "missing": list(moment.missing),
         }
     )
+
+
+def _point_json(point: ContactPoint) -> Json:
+    return {
+        "position": [number(value) for value in point.position],
+        "normal": [number(value) for value in point.normal],
+        "force": number(point.force),
+        "friction": [number(value) for value in point.friction],
+    }
 
 
 def _pose_json(pose: PoseMoment) -> Json:
@@ -173,8 +192,21 @@ def _poses(poses: tuple[PoseMoment, ...], what: str) -> str:
 
 
 def _contacts(contacts: tuple[Contact, ...]) -> str:
-    rows = [[c.a, c.b, _shown(c.force, "N"), _shown(-c.distance, "m")] for c in contacts]
-    return table(["touches", "", "force", "depth"], rows, right=["force", "depth"])
+    rows = [[c.a, c.b, _shown(c.force, "N"), _friction(c), _shown(-c.distance, "m")] for c in contacts]
+    header = ["touches", "", "force", "friction", "depth"]
+    used = [k for k in range(len(header)) if header[k] != "friction" or any(row[k] for row in rows)]
+    return table(
+        [header[k] for k in used], [[row[k] for k in used] for row in rows], right=[header[k] for k in used[2:]]
+    )
+
+
+def _friction(contact: Contact) -> str:
+    """Magnitude of the sum of the friction forces; "" without contact points."""
+    if not contact.points:
+        return ""
+    return _shown(
+        math.hypot(*(math.fsum(axis) for axis in zip(*(p.friction for p in contact.points), strict=True))), "N"
+    )
 
 
 def _shown(value: float | None, unit: str) -> str:

@@ -21,7 +21,7 @@ from types import ModuleType
 import numpy as np
 
 from manipcli.core.geometry import Array, cross, rotate, rotate_inverse
-from manipcli.simulate.engines.pybullet_contacts import ContactPoint, Vector
+from manipcli.simulate.engines.pybullet_contacts import BulletPoint, Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +98,7 @@ class WrenchSensors:
         """Store the motion before the last physics step of a tick."""
         self._before = self._motion() if self._now is None else self._now
 
-    def measure(self, points: Sequence[ContactPoint]) -> None:
+    def measure(self, points: Sequence[BulletPoint]) -> None:
         """Compute the wrenches of the last physics step, with all its contact `points`."""
         if self._now is not None or self._before is None:
             return
@@ -129,7 +129,7 @@ class WrenchSensors:
         momenta = np.hstack([self._mass * states[:, 14:17], turning])
         return _Motion(states[:, :3], states[:, 7:10], states[:, 10:14], momenta)
 
-    def _pushed(self, points: Sequence[ContactPoint]) -> tuple[list[int], list[Vector], list[list[float]]]:
+    def _pushed(self, points: Sequence[BulletPoint]) -> tuple[list[int], list[Vector], list[list[float]]]:
         """Rows of the links in contact, contact positions, and contact forces."""
         rows: list[int] = []
         places: list[Vector] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,7 @@ def test_an_element_is_found_by_its_name_and_fields_below_it_without_their_way(l
 def test_who_touches_no_more_has_no_value(log: Path) -> None:
     ours = series(log, "contacts.force")
     theirs = by_rosbags(log, "/contacts")
-    assert set(ours) == {"cup+robot/wheel", "ball+cup"}
+    assert set(ours) == {"cup+robot/wheel", "cup+desk", "ball+cup"}
     for label, one in ours.items():
         expected = [
             next(
@@ -133,6 +134,21 @@ def test_who_touches_no_more_has_no_value(log: Path) -> None:
         assert None in expected
     assert list(series(log, "contacts.force[cup+ball]")) == ["ball+cup"]
     assert set(series(log, "contacts[cup].force")) == set(ours)
+
+
+@pytest.mark.parametrize("field", ["position.x", "normal.z", "force", "friction.y"])
+def test_points_are_named_by_their_contact_and_number(log: Path, field: str) -> None:
+    ours = series(log, f"contacts.points.{field}")
+    theirs = by_rosbags(log, "/contacts")
+    assert list(ours) == ["ball+cup 0", "cup+robot/wheel 0", "cup+robot/wheel 1", "cup+robot/wheel 2"]
+    for label, one in ours.items():
+        pair, k = label.split()
+        expected = [
+            next((attrgetter(field)(c.points[int(k)]) for c in message.contacts if f"{c.a}+{c.b}" == pair), np.nan)
+            for _, message in theirs
+        ]
+        np.testing.assert_array_equal(one.values, expected)
+    assert list(series(log, f"contacts[robot/wheel].points[1].{field}")) == ["cup+robot/wheel 1"]
 
 
 @pytest.mark.parametrize("start", [0.0, 0.1, 0.15, 0.2, 0.25, 0.35])
@@ -343,6 +359,9 @@ def test_units_follow_the_joint_and_the_place(log: Path) -> None:
     assert unit("tf[cup].translation.x") == "m"
     assert unit("tf[cup].rotation.w") == ""
     assert unit("contacts.force") == "N"
+    assert unit("contacts.points.force") == unit("contacts.points.friction.x") == "N"
+    assert unit("contacts.points.position.x") == "m"
+    assert unit("contacts.points.normal.x") == ""
     assert unit("joint_states.header.stamp") == "s"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manipcli.model.state import Contact
+from manipcli.model.state import Contact, ContactPoint
 from manipcli.record.write.contact_filter import ContactFilter
 
 TICK = 0.001
@@ -100,3 +100,11 @@ def test_another_pair_of_the_same_force_is_another_contact() -> None:
     filtered.changed(0.0, [Contact("a", "b", 1.0, 0.0)])
     other = [Contact("a", "c", 1.0, 0.0)]
     assert filtered.changed(TICK, other) == other
+
+
+def test_points_alone_are_no_reason_to_record() -> None:
+    filtered = ContactFilter()
+    points = [ContactPoint((0.1 * k, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, (0.0, 0.0, 0.0)) for k in range(2)]
+    first, then = (Contact("a", "b", 1.0, 0.0, (point,)) for point in points)
+    assert filtered.changed(0.0, [first]) == [first]
+    assert filtered.changed(1.0, [then]) is None
