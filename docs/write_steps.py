@@ -25,6 +25,7 @@ from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Unit
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.robot import (
@@ -50,6 +51,7 @@ ELSEWHERE: dict[type, str] = {
     BodySpec: "[bodies](task.md#scene)",
     FrameSpec: "[frames](task.md#frames)",
     PoseSpec: "a [pose](task.md#poses)",
+    PlannerSpec: "a [mapping](task.md#planner)",
     RecordSpec: "a [mapping](task.md#record)",
     ReplanSpec: "a [mapping](task.md#replan)",
     VarySpec: "[distributions](task.md#vary)",

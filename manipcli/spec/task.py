@@ -19,6 +19,7 @@ from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.clearance import ClearanceSpec, PartPair
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
@@ -290,6 +291,9 @@ class TaskSpec(Model):
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
     simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")
+    planner: PlannerSpec = Field(
+        PlannerSpec(), description="How paths around obstacles are searched. Default: `rrt_connect`."
+    )
     record: RecordSpec = Field(RecordSpec(), description="Recorded topics and their rates.")
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")

@@ -75,8 +75,8 @@ class MoveSpec(Model):
     path: Literal["free", "joint", "linear"] = Field(
         "free",
         description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
-        "configuration. `free`: the same, or to another configuration if the path to the nearest one is not free. "
-        "Default `free`.",
+        "configuration. `free`: the same; if that is not free, straight to another configuration, else around "
+        "obstacles (not with `touch` or `guarded`). Default `free`.",
     )
     velocity_scaling: VelocityScaling = 1.0
     touch: tuple[str, ...] = Field(
@@ -147,23 +147,25 @@ def _plan(spec: MoveSpec, planner: Planner, state: PlanningState, *, avoid: Sequ
     """One motion; a named pose with joints of the hand moves the hand at the same time, unless it is closed."""
     allowed = planner.may_touch(state, spec.touch) if spec.touch else NOTHING
     builder = MotionBuilder(planner, state, verb="move", allowed=allowed)
+    # What is pushed or pressed on would be in no known place along a path around something else.
+    around = spec.path == "free" and not (spec.touch or spec.guarded)
     if isinstance(spec.to, str):
         pose = planner.robot.pose(spec.to)
         values = dict(zip(pose.joints, pose.positions, strict=True))
         arm = {name: value for name, value in values.items() if name not in planner.gripper_joints}
         chosen = arm if state.closed and arm else values
-        builder.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling)
+        builder.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling, free=around)
     elif spec.to is not None:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
-        builder.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling)
+        builder.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling, free=around)
     else:
         X_WT, leaving = _goal(spec, planner, state)
         if spec.path == "linear":
             builder.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
         else:
-            builder.reach(
-                "move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving, avoid=avoid
-            )
+            free = spec.path == "free"
+            speed = spec.velocity_scaling
+            builder.reach("move", X_WT, speed=speed, free=free, searched=around, leaving=leaving, avoid=avoid)
     planned = builder.plan()
     (motion,) = planned.motions
     end = planned.end
