@@ -7,6 +7,8 @@ Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 (inverse
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,6 +113,32 @@ class Kinematics:
         V = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         linear: Array = V.linear
         return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
+
+    def point_motion(self, q: Array, v: Array, a: Array, link: str, offset: Transform) -> tuple[Array, Array, Array]:
+        """(R_WT (3, 3), v_WT (3,) [m/s], a_WT (3,) [m/s2]) of the origin of frame T, at `offset` X_LT in `link`.
+
+        a = a_L + alpha x r + w x (w x r), with r from L to T in world axes (Featherstone, chapter 2).
+        """
+        pin, model, data, frame = self._pin, self._model, self._data, self._frames[link]
+        pin.forwardKinematics(model, data, q, v, a)
+        R = pin.updateFramePlacement(model, data, frame).rotation
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        V = pin.getFrameVelocity(model, data, frame, axes)
+        A = pin.getFrameClassicalAcceleration(model, data, frame, axes)
+        arm, w = R @ offset.p, V.angular
+        turning = cross(w, arm)
+        return R @ offset.R, V.linear + turning, A.linear + cross(A.angular, arm) + cross(w, turning)
+
+    def carrying(self, link: str, loads: Iterable[tuple[float, Transform, Array]]) -> Kinematics:
+        """The same robot with rigid `loads` on a link: mass [kg], X_LI of its inertial frame, inertia (3, 3) in I."""
+        other = copy(self)
+        other._model = model = self._model.copy()
+        frame = model.frames[self._frames[link]]
+        for mass, X_LI, inertia in loads:
+            body = self._pin.Inertia(mass, np.zeros(3), np.array(inertia))
+            model.appendBodyToJoint(frame.parentJoint, body, frame.placement * self._se3(X_LI))
+        other._data = model.createData()
+        return other
 
     def gravity(self, q: Array) -> Array:
         """g(q) (n,) [N m or N], the gravity load of the joints. A view, overwritten by the next call."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
 from manipcli.plan.motion_limits import MotionLimits
+from manipcli.plan.timing_bound import TimingBound
 from manipcli.plan.trajectory import JointTrajectory
 
 Curve = Callable[[Array], tuple[Array, Array, Array]]
@@ -70,6 +71,7 @@ def on_ticks(
     target: Array,
     limits: MotionLimits,
     period: float,
+    bounds: Sequence[TimingBound] = (),
 ) -> JointTrajectory:
     """Sample `curve` over [0, nominal] at every multiple of `period`, stretched to end on a tick, at rest on `target`.
 
@@ -80,7 +82,7 @@ def on_ticks(
         curve: rest-to-rest motion.
         nominal: its duration [s].
         target: (n) position at its end, reached exactly.
-        limits: what the samples must keep.
+        limits, bounds: what the samples must keep.
         period: control period [s].
 
     Raises:
@@ -97,7 +99,7 @@ def on_ticks(
         q, v, a = curve(np.minimum(times * scale, nominal))
         v, a = v * scale, a * scale**2
         q[-1], v[-1], a[-1] = target, 0.0, 0.0
-        over = excess(v, a, limits, period=period)
+        over = max([excess(v, a, limits, period=period), *(bound.stretch(q, v, a) for bound in bounds)])
         if over <= 1.0 + 1e-9:
             break
         stretch = over * (1.0 + 1e-9) / scale
