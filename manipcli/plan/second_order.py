@@ -46,6 +46,8 @@ class Bounded:
 
     def constraints(self, toppra: ModuleType, speeds: Array | None) -> list[object]:
         """For toppra; `speeds` (k): s' of the round before."""
+        if not self._terms:
+            return []
         at = self._most if speeds is None else np.asarray(speeds)
         made = []
         for terms, rub in zip(self._terms, self._rubs, strict=True):
