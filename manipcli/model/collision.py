@@ -23,8 +23,9 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.motion_bound import MotionBound, Mover
 from manipcli.scene.scene import Scene
-from manipcli.shapes.proximity import coal_shape
+from manipcli.shapes.proximity import bounding_ball, coal_shape
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from manipcli.shapes.proximity import CollisionGeometry
 
 RESOLUTION = 0.01  # rad or m: largest joint motion between two checked positions of a trajectory
+_LIGHTEST = 0.05  # weight of a pair that moves little
 _SEEN = 5e-5  # m: smaller values would be printed as 0.0 mm
 
 Pair = tuple[str, str]
@@ -162,6 +164,9 @@ class CollisionQuery:
 
         self._pin = pin
         self._kinematics = kinematics
+        self.margin = margin
+        self._inflated: dict[tuple[float, ...], InflatedQuery] = {}
+        self._parts = tuple(parts)
         self._names = [part.name for part in parts]
         self._geometry = pin.GeometryModel()
         for k, part in enumerate(parts):
@@ -208,6 +213,13 @@ class CollisionQuery:
                 deepest[a, b] = min(depth, deepest.get((a, b), np.inf))
         return tuple(CollisionHit(a=a, b=b, distance=depth) for (a, b), depth in sorted(deepest.items()))
 
+    def inflated(self, levels: Sequence[float]) -> InflatedQuery:
+        """The same query with larger margins [m]; see `InflatedQuery`."""
+        key = tuple(levels)
+        if key not in self._inflated:
+            self._inflated[key] = InflatedQuery(self._kinematics, self._geometry, self._parts, self.margin, key)
+        return self._inflated[key]
+
     def check_trajectory(
         self,
         columns: Sequence[int],
@@ -233,6 +245,62 @@ class CollisionQuery:
         return None
 
 
+class InflatedQuery:
+    """A query with several margins: at level c every pair has its margin, plus `levels[c]` times the pair's weight.
+
+    The weight is the pair's motion for equal speeds of all joints, relative to the pair that moves most.
+
+    Attributes:
+        bound: bounds of the motion of the movers.
+        summed: (movers, pairs) 1 where a mover's motion changes the distance of a pair; pairs of one link with bodies
+            of the scene are one column.
+        weights: (pairs).
+    """
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        geometry: pin.GeometryModel,
+        parts: Sequence[_Part],
+        margin: float,
+        levels: Sequence[float],
+    ) -> None:
+        import pinocchio as pin
+
+        self._pin, self._kinematics, self._geometry = pin, kinematics, geometry
+        self._data = kinematics.model.createData()
+        movers: dict[tuple[int, int], int] = {}
+        columns: dict[tuple[int, ...], int] = {}
+        self._column: list[int] = []  # of every pair
+        for pair in geometry.collisionPairs:
+            ends = ((pair.first, parts[pair.second].joint), (pair.second, parts[pair.first].joint))
+            rows = [movers.setdefault(end, len(movers)) for end in ends if _moves(kinematics.model, parts, *end)]
+            self._column.append(columns.setdefault(tuple(rows), len(columns)))
+        self.bound = MotionBound(kinematics, [_mover(parts[k], seen_from) for k, seen_from in movers])
+        self.summed = np.zeros((len(movers), len(columns)))
+        for rows, column in columns.items():
+            self.summed[list(rows), column] = 1.0
+        reach = self.bound.reach.sum(axis=1) @ self.summed
+        self.weights = np.maximum(reach / max(1e-9, float(reach.max(initial=0.0))), _LIGHTEST)
+        self._margins = [margin + c * self.weights for c in levels]
+        self._levels: list[tuple[pin.GeometryData, object] | None] = [None] * len(levels)
+
+    def touches(self, q: Array, level: int) -> bool:
+        """Whether any parts are closer than their margin of this level."""
+        made = self._levels[level]
+        if made is None:
+            made = self._levels[level] = self._make(self._margins[level])
+        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, made[1], q, True))
+
+    def _make(self, margins: Array) -> tuple[pin.GeometryData, object]:
+        pin = self._pin
+        state = pin.GeometryData(self._geometry)
+        for request, column in zip(state.collisionRequests, self._column, strict=True):
+            request.security_margin = float(margins[column])
+        broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._kinematics.model, self._geometry, state)
+        return state, broad
+
+
 @dataclass(frozen=True, slots=True)
 class _Part:
     """A shape of a link or of a body; `placement` is in the frame of `joint` (0: the world)."""
@@ -242,6 +310,19 @@ class _Part:
     joint: int
     placement: pin.SE3
     shape: CollisionGeometry
+
+
+def _moves(model: pin.Model, parts: Sequence[_Part], part: int, seen_from: int) -> bool:
+    """Whether a joint moves a part relative to what is fixed to the joint `seen_from` (0: the world)."""
+    joint, other = parts[part].joint, seen_from
+    while other > joint:
+        other = model.parents[other]
+    return bool(joint != other)
+
+
+def _mover(part: _Part, seen_from: int) -> Mover:
+    centre, radius = bounding_ball(part.shape)
+    return Mover(part.joint, seen_from, part.placement.act(centre), radius)
 
 
 def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:
