@@ -118,9 +118,7 @@ def _table(rng: np.random.Generator) -> Draft:
     return boxes, left, [pose for pose in beside() if pose.p[1] < -0.12]
 
 
-def _shelf(
-    rng: np.random.Generator, *, height: float, boards: int, width: float, columns: int, board: float
-) -> Draft:
+def _shelf(rng: np.random.Generator, *, height: float, boards: int, width: float, columns: int, board: float) -> Draft:
     """A bookshelf with boards and walls; the tool goes from one compartment to another."""
     x = rng.uniform(0.55, 0.65)
     y = rng.uniform(-0.1, 0.1)

@@ -36,9 +36,7 @@ class FreeSpace:
         self._edges = EdgeCheck(query)
         self._columns = list(robot.indices(tuple(names)))
         self._others = [np.array(q) for q in others]
-        self._mimics = any(
-            joint.mimic is not None and joint.mimic.joint in names for joint in robot.moving_joints
-        )
+        self._mimics = any(joint.mimic is not None and joint.mimic.joint in names for joint in robot.moving_joints)
         self._blocked: list[Array] = []
         self.edges = 0
         """Number of edges that were checked."""

@@ -18,15 +18,20 @@ from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
+from manipcli.plan.keep import Kept, refuse_unkept
+from manipcli.plan.kept_path import kept_path
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
+from manipcli.plan.motion_constraints import applying, bounds_of, keeps_of
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
+from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
-from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.sweep import grip_time, refuse_collision
+from manipcli.plan.retimer import retime
+from manipcli.plan.sweep import grip_time, refuse_collision, swept
+from manipcli.plan.timing_bound import TimingBound, refuse_exceeded
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
 
@@ -96,7 +101,7 @@ class MotionBuilder:
                 hint=f"open the hand with `release`{'' if carried is None else ' or `place`'}",
             )
         with self._labelled(label):
-            trajectory = self._rest_to_rest(arm, [values[name] for name in arm], speed) if arm else None
+            trajectory = self._rest_to_rest(label, arm, [values[name] for name in arm], speed) if arm else None
         self._add(label, trajectory, self._grip({name: values[name] for name in names if name in hand}))
 
     def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
@@ -133,7 +138,7 @@ class MotionBuilder:
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid)
-            trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
+            trajectory = self._rest_to_rest(label, solver.joints, goal[list(solver.columns)], speed, line=X_WT)
         self._add(label, trajectory, grip)
 
     def straight(
@@ -144,7 +149,7 @@ class MotionBuilder:
         A line that is the step itself may run along joint limits.
         """
         with self._labelled(label):
-            trajectory = self._straight(X_WT, speed, insist=label == self._verb, leaving=leaving)
+            trajectory = self._straight(label, X_WT, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
@@ -154,7 +159,7 @@ class MotionBuilder:
         body that does not sit in the middle of the hand.
         """
         with self._labelled("withdraw"):
-            trajectory = self._straight(X_WT, speed)
+            trajectory = self._straight("withdraw", X_WT, speed)
         allowed = NOTHING
         if grazing:
             planner = self._planner
@@ -172,7 +177,7 @@ class MotionBuilder:
             for k in range(count + 1)
         ]
         with self._labelled(label):
-            trajectory = self._timed(lambda solver: follow_poses(solver, self._now.position, poses), speed)
+            trajectory = self._timed(label, lambda solver: follow_poses(solver, self._now.position, poses), speed)
         self._add(label, trajectory, None)
 
     def back(self, label: str) -> None:
@@ -339,24 +344,54 @@ class MotionBuilder:
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
 
-    def _rest_to_rest(self, names: Sequence[str], target: npt.ArrayLike, speed: float) -> JointTrajectory:
-        limits = self._limits(names, speed)
-        start = self._now.position[self._planner.robot.indices(tuple(names))]
-        trajectory = rest_to_rest(start, target, limits, period=self._planner.period)
+    def _rest_to_rest(
+        self, label: str, names: Sequence[str], target: npt.ArrayLike, speed: float, *, line: Transform | None = None
+    ) -> JointTrajectory:
+        """Straight in joint space; where that violates a constraint, on the tool's `line`, or on a searched path."""
+        planner, now, limits = self._planner, self._now, self._limits(names, speed)
+        end = self._with(names, target)
+        keeps = applying(keeps_of(planner, now, label), end)
+        points = kept_path(planner, now, self._query(), tuple(names), end, keeps, line)
+        bounds = bounds_of(planner, now, tuple(names), points, keeps)
+        trajectory = retime(points, limits, period=planner.period, bounds=bounds)
         verify(trajectory, limits)
+        self._refuse_unkept(keeps, trajectory)
         return trajectory
 
     def _straight(
-        self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+        self, label: str, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
         return self._timed(
-            lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist, leaving=leaving
+            label,
+            lambda solver: linear_path(solver, self._now.position, X_WT),
+            speed,
+            insist=insist,
+            leaving=leaving,
         )
 
-    def _timed(self, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing") -> JointTrajectory:
-        limits = self._limits(self._planner.solver.joints, speed)
-        solver = self._planner.solver.leaving(leaving)
-        return timed_line(walk, solver, limits, period=self._planner.period, insist=insist)
+    def _timed(
+        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+    ) -> JointTrajectory:
+        planner, now = self._planner, self._now
+        limits = self._limits(planner.solver.joints, speed)
+        keeps = keeps_of(planner, now, label)
+
+        def bounds(points: Array) -> Sequence[TimingBound]:
+            return bounds_of(planner, now, limits.names, points, keeps)
+
+        solver = planner.solver.leaving(leaving)
+        trajectory = timed_line(walk, solver, limits, period=planner.period, insist=insist, bounds=bounds)
+        self._refuse_unkept(applying(keeps, self._with(trajectory.names, trajectory.positions[-1])), trajectory)
+        return trajectory
+
+    def _refuse_unkept(self, keeps: tuple[Kept, ...], trajectory: JointTrajectory) -> None:
+        """Check the constraints of a motion at every control tick."""
+        planner, now = self._planner, self._now
+        if any(kept.margin is not None for kept in keeps):
+            times, positions = swept(planner, now, trajectory, None)
+            refuse_unkept(keeps, times, positions)
+        dynamics = PathDynamics(planner, now, trajectory.names)
+        refuse_exceeded([kept.bound(dynamics) for kept in keeps if kept.bound is not None], trajectory)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING

@@ -6,6 +6,7 @@ A step queries the `Planner` about a state, and builds its motions with a `Motio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import combinations
 
 import numpy as np
@@ -22,6 +23,7 @@ from manipcli.plan.motion import PlanningState
 from manipcli.scene.scene import Interior, Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.shapes.primitives import Cylinder
+from manipcli.spec.keep import KeepSpec
 
 Pairs = frozenset[Pair]
 """Pairs of parts that may touch; a part is a body, or `robot/<link>`."""
@@ -78,8 +80,15 @@ class Planner:
         hand |= {joint.parent for joint in robot.joints if joint.name in gripper_joints}
         ignore = (*robot.collision_ignore, *combinations(sorted(hand), 2))
         self.checker = CollisionChecker(self.kinematics, scene, ignore=ignore)
+        self.keep: tuple[KeepSpec, ...] = ()
         self._solver: InverseKinematics | None = None
         self._queries: dict[tuple[object, ...], CollisionQuery] = {}
+
+    def keeping(self, keep: tuple[KeepSpec, ...]) -> Planner:
+        """The same planner for a step with these constraints; it shares generator, solver and queries."""
+        other = copy(self)
+        other.keep = keep
+        return other
 
     @property
     def solver(self) -> InverseKinematics:

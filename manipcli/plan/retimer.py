@@ -38,7 +38,6 @@ _WINDOWS = 1.0, 2.0  # times acceleration / jerk: jumps of s'' from and to zero 
 _MUCH = 0.25  # of the time without jerk limits: a window beyond it may be too wide; at half of it, it is
 _HALVINGS = 20  # of the accelerations: 2^20 is more than any useful factor
 _ROUNDING = 1e-9
-_SCREEN = 5  # ticks between the instants at which bounds are looked at first
 _STRAIGHT = 9  # waypoints of a straight path: its spline is the line itself
 
 
@@ -64,7 +63,7 @@ def retime(
         motion = rest_to_rest(points[0], points[-1], limits, period=period)
     else:
         motion = _along(points, limits, period, ())
-    if kept(bounds, motion, stride=_SCREEN) and kept(bounds, motion):
+    if kept(bounds, motion):
         return motion
     if np.ptp(motion.positions, axis=0).max() <= _ROUNDING:
         refuse_at_rest(bounds, motion.positions[:1], np.zeros_like(motion.positions[:1]))

@@ -73,9 +73,7 @@ def _constraint(toppra: ModuleType, terms: Terms) -> object:
     m = terms.a.shape[1]
 
     def params(self: object, path: object, grid: Array, *_: object) -> object:
-        return linear.canlinear_colloc_to_interpolate(
-            *terms, np.eye(m), np.zeros(m), None, None, grid, identical=True
-        )
+        return linear.canlinear_colloc_to_interpolate(*terms, np.eye(m), np.zeros(m), None, None, grid, identical=True)
 
     made = type("Bound", (base,), {"compute_constraint_params": params})()
     made.identical = True

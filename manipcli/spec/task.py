@@ -17,6 +17,7 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
+from manipcli.spec.keep import Keeps
 from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
@@ -219,6 +220,11 @@ class StepSpec(KeyedSpec):
     )
     timeout: Annotated[Pause, Field(gt=0)] | None = Field(
         None, description="Time after which the step fails [s], above 0 to 1 h."
+    )
+    keep: Keeps = Field(
+        (),
+        description="Constraints on the step's motions, one mapping or a list: `keep: {upright: 10 deg, tool_speed: "
+        "0.25}`. A path that keeps them is searched; the motion is checked at every control tick.",
     )
     on_fail: OnFail = Field(
         "stop",

@@ -142,7 +142,7 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
 def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
     if state.at_start:
         planner.outside(state)
-    return STEPS[step.verb].candidates(step.body, planner, state)
+    return STEPS[step.verb].candidates(step.body, planner.keeping(step.keep) if step.keep else planner, state)
 
 
 def start_position(task: Task) -> Array:

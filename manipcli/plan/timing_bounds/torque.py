@@ -54,13 +54,18 @@ class TorqueBound(TimingBound):
     def viscous(self, v: Array) -> Array | None:
         return self._both(self._damping * v) if self._damping.any() else None
 
+    def values(self, q: Array, v: Array, a: Array) -> Array:
+        return self._both(self._dynamics.torques(q, v, a) + self._coulomb * np.sign(v) + self._damping * v)
+
     def text(self, q: Array, v: Array, a: Array) -> str:
         rub = self._coulomb * np.sign(v) + self._damping * v
         torque = np.abs(self._dynamics.torques(q[None], v[None], a[None])[0] + rub)
         k = self._kept[int(np.argmax((torque / self._limit)[self._kept]))]
         joint = self._joints[k]
         needed, most = distinguished(float(torque[k]), float(self._limit[k]))
-        return f"joint '{joint.name}' needs {needed} {joint.effort_unit}; its effort limit is {most} {joint.effort_unit}"
+        return (
+            f"joint '{joint.name}' needs {needed} {joint.effort_unit}; its effort limit is {most} {joint.effort_unit}"
+        )
 
     def _load(self, q: Array) -> Array:
         if self._loads[0] is not q:
