@@ -114,21 +114,6 @@ class Kinematics:
         linear: Array = V.linear
         return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
 
-    def point_motion(self, q: Array, v: Array, a: Array, link: str, offset: Transform) -> tuple[Array, Array, Array]:
-        """(R_WT (3, 3), v_WT (3,) [m/s], a_WT (3,) [m/s2]) of the origin of frame T, at `offset` X_LT in `link`.
-
-        a = a_L + alpha x r + w x (w x r), with r from L to T in world axes (Featherstone, chapter 2).
-        """
-        pin, model, data, frame = self._pin, self._model, self._data, self._frames[link]
-        pin.forwardKinematics(model, data, q, v, a)
-        R = pin.updateFramePlacement(model, data, frame).rotation
-        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        V = pin.getFrameVelocity(model, data, frame, axes)
-        A = pin.getFrameClassicalAcceleration(model, data, frame, axes)
-        arm, w = R @ offset.p, V.angular
-        turning = cross(w, arm)
-        return R @ offset.R, V.linear + turning, A.linear + cross(A.angular, arm) + cross(w, turning)
-
     def carrying(self, link: str, loads: Iterable[tuple[float, Transform, Array]]) -> Kinematics:
         """The same robot with rigid `loads` on a link: mass [kg], X_LI of its inertial frame, inertia (3, 3) in I."""
         other = copy(self)

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from manipcli.core.geometry import Array, Transform, matrix_from_quat, quat_product, rotate
-from manipcli.model.batch_kinematics import forward_batch, link_places
-from manipcli.model.robot import RobotModel
+from manipcli.core.geometry import Array, Transform, rotate
+from manipcli.model.batch_motion import frames
+from manipcli.model.collision import Carried
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
 
 
-def frames(robot: RobotModel, q: Array, link: str, X_LF: Transform) -> tuple[Array, Array]:
-    """Positions (k, 3) [m] and rotations (k, 3, 3) in the world of a frame F in a link, at positions q (k, n)."""
-    last, X = link_places(robot)[link]
-    X = X @ X_LF
-    if last < 0:
-        return np.tile(X.p, (len(q), 1)), np.tile(X.R, (len(q), 1, 1))
-    p, quat = forward_batch(robot, q)
-    R = [matrix_from_quat(each) for each in quat_product(quat[:, last], X.quat_xyzw)]
-    return p[:, last] + rotate(quat[:, last], X.p), np.array(R)
+def tilts(planner: Planner, carried: Carried, q: Array) -> Array:
+    """(k) [rad] of the held object's z axis to the vertical, at positions q (k, n)."""
+    _, quat = frames(planner.robot, q, carried.link, carried.X_LO)
+    z = rotate(quat, np.array([0.0, 0.0, 1.0]))
+    return np.asarray(np.arctan2(np.hypot(z[:, 0], z[:, 1]), z[:, 2]))
 
 
 def held_points(planner: Planner, state: PlanningState) -> tuple[str, str, Transform, Array]:
@@ -39,5 +35,5 @@ def held_points(planner: Planner, state: PlanningState) -> tuple[str, str, Trans
 def points_of(planner: Planner, state: PlanningState, q: Array) -> Array:
     """(k, m, 3) [m] those corners in the world at positions q (k, n)."""
     _, link, X_LO, corners = held_points(planner, state)
-    p, R = frames(planner.robot, q, link, X_LO)
-    return np.asarray(p[:, None] + np.einsum("kij,mj->kmi", R, corners))
+    p, quat = frames(planner.robot, q, link, X_LO)
+    return np.asarray(p[:, None] + rotate(quat[:, None], corners))

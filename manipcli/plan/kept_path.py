@@ -1,4 +1,4 @@
-"""A joint path that keeps the constraints of a step: the straight one, the tool's straight line, or a searched one.
+"""Joint paths that keep the constraints of a step: the straight one, the tool's straight line, or a searched one.
 
 The search is that of `path_planners.rrt_connect`, in which every new configuration is projected onto the constraints:
 Newton steps on the least margin m(q), dq = (target - m) grad m / |grad m|^2, with the gradient by differences. Edges
@@ -8,6 +8,7 @@ Source: Berenson, Srinivasa, Ferguson and Kuffner, "Manipulation planning on con
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Final
 
@@ -37,7 +38,7 @@ _SHORTCUTS: Final = 100
 _SAME: Final = 1e-3  # rad or m
 
 
-def kept_path(
+def kept_paths(
     planner: Planner,
     state: PlanningState,
     query: CollisionQuery,
@@ -45,8 +46,10 @@ def kept_path(
     end: Array,
     keeps: tuple[Kept, ...],
     line: Transform | None = None,
-) -> Array:
-    """Waypoints (k, m) of the joints `names` from the state to `end` (n); two where the straight path keeps `keeps`.
+) -> Iterator[Array]:
+    """Paths to try: waypoints (k, m) of the joints `names` from the state to `end` (n).
+
+    The straight path, two waypoints, is the only one where it keeps `keeps`.
 
     Args:
         planner, state, query: what moves, and what is free.
@@ -63,15 +66,16 @@ def kept_path(
     straight = np.stack((start[columns], end[columns]))
     shape = tuple(kept for kept in keeps if kept.margin is not None)
     if not shape or _least(shape, start, columns, straight) >= -ROUNDING:
-        return straight
+        yield straight
+        return
     refuse_unkept(shape, np.zeros(1), start[None])
     for kept in shape:
         if margins((kept,), end[None])[0] < -ROUNDING:
             raise NotPlannable(f"{kept.text(end)} at its end", hint="move it elsewhere", reason="constraint")
     on_line = _tool_line(planner, state, names, end, line)
     if on_line is not None and _least(shape, start, columns, on_line) >= -ROUNDING:
-        return on_line
-    return _searched(planner, state, query, names, end, shape)
+        yield on_line
+    yield _searched(planner, state, query, names, end, shape)
 
 
 def _tool_line(
@@ -147,9 +151,8 @@ def _searched(
     return np.vstack([short[:1], *(_between(a, b, _SPACING)[1:] for a, b in pairwise(short))])
 
 
-def projected(margin: object, q: Array, least: float) -> Array | None:
+def projected(margin: Callable[[Array], Array], q: Array, least: float) -> Array | None:
     """The configuration near `q` (m) whose margin is at least `least`; None if Newton's method finds none."""
-    assert callable(margin)
     q = np.array(q)
     for _ in range(_NEWTON):
         around = np.vstack((q, q + _DIFFERENCE * np.eye(len(q))))

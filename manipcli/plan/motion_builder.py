@@ -19,7 +19,7 @@ from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.keep import Kept, refuse_unkept
-from manipcli.plan.kept_path import kept_path
+from manipcli.plan.kept_path import kept_paths
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
@@ -351,12 +351,21 @@ class MotionBuilder:
         planner, now, limits = self._planner, self._now, self._limits(names, speed)
         end = self._with(names, target)
         keeps = applying(keeps_of(planner, now, label), end)
-        points = kept_path(planner, now, self._query(), tuple(names), end, keeps, line)
-        bounds = bounds_of(planner, now, tuple(names), points, keeps)
-        trajectory = retime(points, limits, period=planner.period, bounds=bounds)
-        verify(trajectory, limits)
-        self._refuse_unkept(keeps, trajectory)
-        return trajectory
+        refusal: NotPlannable | None = None
+        for points in kept_paths(planner, now, self._query(), tuple(names), end, keeps, line):
+            try:
+                bounds = bounds_of(planner, now, tuple(names), points, keeps)
+                trajectory = retime(points, limits, period=planner.period, bounds=bounds)
+                verify(trajectory, limits)
+                self._refuse_unkept(keeps, trajectory)
+                if len(points) > 2:
+                    refuse_collision(planner, now, self._query(), label, trajectory, None)
+            except NotPlannable as cause:
+                refusal = cause
+                continue
+            return trajectory
+        assert refusal is not None
+        raise refusal
 
     def _straight(
         self, label: str, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"

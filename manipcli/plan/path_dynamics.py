@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.batch_motion import point_motion
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
@@ -20,7 +21,7 @@ class PathDynamics:
     def __init__(self, planner: Planner, state: PlanningState, names: tuple[str, ...]) -> None:
         self.columns = planner.robot.indices(names)
         self._rest = np.array(state.position)
-        self._kinematics = planner.kinematics
+        self._robot = planner.robot
         self._loaded = _loaded(planner, state)
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
@@ -33,11 +34,8 @@ class PathDynamics:
         return np.array([inverse(*instant)[columns] for instant in whole]).reshape(q.shape)
 
     def points(self, q: Array, v: Array, a: Array, link: str, X_LT: Transform) -> tuple[Array, Array, Array]:
-        """(R_WT (k, 3, 3), velocity (k, 3) [m/s], acceleration (k, 3) [m/s2]) of a frame T in a link."""
-        whole = zip(self._whole(q), *(self._padded(each) for each in (v, a)), strict=True)
-        motions = [self._kinematics.point_motion(*instant, link, X_LT) for instant in whole]
-        R, velocity, acceleration = (np.array(each) for each in zip(*motions, strict=True))
-        return R, velocity, acceleration
+        """(quaternion (k, 4), velocity (k, 3) [m/s], acceleration (k, 3) [m/s2]) of a frame T in a link."""
+        return point_motion(self._robot, self._whole(q), self._padded(v), self._padded(a), link, X_LT)
 
     def _whole(self, q: Array) -> Array:
         whole = np.tile(self._rest, (len(q), 1))

@@ -59,7 +59,7 @@ class TimingBound(ABC):
         return None
 
     def terms(self, q: Array, first: Array, second: Array) -> Terms:
-        """At points of a path, without viscous friction; `q`, `first`, `second`: (k, n) the path and its derivatives."""
+        """At points of a path (k, n) with its derivatives `first` and `second`; without viscous friction."""
         a = self.moving(q, np.zeros_like(first), first)
         return Terms(a, self.moving(q, first, second), self.still(q, first) - 1.0)
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import Final
 
-from manipcli.conditions.condition import CheckContext, Problem
+from manipcli.conditions.condition import CheckContext, Problem, unknown_body
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
@@ -119,6 +119,11 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
         if step.until is not None:
             for p in until_problems(step.until, step.id, context, CONDITIONS):
                 yield ABSENT, ("steps", k, "until"), p
+        for j, keep in enumerate(step.keep):
+            if keep.above is not None:
+                yield from (
+                    (ABSENT, ("steps", k, "keep"), p) for p in unknown_body(context.scene, keep.above, (j, "above"))
+                )
         if member.guarded(step.body):
             yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from manipcli.core.geometry import Array
-from manipcli.plan.held_frame import frames
+from manipcli.plan.held_frame import tilts
 from manipcli.plan.keep import POURING, KeepMember, Kept
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
@@ -28,13 +26,8 @@ def derived(planner: Planner, state: PlanningState) -> Kept | None:
     carried = state.carried
     if carried is None or not planner.contents(state, carried.body):
         return None
-    now = float(_tilt(planner.body_pose(state, carried.body).R[None])[0])
+    now = float(tilts(planner, carried, state.position[None])[0])
     return _within(max(WITH_CONTENTS, now + _SLIPPED), planner, state, derived=True)
-
-
-def _tilt(R: Array) -> Array:
-    """(k) [rad] of z axes, from rotations (k, 3, 3)."""
-    return np.asarray(np.arctan2(np.hypot(R[:, 0, 2], R[:, 1, 2]), R[:, 2, 2]))
 
 
 def _within(limit: float, planner: Planner, state: PlanningState, *, derived: bool = False) -> Kept | None:
@@ -42,15 +35,12 @@ def _within(limit: float, planner: Planner, state: PlanningState, *, derived: bo
     if carried is None:
         return None
 
-    def tilts(q: Array) -> Array:
-        return _tilt(frames(planner.robot, q, carried.link, carried.X_LO)[1])
-
     def text(q: Array) -> str:
-        tilt = math.degrees(float(tilts(q[None])[0]))
+        tilt = math.degrees(float(tilts(planner, carried, q[None])[0]))
         why = ", which has contents" if derived else ""
         return f"'{carried.body}'{why} tilts by {tilt:.1f} deg, beyond `upright: {math.degrees(limit):g} deg`"
 
-    return Kept("upright", lambda q: limit - tilts(q), text, exempt=POURING, derived=derived)
+    return Kept("upright", lambda q: limit - tilts(planner, carried, q), text, exempt=POURING, derived=derived)
 
 
 MEMBER = KeepMember("upright", opened)

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from manipcli.core.geometry import Array, Transform
+from manipcli.core.geometry import Array, Transform, rotate_inverse
 from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.timing_bound import Terms, TimingBound
 
@@ -42,11 +42,12 @@ class SloshBound(TimingBound):
 
     def still(self, q: Array, direction: Array) -> Array:
         zero = np.zeros_like(q)
-        return 1.0 + self._planes(q, np.broadcast_to(-self._gravity, (len(q), 3)), zero, zero)
+        quat, _, _ = self._dynamics.points(q, zero, zero, *self._frame)
+        return 1.0 + self._planes(quat, -self._gravity)
 
     def moving(self, q: Array, v: Array, a: Array) -> Array:
-        _, _, acceleration = self._dynamics.points(q, v, a, *self._frame)
-        return self._planes(q, acceleration, v, a)
+        quat, _, acceleration = self._dynamics.points(q, v, a, *self._frame)
+        return self._planes(quat, acceleration)
 
     def values(self, q: Array, v: Array, a: Array) -> Array:
         """The angle over the largest one, exactly; the planes are only for the timing."""
@@ -54,8 +55,8 @@ class SloshBound(TimingBound):
 
     def angles(self, q: Array, v: Array, a: Array) -> Array:
         """(k) between the apparent "up" and the cup's axis [rad]."""
-        R, _, acceleration = self._dynamics.points(q, v, a, *self._frame)
-        f = np.einsum("kij,ki->kj", R, acceleration - self._gravity)
+        quat, _, acceleration = self._dynamics.points(q, v, a, *self._frame)
+        f = rotate_inverse(quat, acceleration - self._gravity)
         return np.asarray(np.arctan2(np.hypot(f[:, 0], f[:, 1]), f[:, 2]))
 
     def terms(self, q: Array, first: Array, second: Array) -> Terms:
@@ -67,7 +68,6 @@ class SloshBound(TimingBound):
         limit = math.degrees(self._angle)
         return f"the apparent gravity is {angle:.1f} deg from the cup's axis, beyond `slosh: {limit:g} deg`"
 
-    def _planes(self, q: Array, vectors: Array, v: Array, a: Array) -> Array:
-        """(k, m) products of the planes' normals with vectors (k, 3) of the world, over |g|."""
-        R, _, _ = self._dynamics.points(q, v, a, *self._frame)
-        return np.asarray(np.einsum("kij,ki->kj", R, vectors) @ self._inner.T / self._g)
+    def _planes(self, quat: Array, vectors: Array) -> Array:
+        """(k, m) products of the planes' normals with vectors of the world, (k, 3) or (3,), over |g|."""
+        return np.asarray(rotate_inverse(quat, vectors) @ self._inner.T / self._g)
