@@ -35,6 +35,7 @@ _GRID = 300, 500  # fewest and most grid points: 300 cost 0.12 % of time against
 _FINE = 1000  # with bounds, whose values bend more between grid points: at 300, stretching costs up to 1.8 %
 _PER_WAYPOINT = 4  # grid points between two waypoints, up to the most
 _WINDOWS = 1.0, 2.0  # times acceleration / jerk: jumps of s'' from and to zero need one, full reversals two
+_LESS = 0.3  # of the accelerations, which is tried, too, with bounds
 _MUCH = 0.25  # of the time without jerk limits: a window beyond it may be too wide; at half of it, it is
 _HALVINGS = 20  # of the accelerations: 2^20 is more than any useful factor
 _ROUNDING = 1e-9
@@ -121,9 +122,15 @@ def _along(points: Array, limits: MotionLimits, period: float, bounds: Sequence[
         return sampled(fastest.progress, fastest.duration)
     smooth = []
     for factor in _WINDOWS:
-        timing = _quickest(timed, fastest, factor)
-        refuse_endless(points, limits, timing.duration + factor * timing.window)
-        smooth.append(sampled(*_averaged(timing.progress, timing.duration, factor * timing.window, period)))
+        chosen = [_quickest(timed, fastest, factor)]
+        if bounds:
+            # A bound may allow little, but leave peaks of s'', whose averages exceed it: with less there are none.
+            chosen.append(timed(_LESS))
+        for timing in chosen:
+            refuse_endless(points, limits, timing.duration + factor * timing.window)
+            smooth.append(sampled(*_averaged(timing.progress, timing.duration, factor * timing.window, period)))
+        if bounds:
+            break  # a longer window bends the bounds more, and what it exceeds of jerk is stretched
     return min(smooth, key=lambda motion: motion.duration)
 
 
