@@ -84,7 +84,7 @@ class Arm:
         for into, values in zip(ordered, whole, strict=True):
             into[self._at] = values
         tau = np.array(pinocchio.rnea(self._model, self._data, *ordered))[self._at] + self._armature * whole[2]
-        return tau[columns]
+        return np.asarray(tau[columns])
 
 
 def measure(arm: Arm, rng: np.random.Generator) -> Measured:

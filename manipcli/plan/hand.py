@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
 from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import with_mimics
@@ -106,3 +107,11 @@ def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequenc
         own = {f"robot/{link}" for link in moved_links(robot, [joints[j] for j in finger])}
         found += sorted((hit.distance, link) for hit in hits for link in {hit.a, hit.b} & own)[:1]
     return min(found)[1] if found and len(found) >= min(2, len(parts)) else None
+
+
+def no_gripper(posture: str) -> NotPlannable:
+    """The refusal of a step that moves the hand to a pose without a gripper controller."""
+    return NotPlannable(
+        f"pose '{posture}' has no joint that a gripper controller moves",
+        hint="add a controller of type `gripper` for the hand's joints to the controllers file",
+    )

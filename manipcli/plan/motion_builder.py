@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -16,22 +17,17 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
-from manipcli.plan.hand import closed_on, pressing
+from manipcli.plan.constrained_motion import refuse_violation, smooth_motion, straight_motion, tool_motion
+from manipcli.plan.hand import closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
-from manipcli.plan.keep import Kept, refuse_unkept
-from manipcli.plan.kept_path import kept_paths
 from manipcli.plan.limit_check import verify
-from manipcli.plan.line import Walk, timed_line
+from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
-from manipcli.plan.motion_constraints import applying, bounds_of, keeps_of
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
-from manipcli.plan.path_dynamics import PathDynamics
+from manipcli.plan.path import ANGULAR_STEP, follow_poses, joint_path, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
-from manipcli.plan.retimer import retime
-from manipcli.plan.sweep import grip_time, refuse_collision, swept
-from manipcli.plan.timing_bound import TimingBound, refuse_exceeded
+from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
 
@@ -149,8 +145,23 @@ class MotionBuilder:
         A line that is the step itself may run along joint limits.
         """
         with self._labelled(label):
-            trajectory = self._straight(label, X_WT, speed, insist=label == self._verb, leaving=leaving)
+            walk = partial(linear_path, q=self._now.position, X_WT=X_WT)
+            trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
+
+    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Open = "nothing") -> None:
+        """Move the tool through near poses, from the present one; part of the orientation may be left open."""
+        with self._labelled(label):
+            walk = partial(follow_poses, q=self._now.position, poses=poses)
+            trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
+        self._add(label, trajectory, None)
+
+    def through(self, label: str, names: Sequence[str], waypoints: Array) -> None:
+        """Move along a smooth curve through `waypoints` (k, n) as fast as the limits allow; the first is here."""
+        with self._labelled(label):
+            limits = self._limits(names, 1.0)
+            trajectory = smooth_motion(self._planner, self._now, label, limits, joint_path(waypoints))
+        self._add(label, trajectory, None)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
         """Move the tool on a straight line to a pose, away from a `body` that the now open hand was closed on.
@@ -159,7 +170,7 @@ class MotionBuilder:
         body that does not sit in the middle of the hand.
         """
         with self._labelled("withdraw"):
-            trajectory = self._straight("withdraw", X_WT, speed)
+            trajectory = self._timed("withdraw", partial(linear_path, q=self._now.position, X_WT=X_WT), speed)
         allowed = NOTHING
         if grazing:
             planner = self._planner
@@ -176,9 +187,7 @@ class MotionBuilder:
             Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
             for k in range(count + 1)
         ]
-        with self._labelled(label):
-            trajectory = self._timed(label, lambda solver: follow_poses(solver, self._now.position, poses), speed)
-        self._add(label, trajectory, None)
+        self.along(label, poses, speed=speed)
 
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
@@ -218,6 +227,7 @@ class MotionBuilder:
         )
         with self._labelled(label):
             verify(trajectory, limits, given=points)
+            refuse_violation(self._planner, self._now, label, trajectory)
         self._add(label, trajectory, None)
 
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
@@ -238,7 +248,7 @@ class MotionBuilder:
         planner = self._planner
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
-            raise _no_gripper(posture)
+            raise no_gripper(posture)
         duration = grip_time(self._planner, self._now, grip)
         if body is None:
             self._accept(CLOSING, None, grip, duration)
@@ -273,7 +283,7 @@ class MotionBuilder:
         """
         grip = self._grip(self._posture(posture))
         if grip is None:
-            raise _no_gripper(posture)
+            raise no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
             held = self._now.carried.body
@@ -347,60 +357,14 @@ class MotionBuilder:
     def _rest_to_rest(
         self, label: str, names: Sequence[str], target: npt.ArrayLike, speed: float, *, line: Transform | None = None
     ) -> JointTrajectory:
-        """Straight in joint space; where that violates a constraint, on the tool's `line`, or on a searched path."""
-        planner, now, limits = self._planner, self._now, self._limits(names, speed)
-        end = self._with(names, target)
-        keeps = applying(keeps_of(planner, now, label), end)
-        refusal: NotPlannable | None = None
-        for points in kept_paths(planner, now, self._query(), tuple(names), end, keeps, line):
-            try:
-                bounds = bounds_of(planner, now, tuple(names), points, keeps)
-                trajectory = retime(points, limits, period=planner.period, bounds=bounds)
-                verify(trajectory, limits)
-                self._refuse_unkept(keeps, trajectory)
-                if len(points) > 2:
-                    refuse_collision(planner, now, self._query(), label, trajectory, None)
-            except NotPlannable as cause:
-                refusal = cause
-                continue
-            return trajectory
-        assert refusal is not None
-        raise refusal
-
-    def _straight(
-        self, label: str, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
-    ) -> JointTrajectory:
-        return self._timed(
-            label,
-            lambda solver: linear_path(solver, self._now.position, X_WT),
-            speed,
-            insist=insist,
-            leaving=leaving,
-        )
+        limits, end = self._limits(names, speed), self._with(names, target)
+        return straight_motion(self._planner, self._now, label, limits, end, query=self._query(), line=line)
 
     def _timed(
         self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
-        planner, now = self._planner, self._now
-        limits = self._limits(planner.solver.joints, speed)
-        keeps = keeps_of(planner, now, label)
-
-        def bounds(points: Array) -> Sequence[TimingBound]:
-            return bounds_of(planner, now, limits.names, points, keeps)
-
-        solver = planner.solver.leaving(leaving)
-        trajectory = timed_line(walk, solver, limits, period=planner.period, insist=insist, bounds=bounds)
-        self._refuse_unkept(applying(keeps, self._with(trajectory.names, trajectory.positions[-1])), trajectory)
-        return trajectory
-
-    def _refuse_unkept(self, keeps: tuple[Kept, ...], trajectory: JointTrajectory) -> None:
-        """Check the constraints of a motion at every control tick."""
-        planner, now = self._planner, self._now
-        if any(kept.margin is not None for kept in keeps):
-            times, positions = swept(planner, now, trajectory, None)
-            refuse_unkept(keeps, times, positions)
-        dynamics = PathDynamics(planner, now, trajectory.names)
-        refuse_exceeded([kept.bound(dynamics) for kept in keeps if kept.bound is not None], trajectory)
+        limits = self._limits(self._planner.solver.joints, speed)
+        return tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
@@ -434,10 +398,3 @@ class MotionBuilder:
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
         return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
-
-
-def _no_gripper(posture: str) -> NotPlannable:
-    return NotPlannable(
-        f"pose '{posture}' has no joint that a gripper controller moves",
-        hint="add a controller of type `gripper` for the hand's joints to the controllers file",
-    )

@@ -32,7 +32,7 @@ class ToolSpeed(ToolBound):
 
     def moving(self, q: Array, v: Array, a: Array) -> Array:
         velocity, _ = self._motion(q, v, a)
-        return np.sum(velocity**2, axis=1, keepdims=True) / self._limit**2
+        return np.asarray(np.sum(velocity**2, axis=1, keepdims=True) / self._limit**2)
 
     def text(self, q: Array, v: Array, a: Array) -> str:
         speed = float(np.linalg.norm(self._motion(q[None], v[None], a[None])[0]))
@@ -44,7 +44,7 @@ class ToolAcceleration(ToolBound):
 
     def moving(self, q: Array, v: Array, a: Array) -> Array:
         _, acceleration = self._motion(q, v, a)
-        return np.linalg.norm(acceleration, axis=1, keepdims=True) / self._limit
+        return np.asarray(np.linalg.norm(acceleration, axis=1, keepdims=True) / self._limit)
 
     def terms(self, q: Array, first: Array, second: Array) -> Terms:
         """The acceleration u a' + x b' lies in the plane of two vectors: a polygon in it is inside the circle."""
