@@ -94,7 +94,7 @@ def _along(points: Array, limits: MotionLimits, period: float, bounds: Sequence[
         acceleration = toppra.constraint.JointAccelerationConstraint(
             np.column_stack((-most, most)), discretization_scheme=scheme
         )
-        speeds = None
+        speeds: Array | None = None
         for _ in range(second_order.rounds):
             own = second_order.constraints(toppra, speeds)
             constraints = [velocity, acceleration, *own]
@@ -106,6 +106,7 @@ def _along(points: Array, limits: MotionLimits, period: float, bounds: Sequence[
                 raise NotPlannable(
                     f"the path has no timing within the velocity and acceleration limits{others}: it is not smooth"
                 )
+        assert speeds is not None
         progress, duration = _progress(grid, speeds)
         return Timing(progress, duration, float(np.max(_peaks(spline, grid, speeds) / limits.jerk)))
 

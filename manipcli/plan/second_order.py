@@ -11,6 +11,7 @@ from manipcli.core.geometry import Array
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.timing_bound import Terms, TimingBound
 
+_LEAST = 1e-3  # of the largest speed, at which friction is linearised
 _REFINED = 3  # rounds with viscous friction: each linearises it at the speeds of the one before
 
 
@@ -60,8 +61,10 @@ def _rubbing(terms: Terms, rub: Array, speeds: Array, most: Array) -> Terms:
 
     s' is the root of x = s'^2: below its tangent at `speeds` (k), and above its chord from 0 to `most` (k).
     """
-    at = np.maximum(speeds, 1e-3 * most)[:, None]
     against = rub > 0.0
+    # A tangent at a speed at which friction takes all that rest leaves, or more, would forbid rest.
+    room = np.where(against, -terms.c / np.where(against, rub, 1.0), np.inf).min(axis=1)
+    at = np.clip(speeds, np.minimum(_LEAST * most, room), room)[:, None]
     slope = np.where(against, rub / (2.0 * at), rub / most[:, None])
     return Terms(terms.a, terms.b + slope, terms.c + np.where(against, 0.5 * rub * at, 0.0))
 
