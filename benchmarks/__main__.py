@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks import batch, control, inside, processes, recording
+from benchmarks import batch, control, inside, processes, recording, samples
 from benchmarks.table import markdown
 
 
@@ -18,6 +18,7 @@ def main() -> None:
     rounds = 1 if options.quick else options.rounds
     rows = [
         *inside.simulate_rows(rounds),
+        *inside.engine_rows(rounds),
         *control.control_rows(rounds),
         inside.plan_row(rounds),
         *inside.optimality_rows(),
@@ -26,6 +27,7 @@ def main() -> None:
     if not options.quick:
         rows += processes.command_rows(rounds)
         rows.append(processes.help_row(rounds))
+        rows += samples.sample_rows(rounds)
         rows += [batch.throughput_row(rounds), batch.plugin_row(rounds)]
     if options.long:
         rows += processes.long_rows()

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 from unittest.mock import patch
 
-from benchmarks.inside import POUR, clock
+from benchmarks.inside import POUR
 from benchmarks.table import Row
+from benchmarks.twin import clock
 from manipcli.control.actuation import Actuation
+from manipcli.control.compiled import library
 from manipcli.control.limiter import JointLimiter
 from manipcli.control.manager import ControllerManager
 from manipcli.pipeline import run_task
@@ -80,10 +82,15 @@ def tick_cost(overrides: Sequence[str]) -> float:
 
 
 def control_rows(rounds: int) -> list[Row]:
-    """With PID, inverse dynamics, limits and simple transmissions; and with every feature on."""
+    """With PID, inverse dynamics, limits and simple transmissions; with every feature on; without compiled kernels."""
+    kernels = library.use(None)
+    python = tuple(tick_cost(LIMITED) for _ in range(rounds))
+    library.use(kernels)
     plain = tuple(tick_cost(LIMITED) for _ in range(rounds))
     full = tuple(tick_cost(EVERYTHING) for _ in range(rounds))
+    how = "in Python" if kernels is None else "compiled"
     return [
-        Row("control tick of the pour, 13 joints", plain, "us", 25.0, "PID, inverse dynamics, limits, transmissions"),
+        Row("control tick of the pour, 13 joints", plain, "us", 25.0, f"{how}; PID, inverse dynamics, limits, gears"),
         Row("the same with every feature on", full, "us", 40.0, "and integrals, clamps, friction, efficiency"),
+        Row("the first without compiled kernels", python, "us", None, "the laws in Python"),
     ]

@@ -1,17 +1,13 @@
-"""What is measured inside one process: the control loop against bare physics, planning, time-optimality.
-
-The physics of a run is repeated in a twin world while the run goes on: every `BLOCK` ticks the run pauses, and the twin
-takes the same steps with the same commands, of which only `stepSimulation` is timed. Run and twin so share whatever
-else the machine does at that time, and their ratio holds on a busy machine, too.
-"""
+"""What is measured inside one process: the control loop against bare physics, engines, planning, time-optimality."""
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from unittest.mock import patch
@@ -19,10 +15,8 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.table import Row
-from manipcli.control.command import JointCommand
+from benchmarks.twin import ITERATIONS, REFERENCE, Cost, Watched, clock
 from manipcli.control.controller import ControllerOutput
-from manipcli.core.geometry import Array
-from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.pipeline import run_task
 from manipcli.plan.motion_limits import MotionLimits
@@ -30,82 +24,25 @@ from manipcli.plan.path import joint_path
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
 from manipcli.record.write.recorder import Recorder
-from manipcli.scene.scene import Scene
-from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.engines.pybullet import PybulletEngine
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
 POUR = Path(__file__).resolve().parents[1] / "tasks" / "pour.yaml"
-BLOCK = 250
-"""Ticks between two pauses of a run for its twin."""
-clock = time.perf_counter
-
-
-@dataclass
-class Cost:
-    """Seconds of a run: `bare` in its twin's physics, `paused` for the twin in all, `recording` in the recorder."""
-
-    bare: float = 0.0
-    paused: float = 0.0
-    recording: float = 0.0
-    ticks: int = 0
-
-
-class Watched(PybulletEngine):
-    """The engine of a run, with its twin."""
-
-    def __init__(self, cost: Cost, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
-        super().__init__(robot, scene, settings)
-        began = clock()
-        self._cost, self._commands = cost, list[Array]()
-        self._twin = PybulletEngine(robot, scene, settings)
-        cost.paused += clock() - began
-
-    def write(self, command: JointCommand) -> None:
-        super().write(command)
-        self._commands.append(command.effort.copy())
-
-    def advance(self) -> None:
-        super().advance()
-        if len(self._commands) >= BLOCK:
-            self._repeat()
-
-    def close(self) -> None:
-        self._repeat()
-        self._twin.close()
-        super().close()
-
-    def _repeat(self) -> None:
-        """The twin takes the steps since the last pause."""
-        paused, bare = clock(), 0.0
-        step, client = self._twin._p.stepSimulation, self._twin._client
-        command = JointCommand(len(self._commands[0]) if self._commands else 0)
-        command.modes, command.version = ("effort",) * len(command.effort), 1
-        for effort in self._commands:
-            command.effort[:] = effort
-            self._twin.write(command)
-            for _ in range(self._twin._substeps):
-                self._twin._motors.push()
-                began = clock()
-                step(client)
-                bare += clock() - began
-        cost = self._cost
-        cost.bare += bare
-        cost.ticks += len(self._commands)
-        self._commands.clear()
-        cost.paused += clock() - paused
 
 
 def watched_run(folder: Path) -> tuple[float, Cost]:
-    """Seconds of the simulate phase of the pour without the pauses, and what it is made of."""
+    """Seconds of the simulate phase of the reference run of the pour without the pauses, and what it is made of."""
     cost = Cost()
-    member = ENGINES["pybullet"]
-    watched = replace(member, open=partial(Watched, cost))
+    watched = replace(ENGINES["pybullet"], open=partial(Watched, cost))
     with patch("manipcli.run.execute.ENGINES", {"pybullet": watched}):
-        report = run_task(POUR, log=folder / "pour.mcap", force=True)
-    return report.timing.simulate - cost.paused, cost
+        whole = simulate_phase(folder, REFERENCE)
+    return whole - cost.paused, cost
+
+
+def simulate_phase(folder: Path, overrides: tuple[str, ...] = ()) -> float:
+    """Seconds of the simulate phase of the pour."""
+    return run_task(POUR, log=folder / "pour.mcap", force=True, overrides=overrides).timing.simulate
 
 
 def recording(folder: Path) -> tuple[float, Cost]:
@@ -132,24 +69,59 @@ def recording(folder: Path) -> tuple[float, Cost]:
 
 
 def simulate_rows(rounds: int) -> list[Row]:
-    """The simulate phase and its parts, in units of the twin's physics."""
-    ratios, records, steps = [], [], []
+    """The simulate phase and its parts, in units of bare physics."""
+    ratios, references, records, steps = [], [], [], []
     with tempfile.TemporaryDirectory(prefix="manipcli-benchmark-") as name:
         folder = Path(name)
         watched_run(folder)  # imports, caches: does not count
         for _ in range(rounds):
             whole, cost = watched_run(folder)
-            ratios.append(whole / cost.bare)
+            ratios.append(simulate_phase(folder) / cost.bare)
+            references.append(whole / cost.bare)
             steps.append(1e6 * cost.bare / cost.ticks)
             _, cost = recording(folder)
             records.append(cost.recording / cost.bare)
-    rest = tuple(whole - 1.0 - record for whole, record in zip(ratios, records, strict=True))
+    rest = tuple(whole - 1.0 - record for whole, record in zip(references, records, strict=True))
+    bare = f"PyBullet with {ITERATIONS} iterations"
     return [
-        Row("simulate phase of the pour / bare stepSimulation", tuple(ratios), "x", 1.5, "same world, same commands"),
-        Row("recording", tuple(records), "x", 0.2, "Recorder.tick and .contacts, flushes included"),
-        Row("engine, control, loop", rest, "x", 0.3, "the rest above 1"),
+        Row("simulate phase of the pour / bare stepSimulation", tuple(ratios), "x", 1.5, f"bare: {bare}"),
+        Row(f"the same with {ITERATIONS} iterations", tuple(references), "x", 1.5, "same world, same commands"),
+        Row("its part for recording", tuple(records), "x", 0.2, "Recorder.tick and .contacts, flushes included"),
+        Row("its part for engine, control, loop", rest, "x", 0.3, "the rest above 1"),
         Row("bare stepSimulation", tuple(steps), "us", None, "for orientation"),
     ]
+
+
+def engine_rows(rounds: int) -> list[Row]:
+    """Whole simulate phases of the pour, in turn: PyBullet as it is, with 200 iterations, and MuJoCo."""
+    engines = {"reference": REFERENCE, "pybullet": ("simulation.engine=pybullet",)}
+    if has_mujoco():
+        engines["mujoco"] = ("simulation.engine=mujoco",)
+    seconds: dict[str, list[float]] = {name: [] for name in engines}
+    with tempfile.TemporaryDirectory(prefix="manipcli-benchmark-") as name:
+        folder = Path(name)
+        for k in range(rounds + 1):
+            for engine, overrides in engines.items():
+                phase = simulate_phase(folder, overrides)
+                if k > 0:  # the first round is for imports and caches
+                    seconds[engine].append(phase)
+
+    def ratios(engine: str) -> tuple[float, ...]:
+        return tuple(one / other for one, other in zip(seconds[engine], seconds["reference"], strict=True))
+
+    note = f"against PyBullet with {ITERATIONS} iterations"
+    rows = [Row("simulate phase of the pour, PyBullet", ratios("pybullet"), "x", 1 / 1.2, note)]
+    if "mujoco" in engines:
+        rows.append(Row("simulate phase of the pour, MuJoCo", ratios("mujoco"), "x", 1 / 2.8, note))
+    return rows
+
+
+def has_mujoco() -> bool:
+    """Whether the rows of MuJoCo can be measured; prints a note if not."""
+    found = importlib.util.find_spec("mujoco") is not None and any(member.name == "mujoco" for member in ENGINES)
+    if not found:
+        print("no rows for MuJoCo: it is not installed (extra manipcli[mujoco])", file=sys.stderr)
+    return found
 
 
 def plan_row(rounds: int) -> Row:

@@ -5,6 +5,7 @@ what the pour varies, draws the gains of all controllers, and lets every motor a
 
     python -m benchmarks.robustness
     python -m benchmarks.robustness --task tasks/pour_iiwa.yaml --hard --jobs 2
+    python -m benchmarks.robustness --engine mujoco --samples 20
     python -m benchmarks.robustness --only 17 --keep runs
 """
 
@@ -110,6 +111,7 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=100)
     parser.add_argument("--seed", type=int, help="instead of the task's")
     parser.add_argument("--hard", action="store_true", help="of a task with a body named `cup`: wider ranges")
+    parser.add_argument("--engine", metavar="NAME", help="instead of the task's")
     parser.add_argument("--set", dest="overrides", action="append", default=[], metavar="A.B=VALUE", help="as of `run`")
     parser.add_argument("--jobs", type=int, default=1, help="runs at a time")
     parser.add_argument("--only", type=int, metavar="N", help="run sample N alone")
@@ -118,7 +120,8 @@ def main() -> int:
 
     task = chosen.task.resolve()
     words = [] if chosen.seed is None else ["--seed", str(chosen.seed)]
-    for override in (*(hard_overrides(task) if chosen.hard else ()), *chosen.overrides):
+    engine = () if chosen.engine is None else (f"simulation.engine={chosen.engine}",)
+    for override in (*engine, *(hard_overrides(task) if chosen.hard else ()), *chosen.overrides):
         words += ["--set", override]
     wanted = range(chosen.samples) if chosen.only is None else [chosen.only]
     began = time.perf_counter()
@@ -134,8 +137,9 @@ def main() -> int:
             passed += result.passed
             print(f"{result.sample:3d}  {result.text}", flush=True)
     low, high = wilson(passed, len(wanted))
+    kind = f"{', hard' if chosen.hard else ''}{f', {chosen.engine}' if chosen.engine else ''}"
     print(
-        f"{task.name}{', hard' if chosen.hard else ''}: {passed} of {len(wanted)} passed "
+        f"{task.name}{kind}: {passed} of {len(wanted)} passed "
         f"(95 % interval {100 * low:.0f} to {100 * high:.0f} %) in {time.perf_counter() - began:.0f} s"
     )
     return 0 if passed == len(wanted) else 1

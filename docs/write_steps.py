@@ -20,6 +20,7 @@ from pydantic.fields import FieldInfo
 from manipcli.core.units import readable
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps import STEPS
+from manipcli.spec.agree import AgreeSpec
 from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
@@ -54,6 +55,7 @@ ELSEWHERE: dict[type, str] = {
     VarySpec: "[distributions](task.md#vary)",
     DistributionSpec: "one of the first four",
     BaselineSpec: "a [mapping](task.md#baseline)",
+    AgreeSpec: "a [mapping](task.md#agree)",
     GroupSpec: "[groups](robot.md#groups)",
     ToolSpec: "a [mapping](robot.md#tool)",
     LimitsSpec: "[limits](robot.md#limits)",

@@ -7,7 +7,7 @@ alone: the log is read back from its file before the file gets its name.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,24 +15,31 @@ from typing import Unpack
 
 from manipcli.core.errors import Diagnostic, NotPlannable
 from manipcli.core.stopwatch import timed
+from manipcli.judge.agreement import compare
+from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.logs.judge_log import judge_log
+from manipcli.logs.measure_run import measured_run
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
 from manipcli.preflight.findings import preflight_findings
+from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
+from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.logs.verification import Verification
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
-from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, verdict_metadata
+from manipcli.run.prepared import Prepared
+from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
 from manipcli.task.controller_rows import controllers_of
 from manipcli.task.load_task import LoadOptions, load_task
 from manipcli.task.load_view import load_sight
 from manipcli.task.plan_task import Plan, plan_task, refused
 from manipcli.task.task import Task
+from manipcli.task.variants import overrides_of, simulation_of
 from manipcli.task.vocabulary import meanings
 
 __all__ = [
@@ -40,6 +47,7 @@ __all__ = [
     "Plan",
     "Task",
     "check_files",
+    "compare_runs",
     "controllers_of",
     "judge_log",
     "kind_of",
@@ -50,6 +58,7 @@ __all__ = [
     "refused",
     "run_task",
     "schema",
+    "simulation_of",
     "verify_log",
     "words",
 ]
@@ -62,6 +71,7 @@ def run_task(
     force: bool = False,
     embed_meshes: bool = False,
     progress: Progress = SILENT,
+    prepared: Prepared | None = None,
     **options: Unpack[LoadOptions],
 ) -> RunReport:
     """Loads, plans, simulates, records and judges a task.
@@ -72,6 +82,7 @@ def run_task(
         force: replace `log` if it exists.
         embed_meshes: store all mesh files in the log, so that it can be shown without packages.
         progress: receives warnings, steps and ticks.
+        prepared: the same task, loaded and planned before; ignored if a file has changed.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
@@ -82,8 +93,8 @@ def run_task(
         InvalidInput: a file or the path of the log is invalid; nothing was simulated.
         RecordingFailed: writing the log failed.
     """
-    task, loading = timed(_load, path, progress, options)
-    (plan, warnings), planning = timed(_plan, task, progress)
+    task, loading = timed(_load, path, progress, options, prepared)
+    (plan, warnings), planning = timed(_plan, task, progress, prepared)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings)
     where = log if log is not None else default_log(task)
@@ -92,6 +103,60 @@ def run_task(
     )
     timing = replace(timing, load=loading, plan=planning + timing.plan)
     return RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
+
+
+def compare_runs(
+    path: Path,
+    variants: Sequence[Variant],
+    *,
+    log: Path | None = None,
+    force: bool = False,
+    embed_meshes: bool = False,
+    progress: Progress = SILENT,
+    started: Callable[[Variant], None] = lambda _: None,
+    **options: Unpack[LoadOptions],
+) -> ComparedRuns:
+    """Runs a task in several engines, or also at half the step, and compares the runs.
+
+    Args:
+        path: the task file.
+        variants: the runs: engines, each optionally also at half the step.
+        log: path of a log, `x.mcap`; the logs are `x@<variant>.mcap`. Default `runs/<task>.mcap`; replaced.
+        force: replace the logs of `log` if they exist.
+        embed_meshes: see `run_task`.
+        progress: receives warnings, steps and ticks of each run.
+        started: called before each run.
+        options: how the task is loaded, see `LoadOptions`; the variant replaces engine and step.
+
+    Raises:
+        InvalidInput: a file is invalid, or an engine refuses the task; nothing was simulated.
+        RecordingFailed: writing a log failed.
+        KeyboardInterrupt: a run was interrupted.
+    """
+    for where in (variant_log(log, variant) for variant in variants) if log is not None and not force else ():
+        if where.exists():  # before the other runs, not after them
+            raise RecordingRefused(where, "the file exists", hint="choose another name, or pass --force to replace it")
+    overrides, seed = options.get("overrides", ()), options.get("seed")
+    chosen: list[LoadOptions] = [
+        {**options, "overrides": overrides_of(variant, path, overrides=overrides, seed=seed)} for variant in variants
+    ]
+    tasks = [load_task(path, **variant_options) for variant_options in chosen]  # an engine refuses before any run
+    runs, reports = [], []
+    for variant, task, variant_options in zip(variants, tasks, chosen, strict=True):
+        started(variant)
+        report = run_task(
+            path,
+            log=variant_log(log if log is not None else default_log(task), variant),
+            force=force or log is None,
+            embed_meshes=embed_meshes,
+            progress=progress,
+            **variant_options,
+        )
+        if any(finding.code == INTERRUPTED for finding in report.verdict.errors):
+            raise KeyboardInterrupt
+        runs.append(measured_run(variant, task.file, report))
+        reports.append(report)
+    return ComparedRuns(compare(runs), tuple(reports))
 
 
 def verify_log(
@@ -131,18 +196,19 @@ def verify_log(
         return compared(recording, log, repeated, unlike=recorded.unlike, began=began)
 
 
-def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
-    task = load_task(path, **options)
+def _load(path: Path, progress: Progress, options: LoadOptions, prepared: Prepared | None) -> Task:
+    task = prepared.load(path, **options) if prepared is not None else load_task(path, **options)
     if task.warnings:
         progress.warned(task.warnings)
     load_libraries(task)
     return task
 
 
-def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
+def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task without a plan; and all warnings before the run."""
     try:
-        plan = plan_task(task, on_progress=progress.activity)
+        plan = prepared.take_plan(task) if prepared is not None else None
+        plan = plan or plan_task(task, on_progress=progress.activity)
     except NotPlannable as refusal:
         return refused(task, refusal), task.warnings
     findings = preflight_findings(task, plan)

@@ -107,6 +107,7 @@ def runs_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of tests and baselines are in threads, which take a second less than processes."""
     names = SimpleNamespace(Popen=_Thread, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
     monkeypatch.setattr("manipcli.batch.process.subprocess", names)
+    monkeypatch.setattr("manipcli.batch.forks.available", lambda: False)
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "manipcli"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 HEAVY = {
-    "coal", "lxml", "matplotlib", "mcap", "numpy", "pinocchio", "pybullet", "pydantic", "rich", "ruckig", "scipy",
-    "toppra", "viser", "xacro", "yaml",
+    "coal", "lxml", "matplotlib", "mcap", "mujoco", "numpy", "pinocchio", "pybullet", "pydantic", "rich", "ruckig",
+    "scipy", "toppra", "viser", "xacro", "yaml",
 }  # fmt: skip
 
 
@@ -75,6 +75,11 @@ def test_nothing_is_left_undone_and_no_path_of_one_machine_is_named() -> None:
 
 def test_help_loads_nothing_heavy() -> None:
     assert _loaded("import manipcli.cli.app") & HEAVY == set()
+
+
+@pytest.mark.slow
+def test_the_registry_of_engines_loads_no_physics() -> None:
+    assert _loaded("import manipcli.simulate.engines") & {"mujoco", "pybullet"} == set()
 
 
 @pytest.mark.slow

@@ -18,14 +18,13 @@ from manipcli.batch.job import own_stem
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed
 from manipcli.core.whole_file import write_whole
+from manipcli.judge.measures.floors import share_of
 from manipcli.judge.verdict import Verdict
 from manipcli.report.display_quantity import quantity
 from manipcli.spec.baseline import ToleranceSpec
 
 DIGITS: Final = 6
 """Significant digits in the file."""
-FLOORS: Final[Mapping[str, float]] = {"s": 0.05, "J": 1.0, "m": 1e-3, "rad": math.radians(0.5), "N": 0.5}
-"""Differences that are always ignored, by unit."""
 
 ALWAYS: Final = ("duration", "margins", "steps")
 """Keys that every baseline has."""
@@ -140,7 +139,7 @@ def measured(verdict: Verdict, log: Path) -> Measures:
 def compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> tuple[Change, ...]:
     """Changes beyond the tolerance, worse or better, and numbers that cannot be compared.
 
-    A time or an energy may grow, and a margin shrink, by its share of the old value, or by `FLOORS` if that is more.
+    A time or an energy may grow, and a margin shrink, by its share of the old value, or by its floor if that is more.
     """
     return tuple(_compared(old, new, tolerance))
 
@@ -153,7 +152,7 @@ def _compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> Iterato
         if now is None or now.unit != before.unit:
             yield Change(key, before, now, worse=True)
             continue
-        allowed = max(shares[key[0]] * abs(before.value), FLOORS.get(before.unit, 0.0))
+        allowed = share_of(shares[key[0]], before.value, before.unit)
         loss = before.value - now.value if key[0] == "margins" else now.value - before.value
         if abs(loss) > allowed:
             yield Change(key, before, now, worse=loss > 0.0)

@@ -17,6 +17,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.report.suite.suite import Trouble, troubles_of
 
 if TYPE_CHECKING:
+    from manipcli.run.prepared import Prepared
     from manipcli.task.plan_task import PlannedStep
 
 BEAT_PERIOD = 0.25
@@ -25,8 +26,13 @@ BEAT_PERIOD = 0.25
 Parent: TypeAlias = "Connection[Message, Job]"
 
 
-def main(descriptor: int) -> None:
-    """Runs one job, received on the socket with this descriptor."""
+def main(descriptor: int, prepared: Prepared | None = None) -> None:
+    """Runs one job, received on the socket with this descriptor.
+
+    Args:
+        descriptor: of the socket.
+        prepared: its task, loaded and planned before this process was forked.
+    """
     collector.spare()
     parent: Parent = Connection(descriptor)
     os.set_inheritable(descriptor, False)
@@ -38,7 +44,7 @@ def main(descriptor: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     job = parent.recv()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    parent.send(_end_of(job, _Beats(parent)))
+    parent.send(_end_of(job, _Beats(parent), prepared))
 
 
 def _end_with(parent: Parent) -> None:
@@ -93,27 +99,28 @@ class _Beats:
         self._parent.send(Beat(self._activity, self._at, written=self._written))
 
 
-def _end_of(job: Job, beats: _Beats) -> End:
+def _end_of(job: Job, beats: _Beats, prepared: Prepared | None = None) -> End:
     """Runs a job; writes its log and, where requested, its picture and page."""
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
     from manipcli.batch.failure_report import against_baseline, draw, troubles, write_invalid_page, write_page
+    from manipcli.batch.variants import measured, with_step
     from manipcli.record.faults import RecordingFailed
 
     beats.activity("loading")
     settings = job.settings
     job.log.parent.mkdir(parents=True, exist_ok=True)
     try:
+        job = with_step(job)
+        settings = job.settings
         report = pipeline.run_task(
             job.path,
-            overrides=settings.overrides,
-            seed=settings.seed,
             sample=job.case.sample,
             log=job.log,
             force=True,
-            package_path=settings.package_path,
-            allow_outside=settings.allow_outside,
             progress=beats,
+            prepared=prepared,
+            **job.loading.options,
         )
     except InvalidInput as invalid:
         unusable = invalid.findings
@@ -148,7 +155,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     if job.page is not None:
         beats.activity("writing a page")
         notes += _noted("no page", lambda: write_page(job, report, found))
-    return End(report, findings, found, beats.warnings, tuple(notes))
+    return End(report, findings, found, beats.warnings, tuple(notes), measured(job, report))
 
 
 def _noted(what: str, make: Callable[[], None]) -> tuple[str, ...]:

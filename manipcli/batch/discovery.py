@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from manipcli.batch.first_look import SUFFIXES, first_look
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
-from manipcli.report.suite.suite import Case
+from manipcli.judge.measured_run import Variant
+from manipcli.report.suite.suite import AGREEMENT, Case
+
+ENGINE = "engine_"
+"""Beginning of the tag with the engine."""
 
 
 def read_case(path: Path, *, shown: str | None = None) -> Case:
@@ -44,7 +48,7 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
     return Case(
         file=name,
         task=task.value,
-        tags=(*tagged, f"engine_{engine_name}"),
+        tags=(*tagged, f"{ENGINE}{engine_name}"),
         varied=root.get("vary") is not None,
         line=task.place.line,
     )
@@ -57,10 +61,26 @@ def samples_of(case: Case, count: int | None, named: Collection[str] = ()) -> tu
         return (case,)
     if count is not None:
         return tuple(replace(case, sample=sample) for sample in range(count))
-    numbers = (name.removeprefix(f"{case.task}[").removesuffix("]") for name in named)
-    samples = (replace(case, sample=int(number)) for number in numbers if number.isdecimal())
-    chosen = (sample for sample in samples if sample.name in named)
-    return (case, *sorted(chosen, key=lambda sample: sample.sample or 0))
+    beginning = f"{case.task}["
+    words = (name.removeprefix(beginning).removesuffix("]") for name in named if name.startswith(beginning))
+    numbers = {word.partition("-")[0] for word in words}
+    chosen = {int(number) for number in numbers if number.isdecimal() and str(int(number)) == number}
+    return (case, *(replace(case, sample=number) for number in sorted(chosen)))
+
+
+def variants_of_case(case: Case, engines: Sequence[str], *, check_step: bool) -> tuple[Case, ...]:
+    """The case in each engine, also at half the step with `check_step`, then their agreement; the case itself without.
+
+    Without `engines`: the engine of the task.
+    """
+    if case.findings or not (engines or check_step):
+        return (case,)
+    tags = tuple(tag for tag in case.tags if not tag.startswith(ENGINE))
+    own = next((tag.removeprefix(ENGINE) for tag in case.tags if tag.startswith(ENGINE)), "")
+    halves = (False, True) if check_step else (False,)
+    variants = tuple(Variant(engine, half) for engine in (engines or (own,)) for half in halves)
+    runs = (replace(case, variant=variant, tags=(*tags, f"{ENGINE}{variant.engine}")) for variant in variants)
+    return (*runs, replace(case, compared=variants, tags=(*tags, AGREEMENT)))
 
 
 def shown_path(path: Path) -> str:

@@ -6,11 +6,16 @@ import math
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from manipcli.core.errors import Diagnostic, Place
+from manipcli.judge.measured_run import MeasuredRun
 from manipcli.report.html.markup import link
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite.suite import Case, Trouble
+
+if TYPE_CHECKING:
+    from manipcli.task.load_task import FileOptions
 
 FOLDER = Path("runs") / "test"
 """Folder for the logs of tests, below the working directory."""
@@ -38,6 +43,8 @@ class Settings:
         pages: folder for a page about each run; None for no pages.
         keep_logs: keep the logs of passed runs, too.
         baseline: compare a run of a task as written with its baseline.
+        engines: run each task in these engines and compare the runs; empty: in its own engine.
+        check_step: run each task also at half the physics step, and compare the runs.
         silence: stop a run without progress for this time [s]; `inf` for never.
         timeout: stop a run that takes longer [s]; `inf` for never.
     """
@@ -50,8 +57,30 @@ class Settings:
     pages: Path | None = None
     keep_logs: bool = False
     baseline: bool = True
+    engines: tuple[str, ...] = ()
+    check_step: bool = False
     silence: float = 60.0
     timeout: float = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Loading:
+    """How the task of a job is loaded, without its sample: a task file and the options of `load_task`."""
+
+    path: Path
+    overrides: tuple[str, ...] = ()
+    seed: int | None = None
+    package_path: tuple[Path, ...] = ()
+    allow_outside: bool = False
+
+    @property
+    def options(self) -> FileOptions:
+        return {
+            "overrides": self.overrides,
+            "seed": self.seed,
+            "package_path": self.package_path,
+            "allow_outside": self.allow_outside,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +92,13 @@ class Job:
     settings: Settings
 
     @property
+    def loading(self) -> Loading:
+        settings = self.settings
+        return Loading(self.path, settings.overrides, settings.seed, settings.package_path, settings.allow_outside)
+
+    @property
     def log(self) -> Path:
-        """`tasks/pour.mcap` for `tasks/pour.yaml`, `tasks/pour@17.mcap` for its sample 17."""
+        """`tasks/pour.mcap` for `tasks/pour.yaml`, `tasks/pour@17.mcap` for its sample 17, `tasks/pour@mujoco.mcap`."""
         return self._beside(".mcap", self.settings.folder)
 
     @property
@@ -95,7 +129,7 @@ class Job:
     @property
     def nominal(self) -> bool:
         """Whether the task is run as written."""
-        return self.case.sample is None and not self.settings.overrides and self.settings.seed is None
+        return self.case.kind == "" and not self.settings.overrides and self.settings.seed is None
 
     def command(self, verb: str = "run") -> str:
         """The shell command that repeats this run; `test` also compares with the baseline."""
@@ -106,6 +140,7 @@ class Job:
         words += [] if self.case.sample is None else ["--sample", str(self.case.sample)]
         for override in settings.overrides:
             words += ["--set", override]
+        words += self._variant_words()
         for place in settings.package_path:
             words += ["--package-path", str(place)]
         words += ["--allow-outside"] if settings.allow_outside else []
@@ -115,14 +150,22 @@ class Job:
         """The path of an output file; unique among the jobs of a batch and the index of pages.
 
         A folder name of `_` only grows by two, which reserves `_` for the root and `__` for `..`. In a stem a single
-        `@` begins a suffix other than `.yaml`, or a sample.
+        `@` begins a suffix other than `.yaml`, a sample or an engine.
         """
         file = Path(self.case.file)
         names = {file.anchor: "_", "..": "__"}
         parts = [names.get(part, part if part.strip("_") else f"{part}__") for part in file.parts[:-1]]
         stem = own_stem(file) if file.name != "index.yaml" else "index@yaml"
-        sample = "" if self.case.sample is None else f"@{self.case.sample}"
-        return folder.joinpath(*parts, f"{stem}{sample}{suffix}")
+        kind = f"@{self.case.kind}" if self.case.kind else ""
+        return folder.joinpath(*parts, f"{stem}{kind}{suffix}")
+
+    def _variant_words(self) -> list[str]:
+        """Options that repeat the run, or the runs of an agreement; half the step with the run it is compared to."""
+        variants = self.case.compared or ((self.case.variant,) if self.case.variant is not None else ())
+        engines = list(dict.fromkeys(variant.engine for variant in self.case.compared))
+        words = ["--engines", ",".join(engines)] if len(engines) > 1 else []
+        words += ["--set", f"simulation.engine={engines[0]}"] if len(engines) == 1 else []
+        return words + (["--check-step"] if any(variant.half_step for variant in variants) else [])
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +203,7 @@ class End:
         troubles: why it did not pass, with places in the task file.
         warnings: of the files and the plan, before the run.
         notes: pictures and pages that could not be made, and numbers better than the baseline.
+        measured: numbers of a run with a variant.
     """
 
     report: RunReport | None
@@ -167,6 +211,7 @@ class End:
     troubles: tuple[Trouble, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
     notes: tuple[str, ...] = ()
+    measured: MeasuredRun | None = None
 
 
 Message = Beat | End

@@ -17,14 +17,17 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
 
+from manipcli.batch.forks import ONE_THREAD, Forked, ForkPool
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode
 from manipcli.core.lock import Taken, lock
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
 from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of, warnings_of
+
+Child: TypeAlias = "Connection[Job, Message]"
 
 CHILD = """
 import json, sys
@@ -33,8 +36,6 @@ from manipcli.batch.child import main
 main(int(sys.argv[2]))
 """
 """The child has the module path of its parent, and not the working directory (`-P`)."""
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-"""Default environment: with one run per core, threads of libraries would compete for the cores."""
 DRAWING = """
 import json, sys
 sys.path[:], log, picture, packages, outside = json.loads(sys.argv[1])
@@ -68,6 +69,7 @@ def run_jobs(
     at_once: int = 1,
     observer: Callable[[Job, Beat], None] | None = None,
     command: tuple[str, ...] = (),
+    server: tuple[str, ...] = (),
 ) -> Generator[CaseReport, None, None]:
     """Runs jobs and yields their reports, in the order in which they end.
 
@@ -77,14 +79,17 @@ def run_jobs(
         jobs: the runs, in the order in which they start.
         at_once: number of parallel runs.
         observer: callback for each start and each heartbeat.
-        command: another program instead of `batch/child.py`.
+        command: another program instead of `batch/child.py`, started as a new process.
+        server: another program instead of `batch/fork_server.py`.
     """
     waiting = deque(jobs)
     running: list[Process] = []
+    pool = ForkPool([] if command and not server else waiting, command=server)
     try:
+        pool.open()
         while waiting or running:
             while waiting and len(running) < at_once:
-                started = _started(waiting.popleft(), command)
+                started = _started(waiting.popleft(), command, pool)
                 if isinstance(started, CaseReport):
                     yield started
                     continue
@@ -105,14 +110,15 @@ def run_jobs(
     finally:
         for process in running:
             process.forget()
+        pool.close()
 
 
-def _started(job: Job, command: tuple[str, ...]) -> Process | CaseReport:
+def _started(job: Job, command: tuple[str, ...], pool: ForkPool) -> Process | CaseReport:
     """The process of a job, or why there is none."""
     if job.case.findings:
         return _unreadable(job)
     try:
-        return Process(job, command=command)
+        return Process(job, command=command, pool=pool)
     except Taken:
         where = f"writes to '{job.settings.folder}'"
         return _no_process(job, f"another process is running this task and {where}; nothing was run")
@@ -129,12 +135,13 @@ class Process:
         activity: its last heartbeat.
     """
 
-    def __init__(self, job: Job, *, command: tuple[str, ...]) -> None:
+    def __init__(self, job: Job, *, command: tuple[str, ...], pool: ForkPool | None = None) -> None:
         """Starts the process.
 
         Args:
             job: the job.
             command: another program with the messages of `batch/child.py`.
+            pool: forks the process where it can.
 
         Raises:
             Taken: a process of another batch is running this job.
@@ -146,24 +153,45 @@ class Process:
         self.activity = Beat("starting")
         self._end: End | None = None
         self._judged: float | None = None
-        self.connection: Connection[Job, Message]
-        self.connection, childs = Pipe()
-        with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
-            duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
         _remove(job.log, job.partial, job.picture, job.page)
-        self._process = subprocess.Popen(
-            [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=self._output,
-            pass_fds=(childs.fileno(),),
-            start_new_session=True,  # signals of the terminal reach only the parent
-            env={**ONE_THREAD, **os.environ},
-        )
-        childs.close()
+        self.connection: Child
+        self._process: subprocess.Popen[bytes] | Forked
+        try:
+            forked = self._forked(pool) if pool is not None else None
+            self._note = pool.take_note() if pool is not None else ""
+            self.connection, self._process = forked or self._new(command)
+        except BaseException:  # an interrupt, too
+            _remove(job.output)
+            self._output.close()
+            raise
+        with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
+            duplicate.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         with suppress(ConnectionError):  # it has exited already, which `hear` finds
             self.connection.send(job)
+
+    def _forked(self, pool: ForkPool) -> tuple[Child, Forked] | None:
+        ours, childs = Pipe()
+        with childs:
+            process = pool.start(self.job, childs.fileno(), self._output.fileno())
+        if process is None:
+            ours.close()
+            return None
+        return ours, process
+
+    def _new(self, command: tuple[str, ...]) -> tuple[Child, subprocess.Popen[bytes]]:
+        ours, childs = Pipe()
+        with childs:
+            process = subprocess.Popen(
+                [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=self._output,
+                stderr=self._output,
+                pass_fds=(childs.fileno(),),
+                start_new_session=True,  # signals of the terminal reach only the parent
+                env={**ONE_THREAD, **os.environ},
+            )
+        return ours, process
 
     @property
     def elapsed(self) -> float:
@@ -230,6 +258,8 @@ class Process:
         self.end()
         code, end = self._process.returncode, self._end
         if end is None:
+            if code is None:
+                return self._report("crashed", f"crashed, exit code unknown as the fork server ended; {self.activity}")
             if code < 0:
                 cause = f"crashed by {signal_name(-code)}"
                 hint = "; check that there is enough memory" if -code == signal.SIGKILL else ""
@@ -274,7 +304,8 @@ class Process:
             picture=kept[job.picture],
             page=str(job.page) if job.page is not None and job.page.exists() else None,
             output=kept[job.output],
-            notes=end.notes,
+            notes=(*end.notes, *([self._note] if self._note else [])),
+            measured=end.measured,
         )
         return self._with_page(report) if unfinished else report
 

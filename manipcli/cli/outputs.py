@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from manipcli.judge.verdict import Verdict
     from manipcli.pipeline import Task
+    from manipcli.report.agreement.compared_runs import ComparedRuns
 
 ReportFile = Annotated[
     Path | None,
@@ -122,6 +123,18 @@ class Outputs:
         if self._report is not None:
             page = log_page(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
             self._write(self._report, render_page(replace(page, warnings=tuple(warnings))).encode())
+
+    def of_comparison(
+        self, compared: ComparedRuns, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+    ) -> None:
+        """Writes the requested page about compared runs."""
+        from manipcli.logs.agreement_page import ghost_playback
+        from manipcli.report.html.agreement_page import render_page
+
+        self._forget()
+        if self._report is not None:
+            shown, ghosts = ghost_playback(compared, package_path=package_path, allow_outside=allow_outside)
+            self._write(self._report, render_page(compared, shown, ghosts).encode())
 
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Diagnostic]) -> None:
         """Writes the requested files about a task with a step that cannot be planned."""

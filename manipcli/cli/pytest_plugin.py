@@ -122,14 +122,17 @@ class TaskFile(pytest.File):
     """A task file: one test, or one for each sample."""
 
     def collect(self) -> Iterator[TaskItem]:
-        from manipcli.batch.discovery import read_case, samples_of, shown_path
+        from manipcli.batch.discovery import read_case, samples_of, shown_path, variants_of_case
 
-        case = read_case(self.path, shown=shown_path(self.path))
-        for sample in samples_of(case, self.config.getoption("manipcli_samples"), self._named()):
-            for tag in sample.tags:
-                if tag not in MARKS_OF_PYTEST and tag not in _registered(self.config):
-                    _register(self.config, tag, "a tag of a task")
-            yield TaskItem.from_parent(self, name=sample.name, case=sample)
+        written = read_case(self.path, shown=shown_path(self.path))
+        settings = self.config.stash.get(SETTINGS, None)
+        engines, check_step = ((), False) if settings is None else (settings.engines, settings.check_step)
+        for sample in samples_of(written, self.config.getoption("manipcli_samples"), self._named()):
+            for case in variants_of_case(sample, engines, check_step=check_step):
+                for tag in case.tags:
+                    if tag not in MARKS_OF_PYTEST and tag not in _registered(self.config):
+                        _register(self.config, tag, "a tag of a task")
+                yield TaskItem.from_parent(self, name=case.name, case=case)
 
     def _named(self) -> set[str]:
         """Names of tests in this file that are given as ids, or that failed last with --last-failed."""
@@ -171,6 +174,13 @@ class TaskItem(pytest.Item):
         if not self.report.passed:
             raise TaskFailed(self.report)
         self.add_report_section("call", "margins", "\n".join(judged_lines(self.report)))
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        """The runs that this test needs: those of an agreement, or its own."""
+        from manipcli.batch.variants import in_engine
+
+        return tuple(in_engine(case, self.job.path, self.job.settings) for case in self._case.runs)
 
     @property
     def job(self) -> Job:

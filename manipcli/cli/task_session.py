@@ -23,6 +23,7 @@ from manipcli.batch.baseline import is_baseline, kept_baseline
 from manipcli.batch.discovery import refused_path, shown_path
 from manipcli.batch.first_look import NOT_ENTERED
 from manipcli.batch.job import Beat, Job, Settings
+from manipcli.batch.variants import agreement_report
 from manipcli.cli import console, pytest_plugin
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import number_of
@@ -152,7 +153,9 @@ class TaskSession:
                 yield f"{shown_path(file)}: no task has this baseline; rename it after its task, or remove it"
         uncompared = sum(not job.nominal and kept_baseline(job.path).exists() for job in self.jobs.values())
         if uncompared and self._settings.baseline:
-            reason = "a baseline is for the task as written, without --set, --seed and --samples"
+            reason = (
+                "a baseline is for the task as written, without --set, --seed, --samples, --engines and --check-step"
+            )
             yield f"{number_of(uncompared, 'test')} not compared with the baseline: {reason}"
 
 
@@ -214,17 +217,34 @@ class _Run(_Plugin):
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         items = {item.nodeid: item for item in session.items if isinstance(item, pytest_plugin.TaskItem)}
-        jobs = [item.job for item in items.values()]
-        with closing(process.run_jobs(jobs, at_once=self._at_once, observer=self._observe)) as reports:
+        jobs = {job.case.id: job for item in items.values() for job in item.jobs}
+        comparisons = [item for item in items.values() if item.job.case.compared]
+        done: dict[str, CaseReport] = {}
+        with closing(process.run_jobs(jobs.values(), at_once=self._at_once, observer=self._observe)) as reports:
             for report in reports:
-                item = items[report.case.id]
-                self._running.pop(item.nodeid, None)
-                item.report = self.reports[item.nodeid] = report
-                session.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
-                self._ended(report)
-                if session.shouldfail:
-                    raise session.Failed(session.shouldfail)
+                done[report.case.id] = report
+                self._running.pop(report.case.id, None)
+                if report.case.id in items:
+                    self._finish(session, items[report.case.id], report)
+                for item in [*comparisons]:
+                    runs = [done.get(job.case.id) for job in item.jobs]
+                    known = [run for run in runs if run is not None]
+                    if len(known) == len(runs):
+                        comparisons.remove(item)
+                        self._finish(session, item, agreement_report(item.job, known))
         return True
+
+    def _finish(self, session: pytest.Session, item: pytest_plugin.TaskItem, report: CaseReport) -> None:
+        """Reports a test.
+
+        Raises:
+            session.Failed: it is the last one.
+        """
+        item.report = self.reports[item.nodeid] = report
+        session.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+        self._ended(report)
+        if session.shouldfail:
+            raise session.Failed(session.shouldfail)
 
     def _observe(self, job: Job, beat: Beat) -> None:
         self._running[job.case.id] = beat

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.control.compiled import bind
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import Interface
@@ -189,7 +190,8 @@ class Reference:
 
     Attributes:
         rows: see above.
-        feed: (k, n) of this tick, or None: 0.
+        feed_room: (k, n) the part of this tick.
+        feeds: whether it is anything but 0.
         moving: whether `advance` has anything to do.
         ended: whether the trajectory is over.
         end: [s] of the trajectory's clock.
@@ -198,14 +200,15 @@ class Reference:
     """
 
     __slots__ = (
-        "_active", "_before", "_dt", "_end_row", "_feeds", "_interfaces", "_last", "_origin", "_scale", "_since",
-        "_table", "end", "ended", "feed", "moving", "rows", "scales", "speed",
+        "_active", "_at", "_before", "_dt", "_end_row", "_feeds", "_interfaces", "_last", "_origin", "_scale", "_since",
+        "_table", "end", "ended", "feed_room", "feeds", "moving", "rows", "scales", "speed",
     )  # fmt: skip
 
     def __init__(self, rows: Array, interfaces: Sequence[Interface], *, velocity_scale: Array | None = None) -> None:
         self.rows = rows
         self._interfaces = tuple(interfaces)
         self._scale = velocity_scale
+        self.feed_room = np.zeros((len(self._interfaces) if velocity_scale is None else 1, rows.shape[1]))
         self.speed = 1.0
         self.hold(ActiveTrajectory.hold(np.zeros(rows.shape[1])), time=0.0)
 
@@ -214,12 +217,14 @@ class Reference:
         self._active = active
         self.rows[:] = active.rest[:EFFORT]
         feed = self._feed(active.rest[None])
-        self.feed = None if feed is None else feed[0]
+        self.feeds = feed is not None
+        self.feed_room[:] = 0.0 if feed is None else feed[0]
         self.moving, self.ended, self.scales = False, True, False
         self.end, self._before, self._since, self.speed = 0.0, 0.0, time, 1.0
         self._table = np.zeros((0, EFFORT, self.rows.shape[1]))
         self._feeds: Array | None = None
-        self._origin, self._dt, self._last, self._end_row = time, math.inf, -1, 0
+        self._origin, self._dt, self._end_row = time, math.inf, 0
+        self._drop()
 
     def follow(
         self, active: ActiveTrajectory, samples: Array, *, time: float, period: float, speed: float | None = None
@@ -232,7 +237,7 @@ class Reference:
         self._take(samples, time, period)
         self._end_row = len(samples) - 2
         if self.speed != 1.0:
-            self._last = -1
+            self._drop()
         self.moving, self.ended = True, False
 
     def clock(self, time: float) -> float:
@@ -243,20 +248,27 @@ class Reference:
         """From `time` on the clock runs at this speed; samples made in advance are dropped."""
         if self.moving and self.scales and speed != self.speed:
             self._before, self._since = self.clock(time), time
-            self._last = -1
+            self._drop()
             self.speed = speed
 
     def advance(self, time: float, period: float) -> None:
-        """Writes `rows`, `feed` and `ended` of `time` [s], where the next is a `period` later."""
+        """Writes `rows`, `feed_room` and `ended` of `time` [s], where the next is a `period` later."""
+        row = self._at(time, period)
+        if row < 0:
+            self._look_ahead(time, period)
+            row = self._at(time, period)
+        self.ended = row >= self._end_row
+
+    def _sampled(self, time: float, period: float) -> int:
+        """Writes `rows` and `feed_room` of `time` from the samples; returns their row, or -1: there is no sample."""
         ticks = (time - self._origin) / self._dt
         row = int(ticks + 0.5)
         if not (row < self._last and -ON_TICK < ticks - row < ON_TICK and period == self._dt):
-            self._look_ahead(time, period)
-            row = 0
+            return -1
         self.rows[:] = self._table[row]
         if self._feeds is not None:
-            self.feed = self._feeds[row]
-        self.ended = row >= self._end_row
+            self.feed_room[:] = self._feeds[row]
+        return row
 
     def _look_ahead(self, time: float, period: float) -> None:
         """Samples the next ticks, for a time that is not sampled yet."""
@@ -271,8 +283,16 @@ class Reference:
         """Samples (T, 4, n) of the ticks from `time` on; of the last one only its feed is used."""
         self._table = samples[:, :EFFORT]
         self._feeds = self._feed(samples[1:])
-        self.feed = None
+        self.feeds = self._feeds is not None
         self._origin, self._dt, self._last = time, period, len(samples) - 1
+        clock = np.array([time, period, self._last, ON_TICK])
+        feeds = np.zeros(0) if self._feeds is None else np.ascontiguousarray(self._feeds)
+        n = self.rows.shape[1]
+        self._at = bind("sample", n, samples, feeds, clock, self.rows, self.feed_room) or self._sampled
+
+    def _drop(self) -> None:
+        """No time is sampled."""
+        self._last, self._at = -1, self._sampled
 
     def _feed(self, ahead: Array) -> Array | None:
         """(T, k, n) of the samples (T, 4, n) one period ahead; None: always 0."""

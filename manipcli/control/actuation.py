@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.control.compiled import bind
 from manipcli.core.geometry import Array
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
@@ -117,6 +118,31 @@ class Actuation:
         self._pass = np.ones(n)
         self._pass[here] = 0.0
         self._passes = len(here) < n
+        self._look(None, None)
+
+    def _look(self, command: Array | None, velocity: Array | None) -> None:
+        """Bind the compiled law to these arrays, which are overwritten at every tick.
+
+        It needs one joint per actuator, no latency, and the damping, which the first tick computes.
+        """
+        self._seen_arrays, self._compiled = (command, velocity), None
+        if command is None or velocity is None or self._waits or (self._rubs and self._damping is None):
+            return
+        n, a = len(command), len(self.names)
+        joints = np.array(self.drivetrain.joints, dtype=np.int64)
+        k = np.arange(a)
+        to_effort, to_joint = self._to_actuator[k, joints], self._to_joint[joints, k]
+        to_speed = self._to_actuator[a + k, n + joints] if self._sees_velocity else np.zeros(a)
+        if np.count_nonzero(self._to_actuator) != np.count_nonzero(to_effort) + np.count_nonzero(to_speed) or (
+            np.count_nonzero(self._to_joint) != np.count_nonzero(to_joint)
+        ):
+            return
+        self._compiled = bind(
+            "actuation", a, command, velocity, joints, to_effort, to_speed, self._effort, self._velocity, self._coulomb,
+            self._loss, np.zeros(2 * a) if self._damping is None else self._damping, to_joint, self._pass,
+            self.saturated, self.saturations, self._applied,
+            np.array([self._sees_velocity, self._rubs, self._passes]),
+        )  # fmt: skip
 
     def reset(self) -> None:
         """Forgets past commands and the counts."""
@@ -137,6 +163,10 @@ class Actuation:
         """
         if self.ideal:
             return command
+        if self._seen_arrays[0] is not command or self._seen_arrays[1] is not velocity:
+            self._look(command, velocity)
+        if self._compiled is not None:
+            return self._applied if self._compiled() else command
         n = len(command)
         seen = self._seen
         if self._sees_velocity:
@@ -199,6 +229,7 @@ class Actuation:
         """The efforts minus friction and losses."""
         if self._damping is None:
             self._damping = self._stable_damping(position)
+            self._look(*self._seen_arrays)
         damping, a = self._damping, len(given)
         most, least, friction = self._most, self._least, self._friction
         np.abs(given, out=most)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.control.compiled import Run, bind
+from manipcli.control.compiled.library import integers
 from manipcli.control.controller import Controller
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
@@ -68,6 +70,8 @@ class ModelFeedForward:
         ]
         self._served: list[tuple[Array, Index, int, int]] = []
         self._driven: list[tuple[Index, Array, Array]] = []
+        self._spread: Run | None = None
+        self._compiled: Run | None = None
 
     def serve(self, controllers: Sequence[Served]) -> None:
         """Set the controllers to serve."""
@@ -82,6 +86,23 @@ class ModelFeedForward:
         ]
         self._acceleration[:] = 0.0
         self._rate[:] = 0.0
+        self._bind()
+
+    def _bind(self) -> None:
+        """Bind the compiled laws to the arrays of the controllers."""
+        n = len(self._damping)
+        targets = [
+            (target, integers(index, n), source)
+            for index, wanted, reference in self._driven
+            for target, source in ((self._acceleration, wanted), (self._rate, reference))
+        ]
+        self._spread = bind("copies", n, *(array for group in targets for array in group))
+        followers, drivers = (np.array([own[k] for own in self._followers], dtype=np.int64) for k in (0, 1))
+        factors = np.array([own[2] for own in self._followers], dtype=np.float64)
+        commands = [array for command, index, _, _ in self._served for array in (integers(index, n), command)]
+        self._compiled = None
+        if all(every == 1 for _, _, every, _ in self._served):
+            self._compiled = bind("model_efforts", n, self._damping, self._rate, followers, drivers, factors, *commands)
 
     def add(self, tick: int, position: Array, velocity: Array) -> None:
         """To the controllers that were updated at `tick`; at the measured joints (n)."""
@@ -89,17 +110,24 @@ class ModelFeedForward:
             return
         if self._driven:
             acceleration, rate = self._acceleration, self._rate
-            for index, wanted, reference in self._driven:
-                acceleration[index] = wanted
-                rate[index] = reference
+            if self._spread is not None:
+                self._spread()
+            else:
+                for index, wanted, reference in self._driven:
+                    acceleration[index] = wanted
+                    rate[index] = reference
             for follower, driver, factor in self._followers:
                 acceleration[follower] = factor * acceleration[driver]
                 rate[follower] = factor * rate[driver]
             efforts = self._kinematics.inverse_dynamics(position, velocity, acceleration)
-            np.multiply(self._damping, rate, rate)
-            np.add(efforts, rate, efforts)
         else:
             efforts = self._kinematics.gravity(position)
+        if self._compiled is not None:
+            self._compiled(efforts, bool(self._driven))
+            return
+        if self._driven:
+            np.multiply(self._damping, self._rate, self._rate)
+            np.add(efforts, self._rate, efforts)
         for follower, driver, factor in self._followers:
             efforts[driver] += factor * efforts[follower]
         for command, index, every, first in self._served:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.tracking_error import TrackingError
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
@@ -103,16 +104,18 @@ class GripperController:
 
         self.output = output = ControllerOutput.of(n, 1)
         self._reference, self._velocity, self._command = output.position, output.velocity, output.command
-        self._errors = np.zeros((2, n))
-        self._error, self._error_rate = self._errors
-        self._all_errors = self._errors.reshape(-1)
+        self._effort = self._default_effort.copy()
+        self._tracking = TrackingError(output.rows[:2])
+        self._control = None
+        if self._pid is not None:
+            no_feed = np.zeros(n)
+            self._control = self._pid.loop(self._tracking.errors, self._command, feed=no_feed, effort=self._effort)
         self._step = np.zeros(n)
         self._measured: Array = np.zeros(n)
         self._activated = False
         self._time = self._began = 0.0
         self._goal: GoalHandle | None = None
         self._starts = False
-        self._set_effort(self._default_effort)
         self._target = np.zeros(n)
         self._fingers = self._default_fingers
         self._force: float | None = None
@@ -149,9 +152,6 @@ class GripperController:
             )
         return fingers
 
-    def _set_effort(self, effort: Array) -> None:
-        self._effort, self._minus_effort = effort, -effort
-
     def send_goal(self, goal: GripperGoal) -> GoalHandle:
         """Accept a goal, which begins at the next update; the previous goal is aborted.
 
@@ -171,7 +171,7 @@ class GripperController:
         effort = self._default_effort if goal.max_effort is None else self._efforts(goal.max_effort)
         if self._goal is not None:
             self._goal.end("aborted", ErrorCode.INVALID_GOAL, "preempted by a new goal", self._time)
-        self._set_effort(effort)
+        self._effort[:] = effort
         self._target, self._force, self._fingers = target, goal.force, fingers
         self._stops = [None] * len(fingers)
         self._texts = [""] * len(fingers)
@@ -223,17 +223,12 @@ class GripperController:
             self._judge(time, period, measured, contact_force)
             if self._goal is not None:
                 self._ramp(period)
-        if self._pid is None:
+        if self._control is None:
             self._command[:] = self._reference
             return self.output
-        np.subtract(self._reference, measured.position, self._error)
-        np.subtract(self._velocity, measured.velocity, self._error_rate)
-        if not math.hypot(*self._all_errors.tolist()) < math.inf:
+        if not self._tracking.update(measured, math.inf):
             refuse_not_finite(self.name, self.joints, measured, time)
-        command = self._command
-        self._pid.apply(self._errors, period, command)
-        np.maximum(command, self._minus_effort, out=command)
-        np.minimum(command, self._effort, out=command)
+        self._control(period, False)
         return self.output
 
     def _activate(self, measured: JointState) -> None:
@@ -243,7 +238,8 @@ class GripperController:
             self._pid.freeze(False)
         self._reference[:] = measured.position
         self._velocity[:] = 0.0
-        self._set_effort(self._effort if self._goal is not None else self._default_effort)
+        if self._goal is None:
+            self._effort[:] = self._default_effort
 
     def _unwind(self, position: Array) -> None:
         """Reset references that push away from their targets to the joint positions."""

@@ -55,7 +55,7 @@ class Slot:
     """
 
     __slots__ = (
-        "contact_force", "controller", "copies", "every", "first", "gathered", "index", "measured", "period",
+        "contact_force", "controller", "every", "first", "gathered", "index", "measured", "period",
         "scattered", "state",
     )  # fmt: skip
 
@@ -70,7 +70,6 @@ class Slot:
         none = np.zeros(0)
         self.measured = JointState(none, none, none)
         self.contact_force: Array | None = None
-        self.copies: tuple[tuple[Array, Index, Array], ...] = ()
         self.gathered: list[tuple[Array, Array]] = []
 
     def look(self, vectors: Sequence[Array], contact_force: Array | None) -> None:

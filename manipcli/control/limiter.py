@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
+from manipcli.control.compiled import Run, bind
 from manipcli.control.limit_laws import LimitArrays, limit_acceleration, limit_effort, limit_position, limit_velocity
 from manipcli.control.saturation import (
     ACCELERATION,
@@ -85,9 +86,23 @@ class _Efforts:
                 most += [fastest, np.where(near, self._kv_kp * own.soft_upper, math.inf)]
         self._window = Window(least, most)
         self._rows = self._window.rows
+        self._seen: tuple[JointCommand, Array, Array] | None = None
+        self._compiled: Run | None = None
+
+    def _look(self, command: JointCommand, position: Array, velocity: Array) -> None:
+        """Bind the compiled law to these arrays, which are overwritten at every tick."""
+        self._seen = command, position, velocity
+        n = len(position)
+        kv, kv_kp = (self._kv, self._kv_kp) if self._soft else np.zeros((2, n))
+        self._compiled = bind("window", n, position, velocity, command.effort, kv, kv_kp, *self._window.arrays)
 
     def inside(self, command: JointCommand, position: Array, velocity: Array) -> bool:
         """Whether no command saturates."""
+        seen = self._seen
+        if seen is None or seen[0] is not command or seen[1] is not position or seen[2] is not velocity:
+            self._look(command, position, velocity)
+        if self._compiled is not None:
+            return bool(self._compiled())
         rows = self._rows
         rows[0][:] = position
         rows[1][:] = velocity

@@ -14,13 +14,15 @@ switch is done as a whole or not at all, between two updates, so it has no timeo
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Protocol
 
 import numpy as np
 
 from manipcli.control.claims import Claims, conflicts
 from manipcli.control.command import JointCommand, mode_of
+from manipcli.control.compiled import bind
+from manipcli.control.compiled.library import integers
 from manipcli.control.controller import Controller, ControllerOutput
 from manipcli.control.feed_forward import FeedForwardLaw, Index, NoDynamics
 from manipcli.control.lifecycle import (
@@ -89,6 +91,7 @@ class ControllerManager:
         self._felt: Array | None = None
         self._tick = 0
         self._references = False
+        self._copy = self._copier(())
         findings = conflicts(controllers, self.joints, self.following)
         if findings:
             raise InvalidInput(findings)
@@ -256,10 +259,20 @@ class ControllerManager:
         modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
         self.command.obey(modes)
         self._feed_forward.serve([(s.controller, s.index, s.every, s.first) for s in self._active])
-        for slot in self._active:
-            slot.copies = self._copies(slot)
+        self._copy = self._copier([copy for slot in self._active for copy in self._copies(slot)])
         self._seen = self._felt = None
         self.outputs = tuple(s.controller.output if s.state == "active" else None for s in self._slots.values())
+
+    def _copier(self, copies: Sequence[tuple[Array, Index, Array]]) -> Callable[[], object]:
+        """Copies (target, index, source) in one compiled call if possible."""
+        n = len(self.joints)
+        flat = [array for target, index, source in copies for array in (target, integers(index, n), source)]
+
+        def law() -> None:
+            for target, index, source in copies:
+                target[index] = source
+
+        return bind("copies", n, *flat) or law
 
     def _copies(self, slot: Slot) -> tuple[tuple[Array, Index, Array], ...]:
         """The copies into the command at every tick: target, index, source."""
@@ -312,9 +325,7 @@ class ControllerManager:
                 except Exception as error:  # noqa: BLE001  (an error in a controller stops only that controller)
                     self._fail(slot, _cause(error), time)
         self._feed_forward.add(tick, state.position, state.velocity)
-        for slot in self._active:
-            for target, index, source in slot.copies:
-                target[index] = source
+        self._copy()
         return self.command
 
     def _fail(self, slot: Slot, cause: str, time: float) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.control.compiled import bind
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.transmission import Compat
@@ -77,8 +78,9 @@ class Pid:
         if words.size not in (1, self._size):
             raise InvalidArgument("CTRL114", f"{words.size} anti-windup values for gains of {self._size} joints")
         words = np.broadcast_to(words, (self._size,))
-        self._tracks, self._conditional = words == "back_calculation", words == "conditional_integration"
+        self._tracks[:], self._conditional[:] = words == "back_calculation", words == "conditional_integration"
         self._any_tracks, self._any_conditional = bool(self._tracks.any()), bool(self._conditional.any())
+        self._set_switches()
 
     def set_gains(
         self,
@@ -109,30 +111,48 @@ class Pid:
         size = g["p"].size
         if self._size not in (0, size):
             raise InvalidArgument("CTRL114", f"gains for {size} joints; this PID has {self._size}")
-        self._i, self._deadband = g["i"], g["error_deadband"]
-        self._u_min, self._u_max, self._i_min, self._i_max = g["u_min"], g["u_max"], g["i_min"], g["i_max"]
         if self._size == 0:
             self._scalar, self._size = scalar, size
-            self._term, self._integral, self._last_error, self._command = np.zeros((4, size))
-            self._scratch, self._unsaturated = np.zeros((2, size))
-            self._products = np.zeros((2, size))
-            self._proportional, self._derivative = self._products
-            self._has_last = False
-        self._gains = np.stack([g["p"], g["d"]])
+            self._allocate(size)
+        self._i[:], self._deadband[:] = g["i"], g["error_deadband"]
+        self._u_min[:], self._u_max[:], self._i_min[:], self._i_max[:] = g["u_min"], g["u_max"], g["i_min"], g["i_max"]
+        self._gains[:] = g["p"], g["d"]
         integrates = self._i != 0.0
         safe_i = np.where(integrates, self._i, 1.0)
         chosen = np.where(g["d"] != 0.0, np.sqrt(np.abs(g["d"] / safe_i)), np.abs(g["p"] / safe_i))
         tracking = g["tracking_time"]
-        self._tracking = np.where(tracking > 0.0, tracking, np.where(integrates, chosen, 0.0))
+        self._tracking[:] = np.where(tracking > 0.0, tracking, np.where(integrates, chosen, 0.0))
         tracks = self._tracking > 0.0
-        self._inverse_tracking = np.where(tracks & integrates, 1.0 / np.where(tracks, self._tracking, 1.0), 0.0)
-        self._integral_min = np.where(integrates, np.minimum(self._i_min / safe_i, self._i_max / safe_i), -np.inf)
-        self._integral_max = np.where(integrates, np.maximum(self._i_min / safe_i, self._i_max / safe_i), np.inf)
+        self._inverse_tracking[:] = np.where(tracks & integrates, 1.0 / np.where(tracks, self._tracking, 1.0), 0.0)
+        self._integral_min[:] = np.where(integrates, np.minimum(self._i_min / safe_i, self._i_max / safe_i), -np.inf)
+        self._integral_max[:] = np.where(integrates, np.maximum(self._i_min / safe_i, self._i_max / safe_i), np.inf)
         self._has_i, self._has_d = bool(integrates.any()), bool(g["d"].any())
-        self.freeze(False)
         self._clamps_u = bool(np.isfinite(self._u_min).any() or np.isfinite(self._u_max).any())
         self._clamps_i = bool(np.isfinite(self._i_min).any() or np.isfinite(self._i_max).any())
         self._is_pd = not (self._has_i or self._clamps_u)
+        self.freeze(False)
+
+    def _allocate(self, size: int) -> None:
+        """Allocate all arrays; they are written in place from then on, because a compiled law keeps them."""
+        self._gains = np.zeros((2, size))
+        self._i, self._deadband, self._u_min, self._u_max, self._i_min, self._i_max = np.zeros((6, size))
+        self._tracking, self._inverse_tracking, self._integral_min, self._integral_max = np.zeros((4, size))
+        self._counted_above, self._unwinding = np.zeros((2, size))
+        self._tracks, self._conditional = np.zeros((2, size), dtype=np.bool_)
+        self._any_tracks = self._any_conditional = False
+        self._term, self._integral, self._last_error, self._command = np.zeros((4, size))
+        self._scratch, self._unsaturated = np.zeros((2, size))
+        self._products = np.zeros((2, size))
+        self._proportional, self._derivative = self._products
+        self._has_last = False
+        self._switches = np.zeros(8, dtype=np.bool_)
+
+    def _set_switches(self) -> None:
+        """The switches of the compiled law, in its order."""
+        self._switches[:] = (
+            self._is_pd, self._ros1, self._has_i, self._clamps_u, self._clamps_i, self._any_tracks,
+            self._any_conditional, self._has_deadband,
+        )  # fmt: skip
 
     @property
     def tracking_time(self) -> Array:
@@ -146,9 +166,10 @@ class Pid:
 
     def freeze(self, which: npt.ArrayLike) -> None:
         """Freeze the integrals where `which` (n) is true, and no others."""
-        self._counted_above = np.where(which, np.inf, self._deadband)
-        self._unwinding = np.where(which, 0.0, self._inverse_tracking)
+        self._counted_above[:] = np.where(which, np.inf, self._deadband)
+        self._unwinding[:] = np.where(which, 0.0, self._inverse_tracking)
         self._has_deadband = bool(self._counted_above.any())
+        self._set_switches()
 
     def reset(self, keep_integral: bool = False) -> None:
         """Clear the last error and command, and the integral, too, unless `keep_integral`."""
@@ -227,6 +248,41 @@ class Pid:
             np.minimum(command, self._u_max, out=command)
         if self._has_i and not self._ros1:
             self._integrate_afterwards(errors[0], dt, command, unsaturated)
+
+    def loop(
+        self, errors: Array, command: Array, *, feed: Array, effort: Array | None = None
+    ) -> Callable[[float, bool], object]:
+        """`apply` on these arrays, in one compiled call if possible.
+
+        Args:
+            errors: (2, n) as for `apply`.
+            command: (n) is overwritten.
+            feed: (n) feed-forward.
+            effort: (n) largest command; None: unlimited.
+
+        Returns:
+            (dt, fed) -> None: the command of the next `dt` [s], plus `feed` if `fed`, clamped to -+ `effort`. The
+            arrays may change between two calls.
+        """
+        n = self._size
+        most = np.full(n, np.inf) if effort is None else effort
+        compiled = bind(
+            "pid", n, errors, self._gains, self._i, self._counted_above, self._u_min, self._u_max, self._i_min,
+            self._i_max, self._tracks, self._unwinding, self._conditional, self._integral_min, self._integral_max,
+            self._term, self._integral, feed, most, command, self._switches,
+        )  # fmt: skip
+        if compiled is not None:
+            return compiled
+
+        def law(dt: float, fed: bool) -> None:
+            self.apply(errors, dt, command)
+            if fed:
+                np.add(command, feed, out=command)
+            if effort is not None:
+                np.maximum(command, -effort, out=command)
+                np.minimum(command, effort, out=command)
+
+        return law
 
     def _integrate_first(self, e: Array, dt: float) -> None:
         """ROS 1: backward Euler, on the integral of the error."""

@@ -23,7 +23,7 @@ _MOST = sys.float_info.max  # below infinity, so that infinity is detected
 class Window:
     """Rows of numbers, and whether each lies strictly between its bounds: in two comparisons, not two per row."""
 
-    __slots__ = ("_above", "_all", "_below", "_flags", "_least", "_most", "_values", "rows")
+    __slots__ = ("_above", "_all", "_below", "_flags", "_least", "_most", "_values", "arrays", "rows")
 
     def __init__(self, least: Sequence[Array], most: Sequence[Array]) -> None:
         self._least = np.maximum(np.concatenate(least), -_MOST)
@@ -33,6 +33,7 @@ class Window:
         self.rows = tuple(self._values.reshape(len(least), -1))
         self._flags = np.zeros(2 * size, dtype=np.bool_)
         self._above, self._below = self._flags[:size], self._flags[size:]
+        self.arrays = self._least, self._most, self._values, self._flags  # for a compiled law
         self._all = b"\x01" * (2 * size)
 
     def holds(self) -> bool:

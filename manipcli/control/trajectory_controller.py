@@ -15,6 +15,7 @@ from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
 from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.tracking_error import TrackingError
 from manipcli.control.trajectory_goal import (
     Acceptance,
     JointFacts,
@@ -23,7 +24,6 @@ from manipcli.control.trajectory_goal import (
     controlled_by_error,
     outside_limits,
     refused,
-    shortest,
 )
 from manipcli.control.transitions import Transitions
 from manipcli.core.errors import InvalidArgument
@@ -159,11 +159,12 @@ class JointTrajectoryController:
         rows = self.output.rows
         self._reference = Reference(rows[:3], self.interfaces, velocity_scale=scale if by_error else None)
         self._desired, self._desired_velocity = rows[0], rows[1]
-        self._commands, self._command = rows[3:], rows[3]
-        self._errors: Array = np.zeros((2, n))
+        self._commands = rows[3:]
+        self._tracking = TrackingError(rows[:2], self._facts)
+        self._errors = self._tracking.errors
         self._error, self._error_rate = self._errors
-        self._all_errors = self._errors.reshape(-1)
-        self._wraps = self._facts.wraps
+        feed = self._reference.feed_room[0]
+        self._control = None if self._pid is None else self._pid.loop(self._errors, rows[3], feed=feed)
         self._initial_speed = self._speed = speed_scaling
         self._clear(time=0.0)
 
@@ -266,32 +267,17 @@ class JointTrajectoryController:
             reference.advance(time, period)
         if self._waiting:
             self._handle_requests(time, period, measured)
-        np.subtract(self._desired, measured.position, self._error)
-        np.subtract(self._desired_velocity, measured.velocity, self._error_rate)
-        if self._wraps:
-            shortest(self._error, self._facts)
-        # The largest error is at most their norm, a quick test. NaN and infinity do not pass.
-        if not math.hypot(*self._all_errors.tolist()) < self._bound:
+        if not self._tracking.update(measured, self._bound):
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
             late = reference.clock(time) - reference.end
             then = self._goal.judge_end(self._errors, self.output.acceleration, measured.velocity, time, late)
             self._go_on(then, time, measured)
-        feed = reference.feed
-        if self._pid is None:
-            self._commands[:] = feed
+        if self._control is None:
+            self._commands[:] = reference.feed_room
         else:
-            self._pid.apply(self._errors, period, self._command)
-            if feed is not None:
-                self._command += feed[0]
+            self._control(period, reference.feeds)
         return self.output
-
-    def _compare(self, measured: JointState) -> None:
-        """Compute the errors of this tick for the present reference."""
-        np.subtract(self._desired, measured.position, out=self._error)
-        np.subtract(self._desired_velocity, measured.velocity, out=self._error_rate)
-        if self._wraps:
-            shortest(self._error, self._facts)
 
     def _look_closer(self, time: float, measured: JointState) -> None:
         """Abort the goal if a joint exceeds its path tolerance."""
@@ -314,7 +300,7 @@ class JointTrajectoryController:
         self._forget()
         if then == "hold measured" and self._compat != "ros1":
             self._reference.hold(ActiveTrajectory.hold(measured.position), time=time)
-            self._compare(measured)
+            self._tracking.update(measured, self._bound)
 
     def _forget(self) -> None:
         self._goal = None

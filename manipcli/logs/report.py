@@ -24,6 +24,7 @@ from manipcli.record.recording import Recording
 from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import RATE, Playback
 from manipcli.report.display_quantity import quantity
+from manipcli.report.logs.engine_choice import engine_choices
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
 from manipcli.spec.base import Model
@@ -61,7 +62,7 @@ def log_page(
     if not any(len(span.states.time) for span in recording.spans):  # it ended before the start
         return _page(recording, path, judge_recording(recording, path), end=None)
     playback = open_playback(
-        path, rate=_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
+        path, rate=page_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
     )
     verdict = playback.verdict
     assert verdict is not None, "a log of manipcli has a verdict"
@@ -175,7 +176,8 @@ def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
     return places | {step.id: step.place for step in plan.steps if step.place}, list(plan.judged)
 
 
-def _rate(recording: Recording) -> float:
+def page_rate(recording: Recording) -> float:
+    """Sampling rate of the replay in a page [Hz], which bounds its number of states."""
     last = max((event.time for event in recording.events), default=0.0)
     return min(RATE, FRAMES / last) if last > 0.0 else RATE
 
@@ -247,6 +249,7 @@ def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tup
         ("log", path.name),
         *recording.metadata.get("versions", {}).items(),
         ("engine", verdict.engine),
+        *engine_choices(recording.metadata),
         ("seed", str(verdict.seed)),
         ("control period", f"{1e3 * recording.period:g} ms"),
         ("run", run.get("status", "") or "did not finish"),

@@ -10,6 +10,7 @@ import base64
 import html
 import json
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 
@@ -21,6 +22,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import framing
 from manipcli.replay.drawing import WORLD, Drawing, draw, floors_of, ground_height, link_frame
 from manipcli.replay.forces import LONGEST, Forces
+from manipcli.replay.ghost import Ghost
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
 from manipcli.replay.surface import Surface
@@ -61,14 +63,15 @@ class _Pack:
         return base64.b64encode(zlib.compress(b"".join(self.parts), LEVEL)).decode()
 
 
-def player_html(playback: Playback, *, whole_page: bool = False) -> str:
+def player_html(playback: Playback, *, ghosts: Sequence[Ghost] = (), whole_page: bool = False) -> str:
     """A run as an HTML element with its own style and script; a page can hold several.
 
     Args:
         playback: the run.
+        ghosts: other runs of the same task, drawn over it.
         whole_page: the element is alone on its page and takes the keyboard.
     """
-    head, data = _contents(playback)
+    head, data = _contents(playback, ghosts)
     script = "".join(map(_read, sorted(file.name for file in _PAGE.iterdir() if file.name.endswith(".js"))))
     return (
         f'<div class="mc-player"{" data-page=1" if whole_page else ""}>\n'
@@ -107,7 +110,7 @@ def _read(name: str) -> str:
     return _PAGE.joinpath(name).read_text("utf-8")
 
 
-def _contents(playback: Playback) -> tuple[str, str]:
+def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str]:
     """Input of the script: the head as JSON that is safe in a script element, and the packed arrays."""
     pack = _Pack()
     drawing = draw(playback.robot, playback.scene)
@@ -144,6 +147,11 @@ def _contents(playback: Playback) -> tuple[str, str]:
             for table in playback.curves()
         ],
     }
+    if ghosts:
+        head["ghosts"] = [
+            {"name": ghost.name, "position": pack.add(ghost.position, "f"), "body": pack.add(ghost.body, "f")}
+            for ghost in ghosts
+        ]
     text = json.dumps(head, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     # These three occur only in JSON strings; a name must not end the script element.
     safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

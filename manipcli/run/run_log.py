@@ -15,6 +15,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL
+from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
@@ -54,6 +55,11 @@ def default_log(task: Task) -> Path:
         message = f"cannot create folder '{RUNS}' for the log: {error.strerror}"
         raise InvalidInput([Diagnostic("LOG101", message, hint="choose another file with --log PATH")]) from error
     return RUNS / f"{task.name}.mcap"
+
+
+def variant_log(log: Path, variant: Variant) -> Path:
+    """`runs/pour@mujoco.mcap` for `runs/pour.mcap` in MuJoCo."""
+    return log.with_name(f"{log.stem}@{variant.name}{log.suffix}")
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from typing import Annotated, Final, Literal, get_args
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from manipcli.core.text import escape
+from manipcli.spec.agree import AgreeSpec
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
@@ -299,6 +300,7 @@ class TaskSpec(Model):
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
     baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")
+    agree: AgreeSpec = Field(AgreeSpec(), description="Allowed differences between the runs of several engines.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")
     expect: tuple[ExpectationSpec, ...] = Field(
         (), description="What must hold: at the end, at all times, or in a step."

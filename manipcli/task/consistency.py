@@ -12,7 +12,8 @@ from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
-from manipcli.judge.expectation import expectation_problems, until_problems
+from manipcli.core.text import did_you_mean
+from manipcli.judge.expectation import expectation_problems, labels, until_problems
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, no_hand
@@ -98,6 +99,12 @@ def not_there(
         message = f"unknown engine '{spec.simulation.engine}'"
         hint = f"engines: {', '.join(ENGINES.names)}"
         yield task.source.finding(ABSENT, ("simulation", "engine"), message, hint=hint)
+    names = tuple(labels(spec.judged))
+    for name in () if kept else spec.agree.margins:
+        if name not in names:
+            message = f"the task has no expectation '{name}'"
+            near = did_you_mean(name, names, kind="expectations")
+            yield task.source.finding(ABSENT, ("agree", "margins", name), message, hint=near, key=True)
 
 
 def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict, Unpack
 
@@ -49,6 +50,41 @@ class LoadOptions(FileOptions, total=False):
     sample: int | None
 
 
+@dataclass(frozen=True, slots=True)
+class WrittenTask:
+    """A task as written, from which its samples are drawn.
+
+    Attributes:
+        task: the task.
+        varied: the quantities of its `vary:`.
+        path: the task file.
+        options: how it was loaded.
+    """
+
+    task: Task
+    varied: tuple[Varied, ...]
+    path: Path
+    options: FileOptions
+
+    def sample(self, number: int | None) -> Task:
+        """A sample; None for the task as written.
+
+        Raises:
+            InvalidInput: the sample does not exist, or a drawn value is refused.
+        """
+        if number is None:
+            return self.task
+        return draw_sample(
+            self.task,
+            self.varied,
+            number,
+            self.path,
+            overrides=self.options.get("overrides", ()),
+            package_path=self.options.get("package_path", ()),
+            allow_outside=self.options.get("allow_outside", False),
+        )
+
+
 def load_task(path: Path, *, sample: int | None = None, **options: Unpack[FileOptions]) -> Task:
     """Loads a task and all files that it names.
 
@@ -58,24 +94,22 @@ def load_task(path: Path, *, sample: int | None = None, **options: Unpack[FileOp
         options: see `FileOptions`.
 
     Raises:
+        InvalidInput: as `load_written`. Also if the sample does not exist, or a drawn value is refused.
+    """
+    return load_written(path, **options).sample(sample)
+
+
+def load_written(path: Path, **options: Unpack[FileOptions]) -> WrittenTask:
+    """Loads a task as written and all files that it names.
+
+    Raises:
         InvalidInput: all errors of all three files at once; errors of the scene's geometry only if the task file is
-            valid. Also if the sample does not exist, or a drawn value is refused.
+            valid.
     """
     try:
-        task, varied = _as_written(path, **options)
+        return WrittenTask(*_as_written(path, **options), path, options)
     except InvalidInput as first:
         raise every_finding(path, first, **options) from None
-    if sample is None:
-        return task
-    return draw_sample(
-        task,
-        varied,
-        sample,
-        path,
-        overrides=options.get("overrides", ()),
-        package_path=options.get("package_path", ()),
-        allow_outside=options.get("allow_outside", False),
-    )
 
 
 def _as_written(

@@ -81,7 +81,7 @@ class Plan:
 
 
 def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None) -> Plan:
-    """Plans every step.
+    """Plans every step. What a sample changes in the simulation only (`Task.truth`) has no effect.
 
     Args:
         task: the task.
@@ -90,6 +90,7 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     Raises:
         NotPlannable: names the step and the cause; later steps are not planned.
     """
+    task = task.known
     planner = _planner(task)
     start = PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)

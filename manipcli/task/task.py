@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, Loc
@@ -50,6 +50,11 @@ class Task:
     def true(self) -> GroundTruth:
         """The ground truth of the simulation."""
         return self.truth or GroundTruth(self.robot, self.scene, self.controllers_file)
+
+    @property
+    def known(self) -> Task:
+        """The task as the planner knows it: without drawn values and ground truth."""
+        return replace(self, drawn=None, truth=None)
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manipcli.batch.baseline import (
-    FLOORS,
     Key,
     Measure,
     Measures,
@@ -27,6 +26,7 @@ from manipcli.batch.baseline import (
 from manipcli.cli.app import main
 from manipcli.core.errors import InvalidInput
 from manipcli.judge.measures import step_measures
+from manipcli.judge.measures.floors import FLOORS
 from manipcli.judge.measures.step_measures import StepMeasures
 from manipcli.pipeline import run_task
 from manipcli.spec.baseline import ToleranceSpec

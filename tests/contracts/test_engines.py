@@ -254,7 +254,7 @@ def test_the_ideal_engine_makes_references_come_true_at_once(interface: Mode, op
 
 @with_physics
 def test_a_body_falls_by_half_g_t_squared(member: EngineMember, opens: Opens) -> None:
-    """Bullet's semi-implicit Euler falls g t (t + h) / 2: the closed form to the first order in the step h."""
+    """Semi-implicit Euler falls g t (t + h) / 2: the closed form to the first order in the step h."""
     states = run(opens(member, pendulum(), FALLING), 401)
     t = 400 * STEP
     fallen = FALLING.movable[0].X_WO.p[2] - states[400][3][0, 2]
@@ -274,6 +274,18 @@ def test_a_pendulum_keeps_its_energy(member: EngineMember, opens: Opens) -> None
     assert q.max() > 3.0  # it swung through
     # Semi-implicit Euler wobbles by the order of w h; it must not drift.
     assert np.abs(energy).max() < 0.01 * m * G * length
+
+
+@with_physics
+def test_a_pendulum_swings_with_its_period(member: EngineMember, opens: Opens) -> None:
+    """About the vertical with small amplitude A: T = 2 pi sqrt((m l^2 + I) / (m g l)) (1 + A^2 / 16)."""
+    m, length, moment, amplitude = 2.0, 0.5, 0.01, 0.1
+    engine = opens(member, pendulum(), start=[math.pi / 2 + amplitude])
+    q = np.array([s[0][0] for s in run(engine, 6000)]) - math.pi / 2
+    k = np.flatnonzero((q[:-1] < 0.0) & (q[1:] >= 0.0))
+    crossings = (k - q[k] / (q[k + 1] - q[k])) * STEP
+    period = 2 * math.pi * math.sqrt((m * length**2 + moment) / (m * G * length)) * (1 + amplitude**2 / 16)
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=1e-4)
 
 
 @with_physics
@@ -429,7 +441,31 @@ def test_the_origin_of_a_turning_body_circles_its_centre_of_mass(member: EngineM
 
 
 @with_physics
-@pytest.mark.parametrize(("slope", "sticks"), [(20.0, True), (25.0, True), (29.0, False), (35.0, False)])
+def test_impacts_keep_the_momentum(member: EngineMember, opens: Opens) -> None:
+    """Two balls that start inside each other fly apart, and one hits a third: m v sums to 0, and energy does not grow.
+
+    The tolerance is that of the solvers, which end at a residual, relative to the momentum that is exchanged.
+    """
+    masses = np.array([0.3, 0.5, 0.8])
+    places = (2.0, 2.08, 2.3)
+    balls = [
+        body(f"ball{k}", Sphere(0.05), (x, 0.0, 1.0), mass=m, moments=(0.4 * m * 0.05**2,) * 3)
+        for k, (x, m) in enumerate(zip(places, masses, strict=True))
+    ]
+    states = run(opens(member, pendulum(), scene(*balls, gravity=0.0)), 2000)
+    velocities = np.array([state[5] for state in states])
+    momenta = masses[:, None] * velocities
+    before = next(k for k, v in enumerate(velocities) if abs(v[2, 0]) > 0.0) - 1
+    assert abs(velocities[before, 1, 0]) > 0.05
+    assert abs(velocities[-1, 2, 0]) > 0.02, "the third was hit"
+    exchanged = np.abs(momenta).max()
+    assert np.abs(momenta.sum(axis=1)).max() < 1e-6 * exchanged
+    energy = (masses[:, None] * velocities**2).sum(axis=(1, 2)) / 2
+    assert energy[-1] < energy[before] * (1 + 1e-9)
+
+
+@with_physics
+@pytest.mark.parametrize(("slope", "sticks"), [(20.0, True), (26.3, True), (27.9, False), (35.0, False)])
 def test_a_block_on_a_slope_slides_beyond_the_angle_of_friction(
     member: EngineMember, opens: Opens, slope: float, sticks: bool
 ) -> None:
@@ -539,11 +575,12 @@ def test_bullet_refuses_a_joint_that_moves_no_mass(opens: Opens) -> None:
     assert ENGINES["kinematic"].refuses(model, scene(), None) == ()
 
 
-def test_moments_written_with_few_digits_are_held(opens: Opens) -> None:
+@with_physics
+def test_moments_written_with_few_digits_are_held(member: EngineMember, opens: Opens) -> None:
     """One may exceed the sum of the others by a hundredth of it; the engine gets the nearest that a body can have."""
     rounded = Inertial(1.7, Transform.of(rpy=(0.3, 0.2, 0.1)), frozen(np.diag([0.003, 0.0236, 0.0268])))
     model = robot([joint("a", "x")], [rounded])
-    opens(ENGINES["pybullet"], model)
+    opens(member, model)
 
 
 def test_what_bullet_holds_is_read_back(tmp_path: Path) -> None:

@@ -5,17 +5,22 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.core.errors import Diagnostic, Place
+from manipcli.core.errors import Diagnostic, Loc, Place
+from manipcli.judge.agreement import compare
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.measured_run import MeasuredRun, Variant
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.logs import plot as chart
+from manipcli.report.agreement.agreement_json import render_json
+from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.json import render_findings, render_run
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite.suite import Case, CaseReport, Suite, Trouble
@@ -36,7 +41,7 @@ CASE = CaseReport(
 OBJECTS = {
     "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
-    "findings", "motions", "motions.limited_by",
+    "findings", "disagreements", "numbers", "motions", "motions.limited_by",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators", "limits"}
@@ -76,6 +81,16 @@ def test_keys_are_those_that_are_written(which: int) -> None:
     elsewhere = ("cases.run.", "cases.warnings.")
     written = {one for one in _written(json.loads(text)) if not one.startswith(elsewhere)}
     assert set(_documented(list(_rows())[which])) == written
+
+
+def test_keys_of_compared_runs() -> None:
+    place: dict[Loc, Place] = {("judged", 0): Place("a.yaml", 9, 5)}
+    failed = MeasuredRun(Variant("pybullet"), VERDICT, 1e-3, 3.0, log="a.mcap", forces={"pick_1": 20.0}, places=place)
+    passed = replace(NEAR, outcome="passed", margin=0.01)
+    other = MeasuredRun(Variant("mujoco"), replace(VERDICT, expectations=(passed,)), 1e-3, 1.0, log="b.mcap")
+    compared = ComparedRuns(compare([failed, other]), (RUN, RUN))
+    written = {one for one in _written(json.loads(render_json(compared))) if not one.startswith("runs.")}
+    assert set(_documented(list(_rows())[5])) == written
 
 
 def test_keys_of_what_can_be_plotted(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

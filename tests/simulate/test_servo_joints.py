@@ -21,12 +21,15 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Box, Geometry
-from manipcli.simulate.engine import Engine, EngineSettings
+from manipcli.simulate.engine import Engine, EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.engines.pybullet_motors import POSITION_TIME
 from manipcli.simulate.session import Session
 from manipcli.spec.controllers import GainsSpec
 
+with_physics = pytest.mark.parametrize(
+    "member", [member for member in ENGINES if member.physics == "full"], ids=lambda member: member.name
+)
 GRAVITY_EFFORT = 2.0 * 9.81 * 0.3
 FREE = JointLimits(-3.0, 3.0, 100.0, 1000.0)
 
@@ -51,13 +54,15 @@ def obstacle(height: float) -> Body:
     )  # fmt: skip
 
 
-def opened(limits: JointLimits = FREE, *, step: float = 1e-3, bodies: tuple[Body, ...] = ()) -> Engine:
+def opened(
+    member: EngineMember, limits: JointLimits = FREE, *, step: float = 1e-3, bodies: tuple[Body, ...] = ()
+) -> Engine:
     scene = Scene(bodies, (), frozen((0.0, 0.0, -9.81)))
-    return ENGINES["pybullet"].open(robot(limits), scene, EngineSettings(step, 1, np.zeros(1)))
+    return member.open(robot(limits), scene, EngineSettings(step, 1, np.zeros(1)))
 
 
 def following(
-    interface: str, gains: GainsSpec, *, rate: float | None = None, limits: JointLimits = FREE
+    member: EngineMember, interface: str, gains: GainsSpec, *, rate: float | None = None, limits: JointLimits = FREE
 ) -> tuple[Session, JointTrajectoryController]:
     """A session in which a trajectory controller commands the hinge; the gains count on velocities alone."""
     arm = JointTrajectoryController(
@@ -69,7 +74,7 @@ def following(
     manager.configure("arm")
     manager.switch(["arm"])
     scene = Scene((), (), frozen((0.0, 0.0, -9.81)))
-    return Session(robot=robot(limits), scene=scene, engine=opened(limits), manager=manager, period=1e-3), arm
+    return Session(robot=robot(limits), scene=scene, engine=opened(member, limits), manager=manager, period=1e-3), arm
 
 
 def way_to(angle: float) -> JointTrajectory:
@@ -96,21 +101,25 @@ def run(engine: Engine, command: JointCommand, ticks: int) -> tuple[np.ndarray, 
     return tuple(np.array(rows).T)
 
 
+@with_physics
 @pytest.mark.parametrize("step", [5e-4, 1e-3, 2e-3])
-def test_a_position_is_approached_with_one_time_constant_whatever_the_physics_step(step: float) -> None:
+def test_a_position_is_approached_with_one_time_constant_whatever_the_physics_step(
+    member: EngineMember, step: float
+) -> None:
     """Conformance 60, where the lag is a gain a cycle: 1 - exp(-t / tau). One step of lag is Bullet's, which solves for
     the velocity at the end of a step."""
-    engine = opened(step=step)
+    engine = opened(member, step=step)
     position, _, _ = run(engine, commanded("position", 0.01), round(0.1 / step))
     engine.close()
     times = step * np.arange(1, len(position) + 1)
     np.testing.assert_allclose(position, 0.01 * (1 - np.exp(-times / POSITION_TIME)), atol=1e-6)
 
 
+@with_physics
 @pytest.mark.parametrize("mode", ["position", "velocity"])
-def test_nothing_jumps(mode: Mode) -> None:
+def test_nothing_jumps(member: EngineMember, mode: Mode) -> None:
     """Limits of 2 rad/s and 20 N m on 0.24 kg m^2 under gravity: at most 108 rad/s^2."""
-    engine = opened(replace(FREE, velocity=2.0, effort=20.0))
+    engine = opened(member, replace(FREE, velocity=2.0, effort=20.0))
     position, velocity, effort = run(engine, commanded(mode, 2.0), 100)
     engine.close()
     assert np.abs(effort).max() <= 20.0 + 1e-9
@@ -120,10 +129,11 @@ def test_nothing_jumps(mode: Mode) -> None:
     assert np.diff(position, prepend=0.0).max() <= 2.0 * 1e-3 + 1e-9
 
 
+@with_physics
 @pytest.mark.parametrize("mode", ["position", "velocity"])
-def test_a_drive_that_is_too_weak_cannot_hold_the_link(mode: Mode) -> None:
+def test_a_drive_that_is_too_weak_cannot_hold_the_link(member: EngineMember, mode: Mode) -> None:
     """Conformance 62: gravity acts on a joint that obeys positions, too."""
-    weak, strong = opened(replace(FREE, effort=4.0)), opened(replace(FREE, effort=8.0))
+    weak, strong = opened(member, replace(FREE, effort=4.0)), opened(member, replace(FREE, effort=8.0))
     fallen, _, effort = run(weak, commanded(mode, 0.0), 500)
     held, _, holding = run(strong, commanded(mode, 0.0), 500)
     weak.close()
@@ -135,12 +145,13 @@ def test_a_drive_that_is_too_weak_cannot_hold_the_link(mode: Mode) -> None:
     assert holding[-1] == pytest.approx(-GRAVITY_EFFORT, rel=1e-3)
 
 
+@with_physics
 @pytest.mark.parametrize(("mode", "value"), [("position", 1.0), ("velocity", 1.0)])
-def test_a_link_that_is_pressed_on_an_obstacle_does_not_pass(mode: Mode, value: float) -> None:
+def test_a_link_that_is_pressed_on_an_obstacle_does_not_pass(member: EngineMember, mode: Mode, value: float) -> None:
     """The top of the block is where the lower edge of the beam's end comes at 0.2 rad."""
     angle = 0.2
     height = 1.0 - 0.6 * math.sin(angle) - 0.02 * math.cos(angle)
-    engine = opened(replace(FREE, effort=10.0, velocity=2.0), bodies=(obstacle(height),))
+    engine = opened(member, replace(FREE, effort=10.0, velocity=2.0), bodies=(obstacle(height),))
     position, velocity, effort = run(engine, commanded(mode, value), 1500)
     pressing = max(contact.force for contact in engine.contacts())
     engine.close()
@@ -152,13 +163,14 @@ def test_a_link_that_is_pressed_on_an_obstacle_does_not_pass(mode: Mode, value: 
     assert lever == pytest.approx(0.6 * math.cos(angle) - 0.02 * math.sin(angle), rel=0.02)
 
 
+@with_physics
 @pytest.mark.parametrize("interface", ["position", "velocity"])
-def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: str) -> None:
+def test_what_a_controller_brings_about_does_not_depend_on_its_rate(member: EngineMember, interface: str) -> None:
     """Conformance 60. A quintic over half a second, updated at 1000, 500 and 250 Hz on the same physics: the same rest,
     and the same way but for the time that a slower one learns of it."""
     ways = {}
     for rate in (1000.0, 500.0, 250.0):
-        session, arm = following(interface, GainsSpec(p=30.0, ff_velocity_scale=1.0), rate=rate)
+        session, arm = following(member, interface, GainsSpec(p=30.0, ff_velocity_scale=1.0), rate=rate)
         session.tick()
         handle = arm.send_goal(way_to(0.3))
         ways[rate] = np.array([session.tick().position[0] for _ in range(900)])
@@ -170,14 +182,15 @@ def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: s
         assert np.abs(position - ways[1000.0]).max() < peak * (1.0 / rate + 1e-3)
 
 
+@with_physics
 @pytest.mark.parametrize("d", [0.0, 0.3])
 @pytest.mark.parametrize("rate", [1000.0, 500.0])
-def test_a_velocity_loop_settles_up_to_the_gain_that_is_said_of_it(rate: float, d: float) -> None:
+def test_a_velocity_loop_settles_up_to_the_gain_that_is_said_of_it(member: EngineMember, rate: float, d: float) -> None:
     """The engine has no delay that the bound does not know of."""
     most = largest_velocity_gain(d=d, period=1.0 / rate)
     for share, settles in ((0.95, True), (1.05, False)):
         gains = GainsSpec(p=share * most, d=d, ff_velocity_scale=1.0)
-        session, arm = following("velocity", gains, rate=rate)
+        session, arm = following(member, "velocity", gains, rate=rate)
         session.tick()
         arm.send_goal(way_to(0.3))
         position = np.array([session.tick().position[0] for _ in range(600)])
@@ -185,11 +198,14 @@ def test_a_velocity_loop_settles_up_to_the_gain_that_is_said_of_it(rate: float, 
         assert bool(np.abs(position[-50:] - 0.3).max() < 1e-6) is settles
 
 
+@with_physics
 @pytest.mark.parametrize("interface", ["position", "velocity"])
 @pytest.mark.parametrize(("share", "counted"), [(0.9, 300), (1.1, 0)])
-def test_a_motor_that_gives_all_it_may_is_counted(interface: str, share: float, counted: int) -> None:
+def test_a_motor_that_gives_all_it_may_is_counted(
+    member: EngineMember, interface: str, share: float, counted: int
+) -> None:
     limits = replace(FREE, effort=share * GRAVITY_EFFORT)
-    session, _ = following(interface, GainsSpec(p=30.0), limits=limits)
+    session, _ = following(member, interface, GainsSpec(p=30.0), limits=limits)
     for _ in range(301):  # the first tick measures what was before it
         session.tick()
     session.engine.close()
@@ -212,15 +228,14 @@ def test_of_a_hand_that_presses_and_of_a_tick_that_is_counted_already_nothing_is
     assert not hand.watches
 
 
-def test_a_follower_settles_where_its_driver_says_also_under_gravity() -> None:
+@with_physics
+def test_a_follower_settles_where_its_driver_says_also_under_gravity(member: EngineMember) -> None:
     """Conformance 61: multiplier times the driver plus offset, and the same for velocities."""
     base, driver = robot().links, robot().joints[0]
     follower = replace(driver, name="follower", child="other", mimic=Mimic("hinge", -0.5, 0.2))
     pair = replace(robot(), links=(*base, replace(base[1], name="other")), joints=(driver, follower))
     pair = replace(pair, links=tuple(replace(link, collisions=()) for link in pair.links))
-    engine = ENGINES["pybullet"].open(
-        pair, Scene((), (), frozen((0.0, 0.0, -9.81))), EngineSettings(1e-3, 1, np.array([0.0, 0.2]))
-    )
+    engine = member.open(pair, Scene((), (), frozen((0.0, 0.0, -9.81))), EngineSettings(1e-3, 1, np.array([0.0, 0.2])))
     command = JointCommand(2)
     command.obey(["position", "free"])
     for tick in range(1000):

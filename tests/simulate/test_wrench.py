@@ -18,11 +18,14 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Actuator, RobotModel
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Box, Geometry, Sphere
-from manipcli.simulate.engine import Engine, EngineSettings
+from manipcli.simulate.engine import Engine, EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.session import Session
 
 STEP = 1e-3
+with_physics = pytest.mark.parametrize(
+    "member", [member for member in ENGINES if member.physics == "full"], ids=lambda member: member.name
+)
 G = np.array([0.0, 0.0, -9.81])
 MASSES = {"upper": 1.5, "wrist": 0.4, "tray": 0.8}
 COM = {"upper": (0.1, 0.02, -0.03), "wrist": (0.03, 0.0, 0.01), "tray": (0.05, -0.04, 0.02)}
@@ -78,11 +81,12 @@ def settled(engine: Engine, sensors: Sequence[Array], mode: Mode, effort: float 
     return np.array(state.position), [np.array(sensor) for sensor in sensors]
 
 
+@with_physics
 @pytest.mark.parametrize("driven", ["revolute", "prismatic", "continuous"])
 @pytest.mark.parametrize("mode", ["position", "velocity", "brake"])
-def test_what_hangs_at_rest_pulls_with_its_weight(driven: JointType, mode: Mode) -> None:
+def test_what_hangs_at_rest_pulls_with_its_weight(member: EngineMember, driven: JointType, mode: Mode) -> None:
     model = robot(driven)
-    engine = ENGINES["pybullet"].open(model, scene(), EngineSettings(STEP, 1, frozen([0.4])))
+    engine = member.open(model, scene(), EngineSettings(STEP, 1, frozen([0.4])))
     try:
         sensors = [engine.sense_wrench(joint) for joint in ("drive", "mount", "glue")]
         assert not np.array(sensors).any()
@@ -93,12 +97,13 @@ def test_what_hangs_at_rest_pulls_with_its_weight(driven: JointType, mode: Mode)
         np.testing.assert_allclose(wrench, expected(model, q, link), atol=2e-3)  # the motor's solver leaves so much
 
 
-def test_an_effort_is_measured_along_its_own_axis() -> None:
+@with_physics
+def test_an_effort_is_measured_along_its_own_axis(member: EngineMember) -> None:
     """The reaction along the axis of a driven joint is the effort that holds it."""
     model = robot("revolute")
     q = np.array([0.4])
     holds = float(Kinematics(model, gravity=tuple(G)).gravity(q)[0])
-    engine = ENGINES["pybullet"].open(model, scene(), EngineSettings(STEP, 1, frozen(q)))
+    engine = member.open(model, scene(), EngineSettings(STEP, 1, frozen(q)))
     try:
         sensor = engine.sense_wrench("drive")
         command = JointCommand(1)
@@ -124,7 +129,8 @@ def _body(shape: Sphere | Box, mass: float, at: Sequence[float], *, rolls: float
     )  # fmt: skip
 
 
-def test_what_lies_on_a_link_is_measured_through_the_contact() -> None:
+@with_physics
+def test_what_lies_on_a_link_is_measured_through_the_contact(member: EngineMember) -> None:
     """A ball of 2 kg on a level tray, whose own mass is 0.8 kg."""
     slide = _joint("drive", "prismatic", "base", "carriage", Transform.of(xyz=(0.0, 0.0, 1.0)), (0.0, 0.0, 1.0))
     glue = _joint("glue", "fixed", "carriage", "tray", Transform.of(xyz=(0.2, 0.0, 0.0)), (1, 0, 0))
@@ -133,9 +139,7 @@ def test_what_lies_on_a_link_is_measured_through_the_contact() -> None:
     links = (Link("base", None, (), ()), Link("carriage", solid, (), ()), Link("tray", solid, (plate,), (plate,)))
     model = RobotModel("lift", "base", links, (slide, glue), (), (), (), Transform.identity(), "")
     at = (0.25, 0.03, 1.06)
-    engine = ENGINES["pybullet"].open(
-        model, scene(_body(Sphere(0.05), 2.0, at, rolls=0.01)), EngineSettings(STEP, 1, frozen([0.0]))
-    )
+    engine = member.open(model, scene(_body(Sphere(0.05), 2.0, at, rolls=0.01)), EngineSettings(STEP, 1, frozen([0.0])))
     try:
         q, (wrench,) = settled(engine, [engine.sense_wrench("glue")], "position")
         ball = np.array(engine.read().body_position[0])
@@ -164,11 +168,12 @@ def _gripper() -> RobotModel:
     return RobotModel("gripper", "base", tuple(links), joints, (), (), (), Transform.identity(), "")
 
 
-def test_what_couples_joints_and_the_grip_stay_inside_the_hand() -> None:
+@with_physics
+def test_what_couples_joints_and_the_grip_stay_inside_the_hand(member: EngineMember) -> None:
     """A hand that squeezes 0.5 kg with 20 N pulls with its weight and the block's; each finger with half the grip."""
     model, mass, grip = _gripper(), 0.5, 20.0
     block = _body(Box((0.1, 0.1, 0.1)), mass, (0.3, 0.0, 0.9))
-    engine = ENGINES["pybullet"].open(model, scene(block), EngineSettings(STEP, 1, frozen([0.0, 0.0])))
+    engine = member.open(model, scene(block), EngineSettings(STEP, 1, frozen([0.0, 0.0])))
     try:
         ticks = []
         palm, left, right = (engine.sense_wrench(joint) for joint in ("mount", "drive", "follow"))
@@ -194,8 +199,9 @@ def test_what_couples_joints_and_the_grip_stay_inside_the_hand() -> None:
     assert left[2] + right[2] == pytest.approx(-0.8 * 9.81, abs=1e-2)
 
 
+@with_physics
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_a_link_that_moves_pulls_with_what_accelerates_it(substeps: int) -> None:
+def test_a_link_that_moves_pulls_with_what_accelerates_it(member: EngineMember, substeps: int) -> None:
     """Of a pendulum with a rotor, f = m (g - a) where a = q'' x r + q' x (q' x r) from the joint's motion."""
     hinge = _joint("drive", "continuous", "base", "upper", Transform.of(xyz=(0.0, 0.0, 1.0)), (0.0, 1.0, 0.0))
     mass, inertia, rotor = 1.5, 0.02, 0.4
@@ -206,7 +212,7 @@ def test_a_link_that_moves_pulls_with_what_accelerates_it(substeps: int) -> None
         "pendulum", "base", links, (hinge,), (), (), (tag,), Transform.identity(), "",
         actuators=(Actuator("m", rotor_inertia=rotor / 100.0),),
     )  # fmt: skip
-    engine = ENGINES["pybullet"].open(model, scene(), EngineSettings(STEP, substeps, frozen([0.6])))
+    engine = member.open(model, scene(), EngineSettings(STEP, substeps, frozen([0.6])))
     torque, axis = 12.0, np.array([0.0, 1.0, 0.0])
     speeds, wrenches, angles = [], [], []
     try:
@@ -233,9 +239,10 @@ def test_a_link_that_moves_pulls_with_what_accelerates_it(substeps: int) -> None
     assert wrenches[k][4] == pytest.approx(-(torque - rotor * faster), abs=0.02)  # the rotor takes its share
 
 
-def test_a_session_attaches_the_broadcaster_and_an_ideal_engine_feels_nothing() -> None:
+@with_physics
+def test_a_session_attaches_the_broadcaster_and_an_ideal_engine_feels_nothing(member: EngineMember) -> None:
     model = robot("revolute")
-    for name in ("pybullet", "kinematic"):
+    for name in (member.name, "kinematic"):
         engine = ENGINES[name].open(model, scene(), EngineSettings(STEP, 1, frozen([0.4])))
         sensor = ForceTorqueBroadcaster(name="sensor", link="wrist", joint="mount")
         hold = ForwardCommandController(name="hold", joints=("drive",), interface="position")

@@ -83,7 +83,6 @@ def _without_log(done: CaseReport, lines: Sequence[str]) -> CaseReport:
 def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     """Writes the baseline; returns the lines to print."""
     from manipcli.batch.baseline import (
-        FLOORS,
         baseline_path,
         compared,
         kept_baseline,
@@ -93,6 +92,7 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     )
     from manipcli.batch.discovery import shown_path
     from manipcli.core.errors import InvalidInput
+    from manipcli.judge.measures.floors import FLOORS
     from manipcli.report.display_quantity import quantity
     from manipcli.report.text import PASS
     from manipcli.spec.baseline import ToleranceSpec

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.engine_options import CheckStep, Engines, engine_names, refuse_single_outputs
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
 from manipcli.core.errors import ExitCode, InvalidInput
@@ -30,6 +31,8 @@ def run(
     embed_meshes: Annotated[
         bool, typer.Option("--embed-meshes", help="Store the mesh files in the log, so that replay needs no packages.")
     ] = False,
+    engines: Engines = None,
+    check_step: CheckStep = False,
     report_file: ReportFile = None,
     junit: JunitFile = None,
     seed: Seed = None,
@@ -41,11 +44,39 @@ def run(
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Verbose output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the result.")] = False,
 ) -> ExitCode:
-    """Validate, plan, simulate, record and judge a task."""
+    """Validate, plan, simulate, record and judge a task.
+
+    With --engines or --check-step, several times: each run has its own log, runs/<task>@<engine>.mcap. The exit code
+    is 1 if a run fails, or if verdicts differ, or numbers by more than `agree:` of the task allows.
+    """
     from manipcli.cli.interrupts import Interrupts
     from manipcli.cli.log_to_stdout import refuse_stdout, stdout_or
 
     to_stdout = log is not None and str(log) == "-"
+    if engines is not None or check_step:
+        from manipcli.cli.commands.run_engines import run_engines
+
+        refuse_single_outputs(to_stdout=to_stdout, junit=junit)
+        names = engine_names(engines, check_step=check_step, overrides=tuple(overrides or ()))
+        with Interrupts() as interrupts:
+            return run_engines(
+                task,
+                engines=names,
+                check_step=check_step,
+                log=log,
+                force=force,
+                embed_meshes=embed_meshes,
+                report_file=report_file,
+                seed=seed,
+                sample=sample,
+                overrides=tuple(overrides or ()),
+                format_=format_,
+                package_path=tuple(package_path or ()),
+                allow_outside=allow_outside,
+                verbose=verbose,
+                quiet=quiet,
+                interrupts=interrupts,
+            )
     if to_stdout:
         refuse_stdout(format_)
     outputs = Outputs(report_file, junit, others=(task, None if to_stdout else log), quiet=quiet)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.engine_options import CheckStep, Engines, engine_names
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
@@ -62,6 +63,8 @@ def test(
         typer.Option("--logs", metavar="DIR", help="Write logs and pictures to DIR [default: runs/test]."),
     ] = None,
     keep_logs: Annotated[bool, typer.Option("--keep-logs", help="Keep the logs of passed runs, too.")] = False,
+    engines: Engines = None,
+    check_step: CheckStep = False,
     seed: Seed = None,
     overrides: Overrides = None,
     format_: Format = "text",
@@ -73,7 +76,7 @@ def test(
 
     Tests are the YAML files with a name under the top-level key `task`, and the key `robot`; hidden folders, virtual
     environments, runs, build, dist and node_modules are not entered. Logs and pictures of failed tests go to runs/test.
-    Without --set, --seed and --samples, tasks are compared with their baselines, see `bless`.
+    Without --set, --seed, --samples, --engines and --check-step, tasks are compared with their baselines, see `bless`.
     """
     from manipcli.cli.interrupts import Interrupts
 
@@ -89,6 +92,8 @@ def test(
             folder=logs or FOLDER,
             pages=report,
             keep_logs=keep_logs,
+            engines=engine_names(engines, check_step=check_step, overrides=tuple(overrides or ())),
+            check_step=check_step,
             silence=limit(_time("--silence", silence)),
             timeout=limit(_time("--timeout", timeout)),
         )

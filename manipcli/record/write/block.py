@@ -11,6 +11,7 @@ from operator import itemgetter
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.control.compiled import Run, bind
 from manipcli.control.controller import REFERENCE_ROWS, ControllerOutput
 from manipcli.core.geometry import Array, wrapped
 from manipcli.model.batch_kinematics import relative_batch
@@ -139,6 +140,8 @@ class Block:
         self._numbers = self._states.numbers
         self._actuators = Drivetrain.of(robot)
         self._rows: list[Array | None] = []
+        self._seen: tuple[Array, Sequence[ControllerOutput | None]] | None = None
+        self._compiled: Run | None = None
         self._ids = {channel.topic: channel.id for channel in channels}
         sources = self._sources(robot, scene, controllers)
         strides = [selection.stride(topic, period) for topic, _, _ in sources]
@@ -194,11 +197,27 @@ class Block:
         """Copy one tick; the caller can reuse its arrays. The block must not be full."""
         k = self.count
         self._ticks[k] = tick
-        self._numbers[k] = state.numbers
+        self.count = k + 1
+        numbers = state.numbers
+        seen = self._seen
+        if seen is None or seen[0] is not numbers or seen[1] is not outputs:
+            self._look(numbers, outputs)
+        if self._compiled is not None:
+            self._compiled(k)
+            return
+        self._numbers[k] = numbers
         for rows, output in zip(self._rows, outputs, strict=True):
             if rows is not None:
                 rows[k] = np.nan if output is None else output.rows
-        self.count = k + 1
+
+    def _look(self, numbers: Array, outputs: Sequence[ControllerOutput | None]) -> None:
+        """Bind the compiled copy to these arrays, which are overwritten at every tick."""
+        self._seen = numbers, outputs
+        groups = [self._numbers, numbers]
+        for rows, output in zip(self._rows, outputs, strict=True):
+            if rows is not None and rows[0].size:
+                groups += [rows, np.full(rows[0].shape, np.nan) if output is None else output.rows]
+        self._compiled = bind("rows", 0, *groups)
 
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:
         """Encode and empty the block, with `singles` after the tick of their time. None if empty."""

@@ -35,17 +35,18 @@ function between(table, width, column, k, way) {
   return way === 0 ? a : a + way * (table[(k + 1) * width + column] - a);
 }
 
-// Pose {p, q} of every frame at time t, with the joints at the values of `joints`, a (T, n) table.
-function poses(joints, t) {
+// Pose {p, q} of every frame at time t, with the joints at the values of `joints`, a (T, n) table, and the movable
+// bodies at those of `moved`, a (T, 7 m) table.
+function poses(joints, t, moved = bodies) {
   const [k, way] = moment(t), n = run.joints.length, found = [];
   for (const f of run.order) {
     const frame = run.frames[f];
     if (frame.body !== undefined) {
-      const at = (c) => between(bodies, 7 * run.bodies, 7 * frame.body + c, k, 0);
-      const p = [0, 1, 2].map((c) => between(bodies, 7 * run.bodies, 7 * frame.body + c, k, way));
+      const at = (c) => between(moved, 7 * run.bodies, 7 * frame.body + c, k, 0);
+      const p = [0, 1, 2].map((c) => between(moved, 7 * run.bodies, 7 * frame.body + c, k, way));
       let q = [3, 4, 5, 6].map(at);
       if (way > 0) {
-        const next = [3, 4, 5, 6].map((c) => bodies[(k + 1) * 7 * run.bodies + 7 * frame.body + c]);
+        const next = [3, 4, 5, 6].map((c) => moved[(k + 1) * 7 * run.bodies + 7 * frame.body + c]);
         const sign = q[0] * next[0] + q[1] * next[1] + q[2] * next[2] + q[3] * next[3] < 0 ? -1 : 1;
         q = q.map((value, c) => (1 - way) * value + way * sign * next[c]);
         const length = Math.hypot(...q);

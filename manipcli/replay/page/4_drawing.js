@@ -45,6 +45,8 @@ void main() {
   shown = vec4(colour.rgb * a, a);
 }`];
 
+// Reference, and other runs.
+const GHOSTS = [[0.93, 0.42, 0.05, 0.42], [0.13, 0.6, 0.33, 0.42], [0.6, 0.2, 0.7, 0.42]];
 const GHOST = [0.16, 0.45, 0.95, 0.38], SUN = [0.45, 0.25, 0.86], PATH = [0.93, 0.42, 0.05];
 let gl = null, programs = {}, surfaces = [], arrow = {}, path = null, grid = null;
 
@@ -150,6 +152,19 @@ function pointer(pose, length, radius, colour) {
   solid(arrow.head, matrix(tip, [2.4 * radius, 2.4 * radius, head]), colour);
 }
 
+// Drawables at other poses, all in one colour: only their nearest surface, and behind other surfaces at the same place.
+function translucent(where, drawables, colour) {
+  const models = where.map((pose) => matrix(pose));
+  gl.enable(gl.POLYGON_OFFSET_FILL);
+  gl.polygonOffset(2, 2);
+  gl.depthMask(true);
+  gl.colorMask(false, false, false, false);
+  for (const drawable of drawables) solid(surfaces[drawable.surface], models[drawable.frame], colour);
+  gl.colorMask(true, true, true, true);
+  for (const drawable of drawables) solid(surfaces[drawable.surface], models[drawable.frame], colour);
+  gl.disable(gl.POLYGON_OFFSET_FILL);
+}
+
 // A force at a point: the arrow ends there (`before` 1) or begins there (0).
 function push(point, force, before, colour) {
   const newtons = Math.hypot(...force), length = Math.min(newtons * run.pushes.scale, 2 * run.pushes.longest);
@@ -220,18 +235,12 @@ function draw(t) {
   }
   gl.depthMask(false);
   for (const drawable of clear) solid(surfaces[drawable.surface], models[drawable.frame], drawable.rgba);
-  if (shows.ghost && wanted) {
-    const should = poses(wanted, t).map((pose) => matrix(pose)), robot = run.drawables.filter((drawable) => drawable.robot);
-    // Only its nearest surface, and behind other surfaces at the same place.
-    gl.enable(gl.POLYGON_OFFSET_FILL);
-    gl.polygonOffset(2, 2);
-    gl.depthMask(true);
-    gl.colorMask(false, false, false, false);
-    for (const drawable of robot) solid(surfaces[drawable.surface], should[drawable.frame], GHOST);
-    gl.colorMask(true, true, true, true);
-    for (const drawable of robot) solid(surfaces[drawable.surface], should[drawable.frame], GHOST);
-    gl.disable(gl.POLYGON_OFFSET_FILL);
-  }
+  if (shows.ghost && wanted) translucent(poses(wanted, t), run.drawables.filter((drawable) => drawable.robot), GHOST);
+  const moving = (drawable) => drawable.robot || run.frames[drawable.frame].body !== undefined;
+  ghosts.forEach((ghost, k) => {
+    if (!shows[`run-${k}`]) return;
+    translucent(poses(ghost.position, t, ghost.body), run.drawables.filter(moving), GHOSTS[k % GHOSTS.length]);
+  });
   if (shows.path && path && path.count > 0) {
     const to = programs.lines;
     gl.useProgram(to.made);

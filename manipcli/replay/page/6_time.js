@@ -1,6 +1,6 @@
 // The shown time and playback.
 
-let stamps, measured, wanted, bodies, pushFirst, pushes;
+let stamps, measured, wanted, bodies, pushFirst, pushes, ghosts = [];
 let time = run.start, playing = false, before = 0, waiting = false;
 const shows = { ghost: false, path: true, forces: true, frames: false };
 

@@ -49,6 +49,15 @@ function build() {
   });
   scrub(part("plot"), (event) => plot.at(event.clientX - part("plot").getBoundingClientRect().left));
   part("play").addEventListener("click", () => play(!playing));
+  // A switch for each other run, in its colour.
+  ghosts.forEach((ghost, k) => {
+    const label = element(root.querySelector(".shows"), "label"), box = element(label, "input");
+    box.type = "checkbox";
+    box.dataset.part = `show-run-${k}`;
+    shows[`run-${k}`] = true;
+    const [r, g, b] = GHOSTS[k % GHOSTS.length].map((c) => Math.round(255 * c));
+    element(label, "b", "", ghost.name).style.color = `rgb(${r} ${g} ${b})`;
+  });
   for (const name of Object.keys(shows)) {
     const box = part("show-" + name);
     if (!box) continue;
@@ -96,6 +105,7 @@ async function begin() {
   measured = array(run.position);
   wanted = run.reference ? array(run.reference) : null;
   bodies = array(run.body);
+  ghosts = (run.ghosts || []).map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
   if (run.pushes) [pushFirst, pushes] = [array(run.pushes.first), array(run.pushes.rows)];
   for (const table of run.curves) table.values = array(table.values);
   look();
@@ -109,7 +119,8 @@ async function begin() {
   build();
   refresh();
   // For scripts and tests.
-  root.player = { run, seek, play, poses: (t) => poses(measured, t), get time() { return time; }, get playing() { return playing; } };
+  root.player = { run, seek, play, poses: (t) => poses(measured, t),
+    ghosts: (t) => ghosts.map((ghost) => poses(ghost.position, t, ghost.body)), get time() { return time; }, get playing() { return playing; } };
 }
 
 begin().catch((error) => complain("Cannot show the run: " + error.message));

@@ -11,7 +11,7 @@ from manipcli.report.html.page_parts import mark, table
 from manipcli.report.suite.suite import CaseReport, Suite
 from manipcli.report.suite.suite_text import beforehand, gist, render_summary
 
-COLUMNS = ("verdict", "task", "sample", "margin or cause", "duration")
+COLUMNS = ("verdict", "task", "sample or engine", "margin or cause", "duration")
 
 
 def render_page(suite: Suite, folder: Path) -> str:
@@ -50,7 +50,7 @@ def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     return (
         mark(report.passed, report.outcome),
         element("div", name, element("div", report.case.task) if report.case.task else None, class_="name"),
-        "" if report.case.sample is None else str(report.case.sample),
+        report.case.kind,
         element("div", gist(report), *(element("div", line) for line in more), class_="whole"),
         f"{report.duration:.1f} s",
     )

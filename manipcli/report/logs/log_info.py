@@ -10,6 +10,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
 from manipcli.report.json import Json, dumps, number, saturated_object, step_object
+from manipcli.report.logs.engine_choice import engine_choices
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS, steps_table
 
@@ -83,6 +84,7 @@ def render_text(info: LogInfo) -> str:
         held = "all embedded in the log" if embedded >= meshes else f"{embedded} embedded in the log"
         lines += ["", f"{meshes} meshes, {'not embedded in the log' if not embedded else held}"]
     lines += ["", _headline(info), *([str(info.saturations)] if str(info.saturations) else []), _length(info)]
+    lines += [f"{name} of the engine: {value}" for name, value in engine_choices(found.metadata)]
     return "\n".join([*lines, f"log: {found.path}"])
 
 
@@ -102,6 +104,7 @@ def render_json(info: LogInfo) -> str:
             "ours": info.ours,
             "run": dict(info.run),
             "versions": dict(info.versions),
+            "engine_settings": dict(found.metadata.get("engine", {})),
             "verdict": dict(info.verdict) or None,
             "saturated": saturated_object(info.saturations),
             "steps": [step_object(step) for step in info.steps],

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 from manipcli.core.errors import Diagnostic, ExitCode, Place
+from manipcli.judge.agreement import Agreement
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.measured_run import MeasuredRun, Variant
 from manipcli.judge.verdict import ExpectationOutcome
 from manipcli.report.run_report import RunReport
 
-CaseWord = Literal["passed", "failed", "error", "invalid", "crashed", "hung"]
-"""`error`: no verdict, for a reason other than the file or a crash; `invalid`: the file is invalid, nothing was run."""
+AGREEMENT: Final = "agreement"
+"""In the id of the case that compares runs: `tasks/pour.yaml::pour[agreement]`."""
+
+CaseWord = Literal["passed", "failed", "differs", "error", "invalid", "crashed", "hung"]
+"""`differs`: the runs in several engines or steps do not agree;
+`error`: no verdict, for a reason other than the file or a crash; `invalid`: the file is invalid, nothing was run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +32,8 @@ class Case:
         sample: number of the sample of its `vary:`; None for the task as written.
         tags: tags of the task, and `engine_<name>`.
         varied: whether the task has a `vary:`.
+        variant: the engine and step of one of several runs of `--engines`; None: those of the task.
+        compared: the runs whose agreement this case tests, instead of a run; empty for a run.
         findings: errors of the file.
         line: line of the key `task`, from 1.
     """
@@ -37,11 +45,25 @@ class Case:
     varied: bool = False
     findings: tuple[Diagnostic, ...] = ()
     line: int = 1
+    variant: Variant | None = None
+    compared: tuple[Variant, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """`17`, `mujoco`, `17-mujoco`, `agreement`; "" for the task as written."""
+        words = [] if self.sample is None else [str(self.sample)]
+        words += [AGREEMENT] if self.compared else [] if self.variant is None else [self.variant.name]
+        return "-".join(words)
 
     @property
     def name(self) -> str:
-        """`pour`, `pour[17]`."""
-        return self.task if self.sample is None else f"{self.task}[{self.sample}]"
+        """`pour`, `pour[17]`, `pour[mujoco]`."""
+        return f"{self.task}[{self.kind}]" if self.kind else self.task
+
+    @property
+    def runs(self) -> tuple[Case, ...]:
+        """The cases that must run for this one: those of an agreement, or itself."""
+        return tuple(replace(self, variant=variant, compared=()) for variant in self.compared) or (self,)
 
     @property
     def id(self) -> str:
@@ -72,6 +94,8 @@ class CaseReport:
         log, picture, page, output: kept files; `output` is the output of a process that crashed or hung.
         command: shell command that reproduces the case.
         notes: files that could not be written.
+        measured: numbers of a run with a variant.
+        agreement: of a case that compares runs; None where one of them has no verdict.
     """
 
     case: Case
@@ -88,6 +112,8 @@ class CaseReport:
     page: str | None = None
     output: str | None = None
     notes: tuple[str, ...] = ()
+    measured: MeasuredRun | None = None
+    agreement: Agreement | None = None
 
     @property
     def passed(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 from manipcli.core.errors import Place
+from manipcli.report.agreement.agreement_json import agreement_object
 from manipcli.report.json import Json, dumps, finding_object, number, render_run
 from manipcli.report.suite.suite import CaseReport, Suite
 
@@ -35,6 +36,8 @@ def _case(report: CaseReport) -> Json:
         "file": report.case.file,
         "task": report.case.task,
         "sample": report.case.sample,
+        "engine": report.case.variant.engine if report.case.variant is not None else None,
+        "half_step": report.case.variant is not None and report.case.variant.half_step,
         "tags": list(report.case.tags),
         "outcome": report.outcome,
         "text": report.text,
@@ -48,6 +51,7 @@ def _case(report: CaseReport) -> Json:
         ],
         "warnings": [finding_object(warning) for warning in report.warnings],
         "run": json.loads(render_run(report.run)) if report.run is not None else None,
+        "agreement": agreement_object(report.agreement) if report.agreement is not None else None,
         "log": report.log,
         "picture": report.picture,
         "page": report.page,

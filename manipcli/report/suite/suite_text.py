@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, shorten
+from manipcli.report.agreement.agreement_text import numbers_table
 from manipcli.report.display_quantity import quantity
 from manipcli.report.suite.suite import Case, CaseReport, Suite
 from manipcli.report.text import FAIL, PASS, describe
@@ -33,6 +34,8 @@ def render_line(report: CaseReport, *, width: int = 0) -> str:
 def gist(report: CaseReport) -> str:
     """The smallest margin; for a failed case its first cause, unless that is the margin."""
     tightest = report.tightest
+    if report.passed and report.agreement is not None:
+        return report.text
     if report.passed:
         if tightest is None:
             return "no expectations" if report.run is not None and not report.run.verdict.expectations else ""
@@ -59,6 +62,8 @@ def case_lines(report: CaseReport) -> list[str]:
         lines.append(f"{where}{trouble.message}")
     lines += beforehand(report)
     lines += judged_lines(report)
+    if report.agreement is not None:
+        lines += numbers_table(report.agreement).splitlines()
     kept = (("log", report.log), ("picture", report.picture), ("report", report.page), ("output", report.output))
     lines += [f"{name}: {path}" for name, path in kept if path is not None]
     return [*lines, *report.notes, f"reproduce: {report.command}"]
@@ -87,7 +92,9 @@ def judged_lines(report: CaseReport) -> list[str]:
 def render_summary(suite: Suite) -> str:
     """One line: how many cases passed, failed or were not run, and the duration."""
     words = [report.outcome for report in suite.reports]
-    counts = [(words.count(word), word) for word in ("failed", "error", "crashed", "hung", "invalid", "passed")]
+    counts = [
+        (words.count(word), word) for word in ("failed", "differs", "error", "crashed", "hung", "invalid", "passed")
+    ]
     undone = suite.total - len(words)
     parts = [f"{count} {word}" for count, word in counts if count] + ([f"{undone} not run"] if undone else [])
     good = suite.total and all(report.passed for report in suite.reports) and not undone

@@ -30,22 +30,22 @@ from manipcli.simulate.engines.pybullet_contacts import (
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
+from manipcli.simulate.engines.pybullet_solver import iterations
 from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 from manipcli.spec.base import Model
 
-SOLVER_ITERATIONS: Final = 200
-"""Maximum; the solver stops at a residual of 1e-7. With Bullet's default of 50 it does not converge while a hand holds
-an object: for a cup pressed with 34 N in all by three fingers, it computed 39 N, varying by 7 N."""
-
 
 class PybulletSpec(Model):
     """Settings of PyBullet."""
 
-    solver_iterations: Annotated[int, Field(ge=1, le=10_000)] = Field(
-        SOLVER_ITERATIONS,
-        description="Largest number of iterations of the contact solver per physics step, 1 to 10000. Default 200.",
+    solver_iterations: Annotated[int, Field(ge=1, le=10_000)] | None = Field(
+        None,
+        description="Largest number of iterations of the contact solver per physics step, 1 to 10000. Default: by the "
+        "scene. 1000 if a movable body is lighter than 50 g. 100 for at most 5 movable bodies with masses up to 50 "
+        "times apart and a robot without rotor inertia; what lies in a movable container need only have 10 g. Else "
+        "200. The log contains the number and the reason.",
     )
 
 
@@ -74,7 +74,7 @@ class PybulletEngine:
         p.setGravity(*scene.gravity, physicsClientId=client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=settings.step,
-            numSolverIterations=_own(settings.own).solver_iterations,
+            numSolverIterations=_own(settings.own).solver_iterations or iterations(robot, scene).number,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
         )
@@ -262,7 +262,10 @@ def _own(settings: Model | None) -> PybulletSpec:
 
 
 def _chosen(robot: RobotModel, scene: Scene, settings: EngineSettings) -> Mapping[str, str]:
-    return {}
+    if _own(settings.own).solver_iterations is not None:
+        return {}
+    number, reason = iterations(robot, scene)
+    return {"solver_iterations": str(number), "solver_iterations_reason": reason}
 
 
 MEMBER = EngineMember(

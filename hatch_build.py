@@ -1,0 +1,34 @@
+"""Build hook: compiles the kernels of the control tick, where there is a C compiler and Python's headers.
+
+Without them the build goes on: every law also exists in Python and gives the same results, see
+`manipcli/control/compiled`.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sysconfig
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+FOLDER = "manipcli/control/compiled"
+LIBRARY = f"{FOLDER}/_kernels.abi3.so"
+
+
+class Kernels(BuildHookInterface[Any]):
+    """For an editable installation and for a wheel; one wheel serves all versions of Python."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        root = Path(self.root)
+        compile_kernels = runpy.run_path(str(root / FOLDER / "compiler.py"))["compile_kernels"]
+        fault = compile_kernels(root / FOLDER / "kernels.c", root / LIBRARY)
+        if fault:
+            (root / LIBRARY).unlink(missing_ok=True)
+            self.app.display_warning(f"the control tick is not compiled, it runs in Python: {fault}")
+            return
+        platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        build_data["pure_python"] = False
+        build_data["tag"] = f"cp311-abi3-{platform}"
+        build_data["artifacts"].append(f"/{LIBRARY}")

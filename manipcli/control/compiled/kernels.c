@@ -1,0 +1,503 @@
+/* Kernels of the control tick: the laws of manipcli/control for all joints of a controller in one call.
+ *
+ * Each kernel computes what a law in Python computes with numpy, operation by operation and in the same order, so that
+ * both give the same bits: no fused multiply-add (-ffp-contract=off), no sums over joints. The law in Python is the
+ * definition; tests/control/compiled compares them.
+ *
+ *     run = kernels.bind("errors", 7, reference, position, velocity, errors).run
+ *     run(bound)
+ *
+ * `bind` takes the arrays once, checks their types and lengths, and holds them; `run` takes numbers only.
+ */
+
+#define Py_LIMITED_API 0x030B0000
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifndef SOURCE_CRC
+#define SOURCE_CRC 0
+#endif
+
+typedef Py_ssize_t Size;
+typedef struct Kernel Kernel;
+typedef PyObject *(*Run)(Kernel *self, PyObject *const *args);
+
+/* `fields` has two characters per array: its type (d: float64, i: int64, b: bool; a capital is written) and its length
+ * as a multiple of n (0: any). The fields after | repeat. */
+typedef struct {
+    const char *name;
+    const char *fields;
+    Size args;
+    Run run;
+    const char *(*wrong)(const Kernel *self); /* what is inconsistent in the arrays, or NULL */
+} Law;
+
+struct Kernel {
+    PyObject_HEAD
+    const Law *law;
+    Size n;
+    Size count;
+    Py_buffer *arrays;
+};
+
+static double *doubles(const Kernel *self, Size k) { return (double *)self->arrays[k].buf; }
+static int64_t *integers(const Kernel *self, Size k) { return (int64_t *)self->arrays[k].buf; }
+static unsigned char *flags(const Kernel *self, Size k) { return (unsigned char *)self->arrays[k].buf; }
+static Size length(const Kernel *self, Size k) { return self->arrays[k].len / self->arrays[k].itemsize; }
+
+/* numpy's maximum and minimum: NaN wins; of two zeros, the one that the processor's instruction chooses: the larger and
+ * the smaller by sign on ARM, the second operand on x86. */
+#if defined(__aarch64__) || defined(_M_ARM64)
+static double larger(double a, double b) { return a != a || a > b || (a == b && signbit(b)) ? a : b; }
+static double smaller(double a, double b) { return a != a || a < b || (a == b && signbit(a)) ? a : b; }
+#else
+static double larger(double a, double b) { return a != a || a > b ? a : b; }
+static double smaller(double a, double b) { return a != a || a < b ? a : b; }
+#endif
+
+/* Reads a float argument; false with a Python error set. */
+static int number(PyObject *value, double *found)
+{
+    *found = PyFloat_AsDouble(value);
+    return !(*found == -1.0 && PyErr_Occurred());
+}
+
+static int indices_within(const Kernel *self, Size k, Size bound)
+{
+    for (Size j = 0; j < length(self, k); j++)
+        if (integers(self, k)[j] < 0 || integers(self, k)[j] >= bound) return 0;
+    return 1;
+}
+
+/* errors: reference minus measurement of positions and velocities. run(bound) -> whether each is below it. */
+static PyObject *run_errors(Kernel *self, PyObject *const *args)
+{
+    enum { REFERENCE, POSITION, VELOCITY, ERRORS };
+    const double *reference = doubles(self, REFERENCE);
+    const double *position = doubles(self, POSITION), *velocity = doubles(self, VELOCITY);
+    double *errors = doubles(self, ERRORS), bound;
+    Size n = self->n;
+    int below = 1;
+    if (!number(args[0], &bound)) return NULL;
+    for (Size j = 0; j < n; j++) {
+        errors[j] = reference[j] - position[j];
+        errors[n + j] = reference[n + j] - velocity[j];
+        below &= fabs(errors[j]) < bound && fabs(errors[n + j]) < bound; /* NaN is not */
+    }
+    return PyBool_FromLong(below);
+}
+
+/* pid: Pid.apply, then the feed-forward where asked, then the clamp to -+ effort. run(dt, with_feed) */
+static PyObject *run_pid(Kernel *self, PyObject *const *args)
+{
+    enum { ERRORS, GAINS, I, COUNTED, U_MIN, U_MAX, I_MIN, I_MAX, TRACKS, UNWINDING, CONDITIONAL, INTEGRAL_MIN,
+           INTEGRAL_MAX, TERM, INTEGRAL, FEED, EFFORT, COMMAND, SWITCHES };
+    enum { IS_PD, ROS1, HAS_I, CLAMPS_U, CLAMPS_I, ANY_TRACKS, ANY_CONDITIONAL, HAS_DEADBAND };
+    const double *errors = doubles(self, ERRORS), *gains = doubles(self, GAINS), *i = doubles(self, I);
+    const double *counted = doubles(self, COUNTED), *u_min = doubles(self, U_MIN), *u_max = doubles(self, U_MAX);
+    const double *i_min = doubles(self, I_MIN), *i_max = doubles(self, I_MAX), *unwinding = doubles(self, UNWINDING);
+    const double *least = doubles(self, INTEGRAL_MIN), *most = doubles(self, INTEGRAL_MAX);
+    const double *feed = doubles(self, FEED), *effort = doubles(self, EFFORT);
+    const unsigned char *tracks = flags(self, TRACKS), *conditional = flags(self, CONDITIONAL);
+    const unsigned char *switches = flags(self, SWITCHES);
+    double *term = doubles(self, TERM), *integral = doubles(self, INTEGRAL), *command = doubles(self, COMMAND), dt;
+    Size n = self->n;
+    int with_feed = args[1] == Py_True;
+    if (!number(args[0], &dt)) return NULL;
+    for (Size j = 0; j < n; j++) {
+        double e = errors[j], u = gains[j] * e + gains[n + j] * errors[n + j];
+        if (!switches[IS_PD]) {
+            double count = !switches[HAS_DEADBAND] || fabs(e) > counted[j] ? e : 0.0, unsaturated;
+            if (switches[ROS1]) {
+                integral[j] += dt * count;
+                if (conditional[j]) integral[j] = smaller(larger(integral[j], least[j]), most[j]);
+                term[j] = smaller(larger(i[j] * integral[j], i_min[j]), i_max[j]);
+            }
+            if (switches[HAS_I]) u += term[j];
+            unsaturated = u;
+            if (switches[CLAMPS_U]) u = smaller(larger(u, u_min[j]), u_max[j]);
+            if (switches[HAS_I] && !switches[ROS1]) {
+                double step = i[j] * count;
+                if (switches[ANY_TRACKS]) step += (double)tracks[j] * (u - unsaturated) * unwinding[j];
+                if (conditional[j] && u != unsaturated && e * unsaturated > 0.0) step = 0.0;
+                term[j] += step * dt;
+                if (switches[CLAMPS_I]) term[j] = smaller(larger(term[j], i_min[j]), i_max[j]);
+            }
+        }
+        if (with_feed) u += feed[j];
+        command[j] = smaller(larger(u, -effort[j]), effort[j]);
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_pid(const Kernel *self) { return length(self, 18) == 8 ? NULL : "expected 8 switches"; }
+
+/* sample: Reference.advance at a time that is sampled. run(time, period) -> the row, or -1: it is not sampled. */
+static PyObject *run_sample(Kernel *self, PyObject *const *args)
+{
+    enum { SAMPLES, FEEDS, CLOCK, ROWS, FEED };
+    const double *clock = doubles(self, CLOCK);
+    double time, period, ticks;
+    Size n = self->n, k = length(self, FEED), row;
+    if (!number(args[0], &time) || !number(args[1], &period)) return NULL;
+    ticks = (time - clock[0]) / clock[1];
+    if (!(fabs(ticks) < 1e15)) return PyLong_FromLong(-1);
+    row = (Size)(ticks + 0.5);
+    if (!((double)row < clock[2] && -clock[3] < ticks - row && ticks - row < clock[3] && period == clock[1]))
+        return PyLong_FromLong(-1);
+    if (row < 0 || (row + 1) * 4 * n > length(self, SAMPLES) || (length(self, FEEDS) && (row + 1) * k > length(self, FEEDS)))
+        return PyLong_FromLong(-1);
+    memcpy(doubles(self, ROWS), doubles(self, SAMPLES) + row * 4 * n, 3 * n * sizeof(double));
+    if (length(self, FEEDS)) memcpy(doubles(self, FEED), doubles(self, FEEDS) + row * k, k * sizeof(double));
+    return PyLong_FromSsize_t(row);
+}
+
+static const char *wrong_sample(const Kernel *self)
+{
+    return length(self, 2) == 4 ? NULL : "expected origin, period, last row and tolerance";
+}
+
+/* copies: target[index] = source, for each group. run() */
+static PyObject *run_copies(Kernel *self, PyObject *const *args)
+{
+    (void)args;
+    for (Size k = 0; k < self->count; k += 3) {
+        double *target = doubles(self, k);
+        const int64_t *index = integers(self, k + 1);
+        const double *source = doubles(self, k + 2);
+        for (Size j = 0; j < length(self, k + 1); j++) target[index[j]] = source[j];
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_copies(const Kernel *self)
+{
+    for (Size k = 0; k < self->count; k += 3)
+        if (length(self, k + 1) != length(self, k + 2) || !indices_within(self, k + 1, length(self, k)))
+            return "an index does not fit its arrays";
+    return NULL;
+}
+
+/* model_efforts: ModelFeedForward.add after the dynamics. run(efforts, damped); `efforts` (n) is overwritten. */
+static PyObject *run_model_efforts(Kernel *self, PyObject *const *args)
+{
+    enum { DAMPING, RATE, FOLLOWERS, DRIVERS, FACTORS, GROUPS };
+    const double *damping = doubles(self, DAMPING), *rate = doubles(self, RATE), *factors = doubles(self, FACTORS);
+    const int64_t *followers = integers(self, FOLLOWERS), *drivers = integers(self, DRIVERS);
+    Py_buffer view;
+    double *efforts;
+    if (PyObject_GetBuffer(args[0], &view, PyBUF_C_CONTIGUOUS | PyBUF_WRITABLE) < 0) return NULL;
+    if (view.len != self->n * (Size)sizeof(double)) {
+        PyBuffer_Release(&view);
+        PyErr_SetString(PyExc_ValueError, "efforts of another number of joints");
+        return NULL;
+    }
+    efforts = (double *)view.buf;
+    if (args[1] == Py_True)
+        for (Size j = 0; j < self->n; j++) efforts[j] += damping[j] * rate[j];
+    for (Size k = 0; k < length(self, FOLLOWERS); k++) efforts[drivers[k]] += factors[k] * efforts[followers[k]];
+    for (Size k = GROUPS; k < self->count; k += 2) {
+        const int64_t *index = integers(self, k);
+        double *command = doubles(self, k + 1);
+        for (Size j = 0; j < length(self, k); j++) command[j] += efforts[index[j]];
+    }
+    PyBuffer_Release(&view);
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_model_efforts(const Kernel *self)
+{
+    if (length(self, 2) != length(self, 3) || length(self, 2) != length(self, 4)) return "followers of unequal number";
+    if (!indices_within(self, 2, self->n) || !indices_within(self, 3, self->n)) return "an index of a follower is wrong";
+    for (Size k = 5; k < self->count; k += 2)
+        if (length(self, k) != length(self, k + 1) || !indices_within(self, k, self->n))
+            return "an index does not fit its command";
+    return NULL;
+}
+
+/* window: _Efforts.inside: fills the window's rows and compares them with their bounds. run() -> whether all hold. */
+static PyObject *run_window(Kernel *self, PyObject *const *args)
+{
+    enum { POSITION, VELOCITY, EFFORT, KV, KV_KP, LEAST, MOST, VALUES, FLAGS };
+    const double *position = doubles(self, POSITION), *velocity = doubles(self, VELOCITY);
+    const double *effort = doubles(self, EFFORT), *least = doubles(self, LEAST), *most = doubles(self, MOST);
+    double *values = doubles(self, VALUES);
+    unsigned char *above = flags(self, FLAGS);
+    Size n = self->n, size = length(self, VALUES);
+    int all = 1;
+    (void)args;
+    memcpy(values, position, n * sizeof(double));
+    memcpy(values + n, velocity, n * sizeof(double));
+    memcpy(values + 2 * n, effort, n * sizeof(double));
+    if (size > 3 * n) {
+        const double *kv = doubles(self, KV), *kv_kp = doubles(self, KV_KP);
+        for (Size j = 0; j < n; j++) {
+            values[3 * n + j] = kv[j] * velocity[j] + effort[j];
+            values[4 * n + j] = kv_kp[j] * position[j] + values[3 * n + j];
+        }
+    }
+    for (Size k = 0; k < size; k++) {
+        above[k] = values[k] > least[k];
+        above[size + k] = values[k] < most[k];
+        all &= above[k] & above[size + k];
+    }
+    return PyBool_FromLong(all);
+}
+
+static const char *wrong_window(const Kernel *self)
+{
+    Size size = length(self, 7);
+    if (size != 3 * self->n && size != 5 * self->n) return "expected 3 or 5 rows";
+    return length(self, 5) == size && length(self, 6) == size && length(self, 8) == 2 * size ? NULL
+                                                                                              : "bounds of another size";
+}
+
+/* actuation: Actuation.apply without latency, each actuator at one joint. run() -> whether `applied` differs from the
+ * command: false where every actuator is below its limits and has no friction. n is the number of actuators. */
+static PyObject *run_actuation(Kernel *self, PyObject *const *args)
+{
+    enum { COMMAND, SPEED, JOINT, TO_EFFORT, TO_SPEED, EFFORT, VELOCITY, COULOMB, LOSS, DAMPING, TO_JOINT, PASS,
+           SATURATED, SATURATIONS, APPLIED, SWITCHES };
+    enum { SEES_VELOCITY, RUBS, PASSES };
+    const double *command = doubles(self, COMMAND), *speed = doubles(self, SPEED);
+    const double *to_effort = doubles(self, TO_EFFORT), *to_speed = doubles(self, TO_SPEED);
+    const double *effort = doubles(self, EFFORT), *velocity = doubles(self, VELOCITY);
+    const double *coulomb = doubles(self, COULOMB), *loss = doubles(self, LOSS), *damping = doubles(self, DAMPING);
+    const double *to_joint = doubles(self, TO_JOINT), *pass = doubles(self, PASS);
+    const int64_t *joint = integers(self, JOINT);
+    const unsigned char *switches = flags(self, SWITCHES);
+    unsigned char *saturated = flags(self, SATURATED);
+    int64_t *saturations = integers(self, SATURATIONS);
+    double *applied = doubles(self, APPLIED);
+    Size a = self->n, n = length(self, APPLIED);
+    int within = !switches[RUBS];
+    (void)args;
+    for (Size k = 0; within && k < a; k++) {
+        within = fabs(0.0 + to_effort[k] * command[joint[k]]) <= effort[k];
+        if (switches[SEES_VELOCITY]) within &= fabs(0.0 + to_speed[k] * speed[joint[k]]) <= velocity[k];
+    }
+    if (within) {
+        memset(saturated, 0, a);
+        Py_RETURN_FALSE;
+    }
+    memset(applied, 0, n * sizeof(double));
+    for (Size k = 0; k < a; k++) {
+        double wanted = 0.0 + to_effort[k] * command[joint[k]], v = 0.0, most = effort[k], least = -effort[k], given;
+        if (switches[SEES_VELOCITY]) {
+            v = 0.0 + to_speed[k] * speed[joint[k]];
+            if (fabs(v) > velocity[k]) {
+                if (v > 0.0) most = 0.0;
+                if (v < 0.0) least = 0.0;
+            }
+        }
+        given = larger(smaller(wanted, most), least);
+        saturated[k] = given != wanted;
+        saturations[k] += saturated[k];
+        if (switches[RUBS]) {
+            double friction = fabs(given) * loss[k] + coulomb[k];
+            given -= larger(smaller(v * damping[k], friction), -friction);
+            given -= v * damping[a + k];
+        }
+        applied[joint[k]] = 0.0 + to_joint[k] * given;
+    }
+    if (switches[PASSES])
+        for (Size j = 0; j < n; j++) applied[j] += command[j] * pass[j];
+    Py_RETURN_TRUE;
+}
+
+static const char *wrong_actuation(const Kernel *self)
+{
+    Size n = length(self, 14);
+    if (length(self, 0) != n || length(self, 1) != n || length(self, 11) != n) return "vectors of unequal length";
+    if (length(self, 15) != 3) return "expected 3 switches";
+    return indices_within(self, 2, n) ? NULL : "an actuator's joint is wrong";
+}
+
+/* rows: rows[k] = source, for each group. run(k) */
+static PyObject *run_rows(Kernel *self, PyObject *const *args)
+{
+    Size at = PyLong_AsSsize_t(args[0]);
+    if (at == -1 && PyErr_Occurred()) return NULL;
+    for (Size k = 0; k < self->count; k += 2) {
+        Size width = length(self, k + 1);
+        if (at < 0 || (at + 1) * width > length(self, k)) {
+            PyErr_SetString(PyExc_IndexError, "no such row");
+            return NULL;
+        }
+        memcpy(doubles(self, k) + at * width, doubles(self, k + 1), width * sizeof(double));
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_rows(const Kernel *self)
+{
+    for (Size k = 0; k < self->count; k += 2)
+        if (length(self, k + 1) == 0 || length(self, k) % length(self, k + 1)) return "rows of another width";
+    return NULL;
+}
+
+static const Law LAWS[] = {
+    {"errors", "d2d1d1D2", 1, run_errors, NULL},
+    {"pid", "d2d2d1d1d1d1d1d1b1d1b1d1d1D1D1d1d1D1b0", 2, run_pid, wrong_pid},
+    {"sample", "d0d0d0D3D0", 2, run_sample, wrong_sample},
+    {"copies", "|D0i0d0", 0, run_copies, wrong_copies},
+    {"model_efforts", "d1d1i0i0d0|i0D0", 2, run_model_efforts, wrong_model_efforts},
+    {"window", "d1d1d1d1d1d0d0D0B0", 0, run_window, wrong_window},
+    {"actuation", "d0d0i1d1d1d1d1d1d1d2d1d0B1I1D0b0", 0, run_actuation, wrong_actuation},
+    {"rows", "|D0d0", 1, run_rows, wrong_rows},
+    {NULL, NULL, 0, NULL, NULL},
+};
+
+/* ---- the type and the module ---- */
+
+static PyObject *kernel_run(PyObject *object, PyObject *const *args, Py_ssize_t count)
+{
+    Kernel *self = (Kernel *)object;
+    if (count != self->law->args) {
+        PyErr_Format(PyExc_TypeError, "%s takes %zd arguments, not %zd", self->law->name, self->law->args, count);
+        return NULL;
+    }
+    return self->law->run(self, args);
+}
+
+static void kernel_dealloc(PyObject *object)
+{
+    Kernel *self = (Kernel *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    for (Size k = 0; k < self->count; k++) PyBuffer_Release(&self->arrays[k]);
+    PyMem_Free(self->arrays);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(object);
+    Py_DECREF(type);
+}
+
+static PyMethodDef kernel_methods[] = {
+    {"run", (PyCFunction)(void (*)(void))kernel_run, METH_FASTCALL, "Apply the law to the arrays."},
+    {NULL, NULL, 0, NULL},
+};
+static PyType_Slot kernel_slots[] = {
+    {Py_tp_dealloc, kernel_dealloc},
+    {Py_tp_methods, kernel_methods},
+    {0, NULL},
+};
+static PyType_Spec kernel_spec = {
+    "manipcli.control.compiled.Kernel", sizeof(Kernel), 0, Py_TPFLAGS_DEFAULT | Py_TPFLAGS_DISALLOW_INSTANTIATION, kernel_slots,
+};
+
+/* The two characters of array `k`; NULL if the law has no such array. */
+static const char *field_of(const Law *law, Size k)
+{
+    const char *groups = strchr(law->fields, '|');
+    Size fixed = (groups ? groups - law->fields : (Size)strlen(law->fields)) / 2;
+    if (k < fixed) return law->fields + 2 * k;
+    return groups ? groups + 1 + 2 * ((k - fixed) % ((Size)strlen(groups + 1) / 2)) : NULL;
+}
+
+/* Whether the number of arrays is that of the law, with whole groups. */
+static int fits(const Law *law, Size count)
+{
+    const char *groups = strchr(law->fields, '|');
+    Size fixed = (groups ? groups - law->fields : (Size)strlen(law->fields)) / 2;
+    return groups ? count >= fixed && (count - fixed) % ((Size)strlen(groups + 1) / 2) == 0 : count == fixed;
+}
+
+/* Takes one array; false with a Python error set: BufferError for its layout or type, ValueError for its length. */
+static int take(Kernel *self, PyObject *array, const char *field)
+{
+    Py_buffer *view = &self->arrays[self->count];
+    char type = field[0] | 0x20;
+    const char *found;
+    int write = field[0] != type ? PyBUF_WRITABLE : 0, known;
+    if (PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | write) < 0) {
+        PyErr_Clear();
+        PyErr_Format(PyExc_BufferError, "%s: array %zd is not contiguous, or read-only", self->law->name, self->count);
+        return 0;
+    }
+    self->count++;
+    found = view->format ? view->format : "B";
+    if (type == 'd')
+        known = strcmp(found, "d") == 0;
+    else if (type == 'i')
+        known = view->itemsize == 8 && (strcmp(found, "l") == 0 || strcmp(found, "q") == 0);
+    else
+        known = strcmp(found, "?") == 0;
+    if (!known) {
+        PyErr_Format(PyExc_BufferError, "%s: array %zd has the type '%s'", self->law->name, self->count - 1, found);
+        return 0;
+    }
+    if (field[1] != '0' && view->len != self->n * (field[1] - '0') * view->itemsize) {
+        PyErr_Format(PyExc_ValueError, "%s: array %zd has another length", self->law->name, self->count - 1);
+        return 0;
+    }
+    return 1;
+}
+
+static PyObject *bind(PyObject *module, PyObject *args)
+{
+    PyTypeObject *type = *(PyTypeObject **)PyModule_GetState(module);
+    Size count = PyTuple_Size(args) - 2;
+    const char *name, *wrong;
+    const Law *law = LAWS;
+    Kernel *self;
+    if (count < 0) {
+        PyErr_SetString(PyExc_TypeError, "bind(name, n, *arrays)");
+        return NULL;
+    }
+    name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(args, 0), NULL);
+    if (name == NULL) return NULL;
+    while (law->name != NULL && strcmp(law->name, name) != 0) law++;
+    if (law->name == NULL || !fits(law, count)) {
+        PyErr_Format(PyExc_ValueError, "no law '%s' of %zd arrays", name, count);
+        return NULL;
+    }
+    self = (Kernel *)PyType_GenericAlloc(type, 0);
+    if (self == NULL) return NULL;
+    self->law = law;
+    self->n = PyLong_AsSsize_t(PyTuple_GetItem(args, 1));
+    self->arrays = (Py_buffer *)PyMem_Calloc(count ? count : 1, sizeof(Py_buffer));
+    if (self->arrays == NULL) PyErr_NoMemory();
+    if (PyErr_Occurred()) goto failed;
+    for (Size k = 0; k < count; k++)
+        if (!take(self, PyTuple_GetItem(args, k + 2), field_of(law, k))) goto failed;
+    wrong = law->wrong != NULL ? law->wrong(self) : NULL;
+    if (wrong != NULL) {
+        PyErr_Format(PyExc_ValueError, "%s: %s", law->name, wrong);
+        goto failed;
+    }
+    return (PyObject *)self;
+failed:
+    Py_DECREF(self);
+    return NULL;
+}
+
+static PyMethodDef module_methods[] = {
+    {"bind", bind, METH_VARARGS, "bind(name, n, *arrays): a law on these arrays."},
+    {NULL, NULL, 0, NULL},
+};
+
+static int module_exec(PyObject *module)
+{
+    PyTypeObject **state = (PyTypeObject **)PyModule_GetState(module);
+    *state = (PyTypeObject *)PyType_FromModuleAndSpec(module, &kernel_spec, NULL);
+    if (*state == NULL) return -1;
+    return PyModule_AddIntConstant(module, "SOURCE_CRC", (long)(SOURCE_CRC & 0x7fffffff));
+}
+
+static void module_free(void *module)
+{
+    PyTypeObject **state = (PyTypeObject **)PyModule_GetState((PyObject *)module);
+    if (state != NULL) Py_CLEAR(*state);
+}
+
+static PyModuleDef_Slot module_slots[] = {
+    {Py_mod_exec, module_exec},
+    {0, NULL},
+};
+static struct PyModuleDef module_definition = {
+    PyModuleDef_HEAD_INIT, "_kernels", NULL, sizeof(PyTypeObject *), module_methods, module_slots, NULL, NULL, module_free,
+};
+
+PyMODINIT_FUNC PyInit__kernels(void) { return PyModuleDef_Init(&module_definition); }

@@ -1,0 +1,78 @@
+"""States of the bodies of a scene, read from MuJoCo's free joints.
+
+MuJoCo's frame of a body is at its centre of mass C, with the axes of its frame O. A free joint has the position of C,
+the quaternion wxyz, the velocity of C in the world, and the angular velocity in the axes of the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+from manipcli.core.geometry import Array
+from manipcli.model.state import WorldState
+from manipcli.scene.scene import Scene
+
+Vector = tuple[float, float, float]
+
+
+class BodyStates:
+    """The movable bodies (m) of a scene, whose free joints are the last m of the model.
+
+    Args:
+        data: `MjData`.
+        scene: with the bodies.
+        state: receives what is read; from `WorldState.room`.
+    """
+
+    def __init__(self, data: Any, scene: Scene, state: WorldState) -> None:
+        m = len(scene.movable)
+        self._poses: Array = data.qpos[len(data.qpos) - 7 * m :].reshape(m, 7)
+        self._twists: Array = data.qvel[len(data.qvel) - 6 * m :].reshape(m, 6)
+        self._state = state
+        offsets: list[Vector] = [(*map(float, body.X_OI.p),) for body in scene.movable]  # type: ignore[misc]
+        first = state.numbers.size - 7 * m
+        self._apart = [(k, first + 7 * k, offset) for k, offset in enumerate(offsets) if any(offset)]
+        self._offsets = [offset if any(offset) else None for offset in offsets]
+        # Single numbers are written through memory views: a row of an array takes a microsecond.
+        self._numbers = _doubles(state.numbers)
+        self._linear, self._angular = _doubles(state.body_linear), _doubles(state.body_angular)
+
+    def read(self, *, velocities: bool) -> None:
+        """Read the poses of the frames O, and on request their velocities."""
+        state, poses, numbers = self._state, self._poses, self._numbers
+        state.body_position[:] = poses[:, :3]
+        state.body_quat_xyzw[:, :3] = poses[:, 4:]
+        state.body_quat_xyzw[:, 3] = poses[:, 3]
+        for k, at, offset in self._apart:
+            px, py, pz, *quat = poses[k].tolist()
+            x, y, z = _rotated(quat, offset)
+            numbers[at], numbers[at + 1], numbers[at + 2] = px - x, py - y, pz - z
+        if velocities:
+            self._read_velocities()
+
+    def _read_velocities(self) -> None:
+        linear, angular, at = self._linear, self._angular, 0
+        for pose, twist, offset in zip(self._poses.tolist(), self._twists.tolist(), self._offsets, strict=True):
+            quat = pose[3:]
+            vx, vy, vz, *local = twist
+            wx, wy, wz = _rotated(quat, local)
+            if offset is not None:
+                x, y, z = _rotated(quat, offset)
+                vx, vy, vz = vx - wy * z + wz * y, vy - wz * x + wx * z, vz - wx * y + wy * x
+            linear[at], linear[at + 1], linear[at + 2] = vx, vy, vz
+            angular[at], angular[at + 1], angular[at + 2] = wx, wy, wz
+            at += 3
+
+
+def _rotated(quat_wxyz: list[float], v: Sequence[float]) -> Vector:
+    """R(quat) v; plain floats, which are faster than numpy for one vector."""
+    w, x, y, z = quat_wxyz
+    a, b, c = v
+    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
+
+
+def _doubles(array: Array) -> memoryview[float]:
+    """The numbers of a contiguous array, for single assignments."""
+    return cast("memoryview[float]", array.reshape(-1).data)

@@ -1,0 +1,37 @@
+"""Import of MuJoCo, silenced: it writes warnings to stdout and to MUJOCO_LOG.TXT in the current folder."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Final
+
+INSTALL: Final = "install it: pip install 'manipcli[mujoco]'"
+
+
+def installed() -> bool:
+    """Whether MuJoCo can be imported; it is not imported."""
+    return find_spec("mujoco") is not None
+
+
+def library() -> ModuleType:
+    """MuJoCo without console output and log file; the engine reads its warnings from the counters of each world."""
+    import mujoco
+
+    config = mujoco.MjLogConfig.get()
+    if config.logto_console or config.logto_file:
+        config.logto_console = config.logto_file = False
+        mujoco.MjLogConfig.set(config)
+    loaded: ModuleType = mujoco
+    return loaded
+
+
+def version() -> str:
+    """Of the installed distribution; "unknown" if it is missing."""
+    from importlib.metadata import PackageNotFoundError
+    from importlib.metadata import version as installed_version
+
+    try:
+        return installed_version("mujoco-core")
+    except PackageNotFoundError:
+        return "unknown"
