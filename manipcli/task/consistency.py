@@ -38,6 +38,7 @@ NOT_SWITCHED: Final = 233
 GUARDED: Final = 242
 MOTIONLESS: Final = 244
 UNFELT: Final = 245
+UNMOVED: Final = 247
 """Numbers of the codes of findings about a task."""
 OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
 """Codes of findings on a controllers file about joints that are missing or not its own."""
@@ -126,6 +127,9 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
         if step.until is not None:
             for p in until_problems(step.until, step.id, context, CONDITIONS):
                 yield ABSENT, ("steps", k, "until"), p
+        if step.keep and not member.moves:
+            message = f"`keep` has no effect: `{step.verb}` does not move the arm"
+            yield UNMOVED, ("steps", k), Problem(("keep",), message, "remove `keep`")
         for j, keep in enumerate(step.keep):
             if keep.above is not None:
                 yield from (

@@ -46,11 +46,14 @@ scene:
 steps:
   - move: {{to: home}}
     keep: [{{upright: 10 deg}}, {{above: dask, by: 3 cm}}]
+  - wait: 1 s
+    keep: {{tool_speed: 1}}
 """
     )
     with pytest.raises(InvalidInput) as refused:
         load_task(path, allow_outside=True)
-    (finding,) = refused.value.findings
+    finding, still = refused.value.findings
+    assert still.message.endswith("`keep` has no effect: `wait` does not move the arm")
     assert finding.place is not None
     assert (finding.place.line, finding.place.column) == (8, 39)
     assert finding.message.endswith("'dask' is not in the scene")
