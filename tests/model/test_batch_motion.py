@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio
 import pytest
@@ -9,17 +11,14 @@ import pytest
 from manipcli.core.geometry import Transform, matrix_from_quat
 from manipcli.model.batch_motion import frames, point_motion
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import RobotModel
 from manipcli.task.load_task import load_task
-from tests.plan.conftest import ROOT, arm7
+
+ROOT = Path(__file__).parents[2]
 
 
-def robots() -> list[RobotModel]:
-    return [arm7(), load_task(ROOT / "tasks/pour_iiwa.yaml").robot]
-
-
-@pytest.mark.parametrize("robot", robots(), ids=lambda robot: robot.name)
-def test_motion_of_a_point_is_that_of_pinocchio(robot: RobotModel) -> None:
+@pytest.mark.parametrize("task", ["pour", "pour_iiwa", "pick_place"])
+def test_motion_of_a_point_is_that_of_pinocchio(task: str) -> None:
+    robot = load_task(ROOT / f"tasks/{task}.yaml").robot
     kinematics = Kinematics(robot)
     model, data = kinematics.model, kinematics.model.createData()
     rng = np.random.default_rng(1)

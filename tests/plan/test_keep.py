@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from manipcli.plan import kept_path
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.spec.keep import KeepSpec
-from tests.plan.conftest import Bench
+
+Bench = Any  # of conftest.py: a robot at a scene, on which steps are planned one after the other
 
 PICK = {"object": "cup", "grasp": {"posture": "wrap", "height": "68 mm"}}
 ACROSS = {"pose": {"xyz": [0.1, -0.2, 0.0]}, "frame": "tool"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 D = 0.8
 
 
-def one_joint(kind: str, *, friction: float = 0.0, damping: float = 0.0) -> RobotModel:
+def one_joint(kind: Literal["revolute", "prismatic"], *, friction: float = 0.0, damping: float = 0.0) -> RobotModel:
     """A carriage along x, or an arm of 0.5 m about the vertical, with a mass of 4 kg at its origin."""
     inertia = Inertial(mass=MASS, X_LI=Transform.identity(), inertia=frozen(0.1 * np.eye(3)))
     links = [Link("base", None, (), ()), Link("cart", inertia, (), ())]
@@ -81,12 +82,12 @@ def test_viscous_friction_is_overcome_and_costs_little_more_than_it_must() -> No
     needed = MASS * motion.accelerations[:, 0] + b * motion.velocities[:, 0]
     assert np.max(np.abs(needed)) <= 1.005 * EFFORT
 
-    def stops(push: float) -> float:
+    def stops(push: float) -> tuple[float, float]:
         """The distance after pushing for this time, and braking to rest; and the whole time."""
         v = EFFORT / b * (1.0 - np.exp(-b / MASS * push))
         x = EFFORT / b * push - MASS / b * v
         brake = MASS / b * np.log(1.0 + b * v / EFFORT)
-        return float(x + MASS / b * v - EFFORT / b * brake), push + brake
+        return float(x + MASS / b * v - EFFORT / b * brake), float(push + brake)
 
     low, high = 0.0, 10.0
     for _ in range(60):

@@ -47,7 +47,7 @@ def test_a_rounded_corner_leaves_its_segments_where_stated_and_is_smooth() -> No
     before, after = before / np.linalg.norm(before), after / np.linalg.norm(after)
 
     def off(q: Array, origin: Array, along: Array) -> Array:
-        return np.linalg.norm(np.cross(q - origin, along), axis=1)
+        return np.asarray(np.linalg.norm(np.cross(q - origin, along), axis=1))
 
     near = np.linalg.norm(p - corner, axis=1)
     on_line = np.minimum(off(p, corner, before), off(p, corner, after))
