@@ -28,8 +28,8 @@ from manipcli.plan.path import ANGULAR_STEP, follow_poses, joint_path, linear_pa
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
-from manipcli.plan.trajectory import CUBIC, JointTrajectory
-from manipcli.plan.trajectory_sampling import LONGEST
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import backwards, resampled
 
 BRANCH = 0.3
 """[rad or m] Configurations of the arm that differ by less in every joint count as the same."""
@@ -195,13 +195,7 @@ class MotionBuilder:
         Limits are symmetric and the path was free forwards, so nothing is planned or checked.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
-        assert (
-            done.velocities is not None and done.accelerations is not None
-        )  # every motion but those of `follow` has both
-        trajectory = JointTrajectory.of_arrays(
-            names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
-            velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
-        )  # fmt: skip
+        trajectory = backwards(done)
         self._accept(label, trajectory, None, trajectory.duration)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
@@ -215,16 +209,7 @@ class MotionBuilder:
         Raises:
             NotPlannable: it exceeds them, takes longer than `LONGEST`, or is in collision.
         """
-        if points.duration > LONGEST:
-            raise NotPlannable(f"the trajectory takes {points.duration:g} s; the limit is {LONGEST:g} s")
-        period = self._planner.period
-        ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
-        times = np.append(np.arange(ticks) * period, points.duration)
-        q, v, a = points.sample(times)
-        smooth = bool(np.isfinite(limits.acceleration).all())
-        trajectory = JointTrajectory.of_arrays(
-            points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
-        )
+        trajectory = resampled(points, limits, self._planner.period)
         with self._labelled(label):
             verify(trajectory, limits, given=points)
             refuse_violation(self._planner, self._now, label, trajectory)
@@ -269,7 +254,12 @@ class MotionBuilder:
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
-        self._motions.append(Motion(CLOSING, trajectory=None, grip=grip, duration=duration))
+        self._motions.append(
+            Motion(
+                CLOSING, trajectory=None, grip=grip, duration=duration, begins=self._now,
+                allowed=self._allowed | planner.hand_contacts(body),
+            )
+        )  # fmt: skip
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
@@ -373,16 +363,25 @@ class MotionBuilder:
         query, move = self._query(allowed), self._verb == "move"
         refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
-        self._accept(label, trajectory, grip, duration if trajectory is None else max(duration, trajectory.duration))
+        whole = duration if trajectory is None else max(duration, trajectory.duration)
+        self._accept(label, trajectory, grip, whole, allowed=allowed)
 
-    def _accept(self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, duration: float) -> None:
+    def _accept(
+        self,
+        label: str,
+        trajectory: JointTrajectory | None,
+        grip: Grip | None,
+        duration: float,
+        *,
+        allowed: Pairs = NOTHING,
+    ) -> None:
         before = self._now
         if grip is not None:
             self._now = self._now.moved(self._with(grip.joints, grip.target))
         if trajectory is not None:
             self._now = self._now.moved(self._with(trajectory.names, trajectory.positions[-1]))
             self._now = carried_along(self._planner, before, self._now)
-        self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
+        self._motions.append(Motion(label, trajectory, grip, duration, begins=before, allowed=allowed | self._allowed))
 
     def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
         """The present position with other values of some joints; joints that mimic them follow."""

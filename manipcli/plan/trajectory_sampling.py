@@ -11,7 +11,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.timing_bound import TimingBound
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory import CUBIC, JointTrajectory
 
 Curve = Callable[[Array], tuple[Array, Array, Array]]
 """times (k,) [s] -> position, velocity, acceleration, each (k, n)."""
@@ -106,3 +106,29 @@ def on_ticks(
     return JointTrajectory.of_arrays(
         names=limits.names, times=frozen(times), positions=frozen(q), velocities=frozen(v), accelerations=frozen(a)
     )
+
+
+def resampled(points: JointTrajectory, limits: MotionLimits, period: float) -> JointTrajectory:
+    """Given points as one per control tick and one at their end; accelerations where the `limits` bound them.
+
+    Raises:
+        NotPlannable: longer than `LONGEST`.
+    """
+    if points.duration > LONGEST:
+        raise NotPlannable(f"the trajectory takes {points.duration:g} s; the limit is {LONGEST:g} s")
+    ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
+    times = np.append(np.arange(ticks) * period, points.duration)
+    q, v, a = points.sample(times)
+    smooth = bool(np.isfinite(limits.acceleration).all())
+    return JointTrajectory.of_arrays(
+        points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
+    )
+
+
+def backwards(motion: JointTrajectory) -> JointTrajectory:
+    """The same motion in reverse; it must have velocities and accelerations."""
+    assert motion.velocities is not None and motion.accelerations is not None
+    return JointTrajectory.of_arrays(
+        names=motion.names, times=motion.times, positions=frozen(motion.positions[::-1]),
+        velocities=frozen(-motion.velocities[::-1]), accelerations=frozen(motion.accelerations[::-1]),
+    )  # fmt: skip

@@ -27,11 +27,13 @@ from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPla
 from manipcli.core.geometry import Transform
 from manipcli.description.elements import Joint, JointLimits
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.collision import CollisionHit
 from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
 
+NEAR = CollisionHit("cup", "robot/palm", 0.0123, time=1.5)
 PASSED = Verdict(
     task="pour",
     verdict="passed",
@@ -295,11 +297,11 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=(_motion(),))
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=(_motion(),), clearances=lambda: (NEAR,))
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
     assert "velocity of j1" in (out := capsys.readouterr().out)
-    assert "75.0 %" in out
+    assert "75.0 %" in out and "12.3 mm" in out and "cup and robot/palm at 1.50 s" in out
     rows = csv.read_text().splitlines()
     assert rows[0] == "step,motion,time,j1_position,j1_velocity,j1_acceleration"
     assert rows[2] == "move_1,move,1.000000,0.5,1.5,0"
@@ -307,6 +309,7 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
 
     assert main(["plan", "t.yaml", "--format", "json"]) == 0
     answer = json.loads(capsys.readouterr().out)
+    assert answer["motions"][0]["clearance"] == {"between": ["cup", "robot/palm"], "distance": 0.0123, "time": 1.5}
     assert answer["motions"][0]["limited_by"] == {"joint": "j1", "quantity": "velocity", "used": 0.75}
 
 
@@ -314,7 +317,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=(), clearances=tuple)
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
     assert "' does not exist" in capsys.readouterr().err
 
@@ -390,7 +393,7 @@ def test_what_is_on_a_full_disk_is_named_and_no_bug(
 
 def test_a_file_on_a_full_disk_is_named(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=(), clearances=tuple)
     assert main(["plan", "t.yaml", "--csv", "/dev/full"]) == 3
     assert capsys.readouterr().err == "error[INT001]: /dev/full: the disk is full (No space left on device)\n"
 
