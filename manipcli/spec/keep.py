@@ -39,8 +39,8 @@ class KeepSpec(Model):
         description="A body that the held object, or the tool where nothing is held, stays above; except where a step "
         "approaches, lowers and withdraws.",
     )
-    by: Annotated[Length, Field(ge=0, le=100.0)] = Field(
-        0.0, description="Height above the top of that body [m]. Default 0."
+    by: Annotated[Length, Field(ge=0, le=100.0)] | None = Field(
+        None, description="Height above the top of that body [m]. Default: 0."
     )
     inside: InsideSpec | None = Field(
         None, description="Where the corners of the held object, or the tool where nothing is held, stay."
@@ -59,9 +59,9 @@ class KeepSpec(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> KeepSpec:
-        if "by" in self.model_fields_set and self.above is None:
+        if self.by is not None and self.above is None:
             raise problem("conflict", "`by` needs `above: BODY`", at=("by",), key=True, hint="add `above: BODY`")
-        if not self.model_fields_set:
+        if all(getattr(self, word) is None for word in type(self).model_fields):
             raise problem("conflict", "`keep` has no constraint", hint="for example `keep: {upright: 10 deg}`")
         return self
 

@@ -19,6 +19,13 @@ def test_a_mapping_is_a_list_of_one() -> None:
     assert len(READ.validate_python([{"above": "desk"}, {"above": "shelf", "by": "5 cm"}])) == 2
 
 
+def test_what_a_log_stores_is_read_back() -> None:
+    """Logs hold every field, also those that the user left out."""
+    read = READ.validate_python([{"upright": "10 deg"}, {"above": "desk"}])
+    assert READ.validate_python(READ.dump_python(read)) == read
+    assert READ.validate_python(READ.dump_python(read, exclude_none=True)) == read
+
+
 @pytest.mark.parametrize(
     ("value", "message"),
     [

@@ -20,7 +20,7 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
     """By the highest corner of the body's bounding box, and the lowest corner of the held object's."""
     if spec.above is None:
         return None
-    other, by = spec.above, spec.by
+    other, by = spec.above, spec.by or 0.0
     level = by + _top(planner.scene.body(other), planner, state)
     name = held_points(planner, state)[0]
 
