@@ -26,6 +26,9 @@ from manipcli.plan.retimer import retime
 from manipcli.plan.sweep import refuse_collision, swept
 from manipcli.plan.timing_bound import TimingBound, refuse_exceeded
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import backwards, stretched
+
+_SOME = 50  # instants at which loads at rest are examined
 
 
 def straight_motion(
@@ -102,6 +105,14 @@ def smooth_motion(
     end = np.array(state.position)
     end[planner.robot.indices(limits.names)] = points[-1]
     return _smooth(planner, state, limits, points, applying(keeps_of(planner, state, label), end))
+
+
+def reversed_motion(planner: Planner, state: PlanningState, label: str, motion: JointTrajectory) -> JointTrajectory:
+    """The motion backwards; slower where that exceeds a bound, as friction acts in the other direction."""
+    back = backwards(motion)
+    some = back.positions[np.linspace(0, len(back.positions) - 1, _SOME).astype(int)]
+    bounds = bounds_of(planner, state, back.names, some, keeps_of(planner, state, label))
+    return stretched(back, bounds, planner.period)
 
 
 def refuse_violation(planner: Planner, state: PlanningState, label: str, trajectory: JointTrajectory) -> None:

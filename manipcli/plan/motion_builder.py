@@ -17,7 +17,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
-from manipcli.plan.constrained_motion import refuse_violation, smooth_motion, straight_motion, tool_motion
+from manipcli.plan import constrained_motion as timed
 from manipcli.plan.hand import closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
@@ -29,7 +29,7 @@ from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.plan.trajectory_sampling import backwards, resampled
+from manipcli.plan.trajectory_sampling import resampled
 
 BRANCH = 0.3
 """[rad or m] Configurations of the arm that differ by less in every joint count as the same."""
@@ -160,7 +160,7 @@ class MotionBuilder:
         """Move along a smooth curve through `waypoints` (k, n) as fast as the limits allow; the first is here."""
         with self._labelled(label):
             limits = self._limits(names, 1.0)
-            trajectory = smooth_motion(self._planner, self._now, label, limits, joint_path(waypoints))
+            trajectory = timed.smooth_motion(self._planner, self._now, label, limits, joint_path(waypoints))
         self._add(label, trajectory, None)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
@@ -192,10 +192,10 @@ class MotionBuilder:
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
 
-        Limits are symmetric and the path was free forwards, so nothing is planned or checked.
+        Limits are symmetric and the path was free forwards: only torques are checked, as friction acts the other way.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
-        trajectory = backwards(done)
+        trajectory = timed.reversed_motion(self._planner, self._now, label, done)
         self._accept(label, trajectory, None, trajectory.duration)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
@@ -212,7 +212,7 @@ class MotionBuilder:
         trajectory = resampled(points, limits, self._planner.period)
         with self._labelled(label):
             verify(trajectory, limits, given=points)
-            refuse_violation(self._planner, self._now, label, trajectory)
+            timed.refuse_violation(self._planner, self._now, label, trajectory)
         self._add(label, trajectory, None)
 
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
@@ -348,13 +348,13 @@ class MotionBuilder:
         self, label: str, names: Sequence[str], target: npt.ArrayLike, speed: float, *, line: Transform | None = None
     ) -> JointTrajectory:
         limits, end = self._limits(names, speed), self._with(names, target)
-        return straight_motion(self._planner, self._now, label, limits, end, query=self._query(), line=line)
+        return timed.straight_motion(self._planner, self._now, label, limits, end, query=self._query(), line=line)
 
     def _timed(
         self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
-        return tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)
+        return timed.tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING

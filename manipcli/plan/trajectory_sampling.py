@@ -10,7 +10,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.timing_bound import TimingBound
+from manipcli.plan.timing_bound import TimingBound, kept
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 
 Curve = Callable[[Array], tuple[Array, Array, Array]]
@@ -132,3 +132,16 @@ def backwards(motion: JointTrajectory) -> JointTrajectory:
         names=motion.names, times=motion.times, positions=frozen(motion.positions[::-1]),
         velocities=frozen(-motion.velocities[::-1]), accelerations=frozen(motion.accelerations[::-1]),
     )  # fmt: skip
+
+
+def stretched(motion: JointTrajectory, bounds: Sequence[TimingBound], period: float) -> JointTrajectory:
+    """The motion, slower by one factor for all of it where it exceeds a bound; with velocities and accelerations."""
+    if kept(bounds, motion):
+        return motion
+    q, v, a = motion.positions, motion.velocities, motion.accelerations
+    assert v is not None and a is not None
+    factor = max(bound.stretch(q, v, a) for bound in bounds)
+    times = np.arange(math.ceil(motion.duration * factor / period - 1e-6) + 1) * period
+    scale = motion.duration / times[-1]
+    q, v, a = motion.sample(np.minimum(times * scale, motion.duration))
+    return JointTrajectory.of_arrays(motion.names, times, q, v * scale, a * scale**2)

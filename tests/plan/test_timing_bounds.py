@@ -25,6 +25,7 @@ from manipcli.plan.timing_bounds.slosh import SloshBound
 from manipcli.plan.timing_bounds.tool_motion import ToolAcceleration, ToolSpeed
 from manipcli.plan.timing_bounds.torque import TorqueBound
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import backwards, stretched
 from manipcli.scene.scene import Scene
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
@@ -70,6 +71,23 @@ def test_dry_friction_helps_to_brake() -> None:
     motion = moved(limits, TorqueBound(robot, dynamics, ("slide",), np.zeros((2, 1))))
     a1, a2 = (EFFORT - FRICTION) / MASS, (EFFORT + FRICTION) / MASS
     assert motion.duration == pytest.approx(np.sqrt(2.0 * D * (a1 + a2) / (a1 * a2)), rel=0.005)
+
+
+def test_backwards_friction_acts_the_other_way() -> None:
+    """What used all the effort forwards needs more backwards, and is slowed down."""
+    robot = one_joint("prismatic", friction=FRICTION)
+    dynamics, limits = setup(robot)
+    bound = TorqueBound(robot, dynamics, ("slide",), np.zeros((2, 1)))
+    back = backwards(moved(limits, bound))
+    slower = stretched(back, [bound], PERIOD)
+
+    def most(motion: JointTrajectory) -> float:
+        assert motion.velocities is not None and motion.accelerations is not None
+        return float(bound.values(motion.positions, motion.velocities, motion.accelerations).max())
+
+    assert most(back) > 1.5
+    assert 0.99 < most(slower) <= 1.005
+    np.testing.assert_allclose(slower.positions[[0, -1]], back.positions[[0, -1]], atol=1e-9)
 
 
 def test_viscous_friction_is_overcome_and_costs_little_more_than_it_must() -> None:
