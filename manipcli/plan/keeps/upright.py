@@ -12,7 +12,7 @@ from manipcli.plan.planner import Planner
 from manipcli.spec.keep import KeepSpec
 
 WITH_CONTENTS = math.radians(20.0)
-"""[rad] The limit for an object with contents, if none is stated: half of a friction angle of 40 deg."""
+"""[rad] The limit for an object with contents, if none is stated: chosen, well above what grasps and places tilt."""
 _SLIPPED = math.radians(2.0)  # what an object that is held tilted may tilt more
 
 
