@@ -13,14 +13,13 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.model.edge_check import SLACK
+from manipcli.plan.constrained_motion import smooth_motion
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.limit_check import verify
 from manipcli.plan.motion import Grip, PlanningState
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path_search import PathSearch
 from manipcli.plan.path_smoothing import rounded
 from manipcli.plan.planner import Planner
-from manipcli.plan.retimer import retime
 from manipcli.plan.sweep import blocked, first_hit, swept
 from manipcli.plan.trajectory import JointTrajectory
 
@@ -64,7 +63,7 @@ def free_trajectory(
     if search is None or goals is None:
         raise refusal
     with labelled(label, verb):
-        return around(planner, search, state, query, goals(search.rng), limits, grip)
+        return around(planner, search, state, query, goals(search.rng), limits, grip, label)
 
 
 def refusing(
@@ -110,6 +109,7 @@ def around(
     goals: Array,
     limits: MotionLimits,
     grip: Grip | None,
+    label: str,
 ) -> JointTrajectory:
     """The motion of the joints of `limits` on a searched path to one of the `goals` (k, m), at rest at both ends.
 
@@ -129,8 +129,7 @@ def around(
         for share in _FINER:
             points = rounded(path, share * search.spec.deviation)
             try:
-                trajectory = retime(_distinct(points), limits, period=planner.period)
-                verify(trajectory, limits)
+                trajectory = smooth_motion(planner, state, label, limits, _distinct(points))
             except NotPlannable as cause:
                 refusal = cause
                 continue

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -16,20 +17,20 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
+from manipcli.plan import constrained_motion as timed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing
-from manipcli.plan.hand import closed_on, no_gripper, pressing
+from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
-from manipcli.plan.line import Walk, timed_line
+from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
+from manipcli.plan.path import ANGULAR_STEP, follow_poses, joint_path, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
-from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sweep import grip_time, refuse_collision
-from manipcli.plan.trajectory import CUBIC, JointTrajectory
-from manipcli.plan.trajectory_sampling import LONGEST
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import resampled
 
 GRAZE = 1e-4
 """[m] How much nearer than before a withdrawing finger may come: rounding, and the arm's own curve."""
@@ -89,13 +90,7 @@ class MotionBuilder:
         values = dict(zip(names, target, strict=True))
         arm = [name for name in names if name not in hand]
         if self._now.closed and len(arm) < len(names):
-            carried = self._now.carried
-            what = "an earlier step closed" if carried is None else f"holds '{carried.body}'"
-            named = next(name for name in names if name in hand)
-            raise NotPlannable(
-                f"joint '{named}' belongs to the hand, which {what}",
-                hint=f"open the hand with `release`{'' if carried is None else ' or `place`'}",
-            )
+            raise closed_hand(next(name for name in names if name in hand), self._now.carried)
         grip = self._grip({name: values[name] for name in names if name in hand})
         if arm:
             goal = np.array([values[name] for name in arm])
@@ -144,7 +139,7 @@ class MotionBuilder:
         def goals(rng: np.random.Generator) -> Array:
             return branches(solver, X_WT, goal, rng, query=self._query(), limits=limits)
 
-        self._free(label, limits, goal[list(solver.columns)], grip, goals=goals if searched else None)
+        self._free(label, limits, goal[list(solver.columns)], grip, goals=goals if searched else None, line=X_WT)
 
     def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
         """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
@@ -170,8 +165,23 @@ class MotionBuilder:
         A line that is the step itself may run along joint limits.
         """
         with self._labelled(label):
-            trajectory = self._straight(X_WT, speed, insist=label == self._verb, leaving=leaving)
+            walk = partial(linear_path, q=self._now.position, X_WT=X_WT)
+            trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
+
+    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Open = "nothing") -> None:
+        """Move the tool through near poses, from the present one; part of the orientation may be left open."""
+        with self._labelled(label):
+            walk = partial(follow_poses, q=self._now.position, poses=poses)
+            trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
+        self._add(label, trajectory, None)
+
+    def through(self, label: str, names: Sequence[str], waypoints: Array) -> None:
+        """Move along a smooth curve through `waypoints` (k, n) as fast as the limits allow; the first is here."""
+        with self._labelled(label):
+            limits = self._limits(names, 1.0)
+            trajectory = timed.smooth_motion(self._planner, self._now, label, limits, joint_path(waypoints))
+        self._add(label, trajectory, None)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
         """Move the tool on a straight line to a pose, away from a `body` that the now open hand was closed on.
@@ -180,7 +190,7 @@ class MotionBuilder:
         body that does not sit in the middle of the hand.
         """
         with self._labelled("withdraw"):
-            trajectory = self._straight(X_WT, speed)
+            trajectory = self._timed("withdraw", partial(linear_path, q=self._now.position, X_WT=X_WT), speed)
         allowed = NOTHING
         if grazing:
             planner = self._planner
@@ -197,23 +207,15 @@ class MotionBuilder:
             Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
             for k in range(count + 1)
         ]
-        with self._labelled(label):
-            trajectory = self._timed(lambda solver: follow_poses(solver, self._now.position, poses), speed)
-        self._add(label, trajectory, None)
+        self.along(label, poses, speed=speed)
 
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
 
-        Limits are symmetric and the path was free forwards, so nothing is planned or checked.
+        Limits are symmetric and the path was free forwards: only torques are checked, as friction acts the other way.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
-        assert (
-            done.velocities is not None and done.accelerations is not None
-        )  # every motion but those of `follow` has both
-        trajectory = JointTrajectory.of_arrays(
-            names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
-            velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
-        )  # fmt: skip
+        trajectory = timed.reversed_motion(self._planner, self._now, label, done)
         self._accept(label, trajectory, None)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
@@ -227,18 +229,10 @@ class MotionBuilder:
         Raises:
             NotPlannable: it exceeds them, takes longer than `LONGEST`, or is in collision.
         """
-        if points.duration > LONGEST:
-            raise NotPlannable(f"the trajectory takes {points.duration:g} s; the limit is {LONGEST:g} s")
-        period = self._planner.period
-        ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
-        times = np.append(np.arange(ticks) * period, points.duration)
-        q, v, a = points.sample(times)
-        smooth = bool(np.isfinite(limits.acceleration).all())
-        trajectory = JointTrajectory.of_arrays(
-            points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
-        )
+        trajectory = resampled(points, limits, self._planner.period)
         with self._labelled(label):
             verify(trajectory, limits, given=points)
+            timed.refuse_violation(self._planner, self._now, label, trajectory)
         self._add(label, trajectory, None)
 
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
@@ -347,33 +341,31 @@ class MotionBuilder:
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
 
-    def _rest_to_rest(self, limits: MotionLimits, target: npt.ArrayLike) -> JointTrajectory:
-        start = self._now.position[self._planner.robot.indices(limits.names)]
-        trajectory = rest_to_rest(start, target, limits, period=self._planner.period)
-        verify(trajectory, limits)
-        return trajectory
-
     def _free(
-        self, label: str, limits: MotionLimits, target: npt.ArrayLike, grip: Grip | None, *, goals: Goals | None
+        self,
+        label: str,
+        limits: MotionLimits,
+        target: Array,
+        grip: Grip | None,
+        *,
+        goals: Goals | None,
+        line: Transform | None = None,
     ) -> None:
-        """Add a motion straight to `target`; where it is in collision and `goals` are given, around obstacles."""
+        """Add a motion straight to `target`; where it is in collision and `goals` are given, around obstacles.
+
+        `line`: the tool pose at the target, if the arm may arrive there in another configuration.
+        """
+        query, end = self._query(), self._with(limits.names, target)
         with self._labelled(label):
-            straight = self._rest_to_rest(limits, target)
-        query, verb = self._query(), self._verb
-        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, verb, goals)
+            straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
+        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
         self._accept(label, free, grip)
 
-    def _straight(
-        self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+    def _timed(
+        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
-        return self._timed(
-            lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist, leaving=leaving
-        )
-
-    def _timed(self, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing") -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
-        solver = self._planner.solver.leaving(leaving)
-        return timed_line(walk, solver, limits, period=self._planner.period, insist=insist)
+        return timed.tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING

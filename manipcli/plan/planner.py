@@ -26,6 +26,7 @@ from manipcli.plan.path_search import PathSearch
 from manipcli.scene.scene import Interior, Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.shapes.primitives import Cylinder
+from manipcli.spec.keep import KeepSpec
 from manipcli.spec.planner import PlannerSpec
 
 Pairs = frozenset[Pair]
@@ -92,6 +93,7 @@ class Planner:
         hand |= {joint.parent for joint in robot.joints if joint.name in gripper_joints}
         ignore = (*robot.collision_ignore, *combinations(sorted(hand), 2))
         self.checker = CollisionChecker(self.kinematics, scene, ignore=ignore)
+        self.keep: tuple[KeepSpec, ...] = ()
         self._solver: InverseKinematics | None = None
         self._queries: dict[tuple[object, ...], CollisionQuery] = {}
         self._paths = RrtConnectSpec() if paths is None else paths
@@ -145,6 +147,16 @@ class Planner:
         other = copy(self)
         other._allowed = self._allowed | pairs
         other._obstructed, other._search = False, None
+        return other
+
+    def keeping(self, keep: tuple[KeepSpec, ...]) -> Planner:
+        """The same planner for a step with these constraints; it shares everything else."""
+        if not keep:
+            return self
+        with suppress(NotPlannable):
+            _ = self.solver  # made once, for both
+        other = copy(self)
+        other.keep = keep
         return other
 
     def keeps(self, a: str, b: str) -> float:

@@ -44,6 +44,7 @@ class StepMember(Generic[S]):
         request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
+        moves: whether it moves the arm, so that `keep` means something.
     """
 
     name: str
@@ -53,6 +54,7 @@ class StepMember(Generic[S]):
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
+    moves: bool = True
 
     def plan(self, spec: S, planner: Planner, state: PlanningState) -> StepPlan:
         """The plan of the first candidate that has one, with straight paths only.

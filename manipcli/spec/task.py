@@ -19,6 +19,7 @@ from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.clearance import ClearanceSpec, PartPair
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
+from manipcli.spec.keep import Keeps
 from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
@@ -232,6 +233,11 @@ class StepSpec(KeyedSpec):
     )
     timeout: Annotated[Pause, Field(gt=0)] | None = Field(
         None, description="Time after which the step fails [s], above 0 to 1 h."
+    )
+    keep: Keeps = Field(
+        (),
+        description="Constraints on the step's motions, one mapping or a list: `keep: {upright: 10 deg, tool_speed: "
+        "0.25}`. A path that keeps them is searched; the motion is checked at every control tick.",
     )
     allow: tuple[PartPair, ...] = Field(
         (),

@@ -154,6 +154,7 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
 
 
 def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
+    planner = planner.keeping(step.keep)
     if state.at_start:
         planner.outside(state)
     allowed = expanded_pairs(planner.robot, planner.scene, step.allow)
