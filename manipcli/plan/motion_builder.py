@@ -94,7 +94,7 @@ class MotionBuilder:
         grip = self._grip({name: values[name] for name in names if name in hand})
         if arm:
             goal = np.array([values[name] for name in arm])
-            self._free(label, self._limits(arm, speed), goal, grip, goals=(lambda _: goal[None]) if free else None)
+            self._free(label, self._limits(arm, speed), goal, grip, (lambda _: goal[None]) if free else None)
         else:
             self._add(label, None, grip)
 
@@ -139,7 +139,7 @@ class MotionBuilder:
         def goals(rng: np.random.Generator) -> Array:
             return branches(solver, X_WT, goal, rng, query=self._query(), limits=limits)
 
-        self._free(label, limits, goal[list(solver.columns)], grip, goals=goals if searched else None, line=X_WT)
+        self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=X_WT)
 
     def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
         """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
@@ -342,15 +342,9 @@ class MotionBuilder:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
 
     def _free(
-        self,
-        label: str,
-        limits: MotionLimits,
-        target: Array,
-        grip: Grip | None,
-        *,
-        goals: Goals | None,
+        self, label: str, limits: MotionLimits, target: Array, grip: Grip | None, goals: Goals | None,
         line: Transform | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Add a motion straight to `target`; where it is in collision and `goals` are given, around obstacles.
 
         `line`: the tool pose at the target, if the arm may arrive there in another configuration.
