@@ -119,13 +119,16 @@ def pinks(given: Problem) -> Solve:
     model.lowerPositionLimit, model.upperPositionLimit = (np.array(x) for x in position_limits(moving))
     model.velocityLimit = np.full(model.nv, 1e3)
 
-    def attempt(task: object, goal: Transform, start: Array) -> Array | None:
-        now = pink.Configuration(model, model.createData(), start)
+    data = model.createData()
+    held = np.setdiff1d(np.arange(model.nv), columns)
+
+    def attempt(task: FrameTask, start: Array) -> Array | None:
+        now = pink.Configuration(model, data, start, copy_data=False)
         for _ in range(PINK_ITERATIONS):
-            if reached(given, goal, now.q):
+            error = task.compute_error(now)
+            if np.linalg.norm(error[:3]) <= 0.9 * POSITION and np.linalg.norm(error[3:]) <= 0.9 * ANGLE:
                 return np.array(now.q)
             velocity = pink.solve_ik(now, [task], 1.0, solver="daqp", safety_break=False)
-            held = np.setdiff1d(np.arange(model.nv), columns)
             velocity[held] = 0.0
             now.integrate_inplace(velocity, 1.0)
         return None
@@ -135,7 +138,7 @@ def pinks(given: Problem) -> Solve:
         task.set_target(se3(goal @ tool.X_LT.inverse()))
         start = seed
         for _ in range(1 + RESTARTS):
-            found = attempt(task, goal, start)
+            found = attempt(task, start)
             if found is not None:
                 return found
             start = seed.copy()

@@ -51,17 +51,20 @@ class Candidates:
             its own.
         decides: what later steps depend on; the search comes back only to steps that decide something.
         explain: (refusal of all) -> the same with a better hint.
+        further: the candidates after these, if there are any: costlier ones. Their refusal counts, not that of these.
     """
 
     options: Iterable[Candidate]
     what: str = ""
     decides: Decision = "nothing"
     explain: Callable[[NotPlannable], NotPlannable] = lambda refusal: refusal
+    further: Callable[[], Candidates | None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """A candidate, its plan, the candidates that were refused before it, and its `index` among all."""
+    """A candidate, its plan, the candidates that were refused before it, and its `index` among
+    all; 0 for one of `Candidates.further`."""
 
     candidate: Candidate
     plan: StepPlan
@@ -91,7 +94,7 @@ class Attempts:
         self.excluded = [*exclude]
         self.dropped: list[Dropped] = []
         self._candidates = candidates
-        self._options = _preferring(enumerate(candidates.options), prefer)
+        self._options: Iterator[tuple[int, Candidate]] = _preferring(enumerate(candidates.options), prefer)
 
     def take(self) -> Chosen:
         """The next candidate with a plan.
@@ -106,7 +109,11 @@ class Attempts:
                 return Chosen(candidate, candidate.plan(), tuple(self.dropped), index)
             except NotPlannable as refusal:
                 self.dropped.append(Dropped(candidate.name, refusal))
-        raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
+        further = self._candidates.further()
+        if further is None:
+            raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
+        self._candidates, self._options, self.dropped = further, zip(itertools.repeat(0), further.options), []
+        return self.take()
 
 
 def _preferring(options: Iterator[tuple[int, Candidate]], index: int) -> Iterator[tuple[int, Candidate]]:

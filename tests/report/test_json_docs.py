@@ -108,7 +108,7 @@ def test_keys_of_what_is_checked() -> None:
 def test_keys_of_the_self_collision_matrix(capsys: pytest.CaptureFixture[str]) -> None:
     robot = DOCS.parents[1] / "robots" / "differential_wrist" / "robot.yaml"
     assert main(["check", str(robot), "--collisions", "--format", "json"]) == 0
-    assert set(_documented(list(_rows())[5])) == set(_written(json.loads(capsys.readouterr().out)))
+    assert set(_documented(list(_rows())[6])) == set(_written(json.loads(capsys.readouterr().out)))
 
 
 def test_keys_of_what_is_planned(capsys: pytest.CaptureFixture[str]) -> None:
