@@ -15,7 +15,8 @@ error is the angle between the two z axes), or the whole rotation.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -113,11 +114,14 @@ class InverseKinematics:
         other._open = open_
         return other
 
-    def trying(self, tries: int) -> InverseKinematics:
-        """The same solver with this number of restarts instead of 40."""
-        other = copy(self)
-        other._tries = tries
-        return other
+    @contextmanager
+    def trying(self, tries: int) -> Iterator[None]:
+        """Inside this context the solver makes this number of restarts instead of 40, to look at many poses."""
+        before, self._tries = self._tries, tries
+        try:
+            yield
+        finally:
+            self._tries = before
 
     def drawn_in(self, margin: Array) -> InverseKinematics:
         """The same solver with the limits of each joint narrowed by its `margin` (m) [rad or m]."""

@@ -135,12 +135,6 @@ class Planner:
             self._solver = InverseKinematics(self.kinematics, joints, tool.link, X_LT=tool.X_LT)
         return self._solver
 
-    def trying(self, tries: int) -> Planner:
-        """The same planner with fewer restarts of the inverse kinematics, to look at many poses."""
-        other = copy(self)
-        other._solver = self.solver.trying(tries)
-        return other
-
     @property
     def tool_link(self) -> str:
         """The link that carries the tool, and what the hand holds."""

@@ -298,9 +298,7 @@ class TaskSpec(Model):
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
     simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")
-    planner: PlannerSpec = Field(
-        PlannerSpec(), description="How paths around obstacles are searched. Default: `rrt_connect`."
-    )
+    planner: PlannerSpec = Field(PlannerSpec(), description="Search for paths. Default: `rrt_connect`.")
     record: RecordSpec = Field(RecordSpec(), description="Recorded topics and their rates.")
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")

@@ -136,11 +136,10 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     lines: dict[GraspFrame, tuple[float, float, Array]] = {}
     attempts = 0
     weak: list[Candidate] = []
-    hasty = planner.trying(FEW)
 
     def attempt(frame: GraspFrame, distance: float, slope: float, further: bool, avoid: Array | None) -> StepPlan:
         nonlocal attempts
-        builder = MotionBuilder(hasty if further else planner, state)
+        builder = MotionBuilder(planner, state)
         if frame not in out_of_reach:  # checked once: it does not depend on distance and slope
             out_of_reach[frame] = builder.unreachable("approach", frame.X_WT, hand=spec.open)
         refusal = out_of_reach[frame]
@@ -181,13 +180,18 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             )
         return planned
 
+    def quickly(frame: GraspFrame, distance: float, slope: float, further: bool, avoid: Array | None) -> StepPlan:
+        with planner.solver.trying(FEW):
+            return attempt(frame, distance, slope, further, avoid)
+
     def candidate(
         frame: GraspFrame, distance: float, slope: float, further: bool = False, avoid: Array | None = None
     ) -> Candidate:
         sloping = f" at a slope of {math.degrees(slope):.0f} deg" if slope else ""
         branch = "" if avoid is None else ", in another configuration of the arm"
         name = f"{frame.name}, approach of {readable(distance, 'm')}{sloping}{branch}"
-        return Candidate(partial(attempt, frame, distance, slope, further, avoid), name=name, grasp=frame.X_WT.R)
+        plan = partial(quickly if further else attempt, frame, distance, slope, further, avoid)
+        return Candidate(plan, name=name, grasp=frame.X_WT.R)
 
     def touched() -> bool:
         return any(why is None or why.reason == "touches" for why in out_of_reach.values())
@@ -205,7 +209,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                 break  # a higher grasp is not nearer
             for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
                 yield candidate(frame, distance, slope)
-        if not touched() and _beyond(hasty, state, usual[0].X_WT):
+        if not touched() and _beyond(planner, state, usual[0].X_WT):
             return  # no other orientation is nearer
         overlapping = overlaps(planner, state, spec.object, spec.open)
         for frame in first_fitting(frames.further(), lambda X_WT: not overlapping(X_WT), FURTHER):
@@ -236,7 +240,8 @@ def _brief(distance: Range) -> tuple[tuple[float, float], ...]:
 def _beyond(planner: Planner, state: PlanningState, X_WT: Transform) -> bool:
     """Whether no orientation of the tool reaches the point of a frame."""
     try:
-        planner.solver.leaving("rotation").solve(X_WT, state.position, planner.rng)
+        with planner.solver.trying(FEW):
+            planner.solver.leaving("rotation").solve(X_WT, state.position, planner.rng)
     except NotPlannable:
         return True
     return False
