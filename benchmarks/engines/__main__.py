@@ -15,7 +15,7 @@ from typing import Final
 
 from benchmarks.engines import pictures
 from benchmarks.engines.cost import cost_rows
-from benchmarks.engines.grasps import MUJOCO, PYBULLET, cup_slip, slip_text, vice_rows
+from benchmarks.engines.grasps import MUJOCO, PYBULLET, cup_rows, vice_rows
 from benchmarks.engines.laws import law_rows, laws
 from benchmarks.engines.tasks import task_rows
 from benchmarks.engines.worlds import NAMES
@@ -40,10 +40,9 @@ def _vice() -> str:
 
 def _cup() -> str:
     with TemporaryDirectory(prefix="manipcli-benchmark-") as folder:
-        found, steps = cup_slip(Path(folder))
-    pictures.slip_picture(found, steps)
-    row = ("cup of 300 g, friction 0.5: largest slip while carried", *slip_text(found, list(NAMES)))
-    return table(["pour", *NAMES.values()], [row])
+        rows, hard = cup_rows(Path(folder))
+    pictures.slip_picture(hard)
+    return table(["pour", "grip force", "slip", "slip of a cup of 300 g, friction 0.5"], rows)
 
 
 def _cost() -> str:

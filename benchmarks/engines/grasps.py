@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.engines.worlds import NAMES, STEP, body, opened, robot
+from benchmarks.engines.worlds import STEP, body, opened, robot
 from benchmarks.processes import POUR
 from manipcli.core.geometry import Array
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.state import Contact
 from manipcli.pipeline import load_task, run_task
 from manipcli.record.read.reading import read_recording
+from manipcli.record.write.recorder import Recorder
 from manipcli.replay.curves import Interval
 from manipcli.shapes.primitives import Box
 
@@ -70,34 +73,67 @@ def vice_rows() -> list[tuple[str, ...]]:
     return rows
 
 
-def cup_slip(folder: Path) -> tuple[dict[str, tuple[Array, Array]], tuple[Interval, ...]]:
-    """How far the cup moves in the hand while it is carried, in the pour with `HARD_CUP`.
+class Carried(NamedTuple):
+    """A pour: the cup in the hand, from 0.1 s after the pick to the start of the `place`.
 
-    Returns:
-        For each engine: times [s], and the distance [m] of the cup from its place in the palm 0.1 s after the pick.
-        And the steps of the last run.
+    Attributes:
+        times: (T) [s].
+        slip: (T) [m] distance of the cup from its first place in the palm.
+        force: (F) [N] sum of the normal forces of the hand on the cup, whenever the run reads them, from the lift on.
+        steps: of the run.
     """
-    found: dict[str, tuple[Array, Array]] = {}
-    steps: tuple[Interval, ...] = ()
-    for engine in NAMES:
-        log = folder / f"{engine}.mcap"
-        overrides = (*HARD_CUP, f"simulation.engine={engine}")
+
+    times: Array
+    slip: Array
+    force: Array
+    steps: tuple[Interval, ...]
+
+
+def carried(folder: Path, variant: Variant, overrides: Sequence[str] = ()) -> Carried:
+    """Run the pour."""
+    own = (f"simulation.{variant.engine}.{key}={value}" for key, value in variant.own.items())
+    overrides = (*overrides, f"simulation.engine={variant.engine}", *own)
+    forces: list[tuple[int, float]] = []
+    contacts = Recorder.contacts
+
+    def noted(self: Recorder, k: int, touching: Sequence[Contact]) -> None:
+        contacts(self, k, touching)
+        pairs = [c for c in touching if "cup" in (c.a, c.b) and (c.a + c.b).count("robot/")]
+        forces.append((k, sum(c.force for c in pairs)))
+
+    log = folder / "pour.mcap"
+    with patch.object(Recorder, "contacts", noted):
         report = run_task(POUR, log=log, force=True, overrides=overrides)
-        steps = tuple(Interval(s.id, s.started or 0.0, s.ended or 0.0) for s in report.verdict.steps)
-        recording = read_recording(log)
-        states, robot = recording.states, load_task(POUR, overrides=overrides).robot
-        first = steps[0].end + 0.1
-        last = next(step for step in steps if step.name.startswith("place")).start
-        ticks = np.arange(round(first / recording.period), round(last / recording.period), 20)
-        kinematics, cup = Kinematics(robot), recording.body_names.index("cup")
-        held = []
-        for k in ticks:
-            X_WP = kinematics.forward(states.position[k], "palm")
-            held.append(X_WP.R.T @ (states.body_position[k, cup] - X_WP.p))
-        found[engine] = states.time[ticks], np.linalg.norm(np.array(held) - held[0], axis=1)
-    return found, steps
+    steps = tuple(Interval(s.id, s.started or 0.0, s.ended or 0.0) for s in report.verdict.steps)
+    recording = read_recording(log)
+    states, robot = recording.states, load_task(POUR, overrides=overrides).robot
+    last = round(next(step for step in steps if step.name.startswith("place")).start / recording.period)
+    ticks = np.arange(round((steps[0].end + 0.1) / recording.period), last, 20)
+    kinematics, cup = Kinematics(robot), recording.body_names.index("cup")
+    held = []
+    for k in ticks:
+        X_WP = kinematics.forward(states.position[k], "palm")
+        held.append(X_WP.R.T @ (states.body_position[k, cup] - X_WP.p))
+    slip = np.linalg.norm(np.array(held) - held[0], axis=1)
+    force = np.array([force for k, force in forces if round(steps[1].end / recording.period) < k < last])
+    return Carried(states.time[ticks], slip, force, steps)
 
 
-def slip_text(found: dict[str, tuple[Array, Array]], engines: Sequence[str]) -> tuple[str, ...]:
-    """The largest distance of each."""
-    return tuple(f"{1e3 * found[engine][1].max():.2g} mm" for engine in engines)
+def cup_rows(folder: Path) -> tuple[list[tuple[str, ...]], dict[str, Carried]]:
+    """Rows of the table: variant, force and slip in the pour, slip with `HARD_CUP`; and the runs with `HARD_CUP`."""
+    few = Variant("PyBullet, 50 iterations", "pybullet", {"solver_iterations": 50})
+    rows: list[tuple[str, ...]] = []
+    hard: dict[str, Carried] = {}
+    for variant in (few, *PYBULLET, MUJOCO):
+        run = carried(folder, variant)
+        force = f"{run.force.mean():.2f} N +- {run.force.std():.2f}"
+        slip = "not measured"
+        if variant in (PYBULLET[0], MUJOCO):
+            hard[variant.label] = carried(folder, variant, HARD_CUP)
+            slip = _largest(hard[variant.label])
+        rows.append((variant.label, force, _largest(run), slip))
+    return rows, hard
+
+
+def _largest(run: Carried) -> str:
+    return f"{1e3 * run.slip.max():.2g} mm"

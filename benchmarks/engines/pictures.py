@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.engines.grasps import MUJOCO, PYBULLET, vice
+from benchmarks.engines.grasps import MUJOCO, PYBULLET, Carried, vice
 from benchmarks.engines.laws import drop
 from benchmarks.engines.worlds import NAMES, STEP
 from manipcli.core.geometry import Array
 from manipcli.replay import figure
-from manipcli.replay.curves import Chart, Curve, Interval, Panel
+from manipcli.replay.curves import Chart, Curve, Panel
 
 DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
 
@@ -31,12 +31,14 @@ def vice_picture() -> None:
     _draw("engines_vice.svg", Chart("A cube of 10 g, pressed with 40 N", panels, (), 0.1, 2.0))
 
 
-def slip_picture(found: dict[str, tuple[Array, Array]], steps: tuple[Interval, ...]) -> None:
-    """docs/engines_slip.svg, of what `cup_slip` returns."""
-    curves = tuple(Curve(label, label, "", found[name][0], 1e3 * found[name][1]) for name, label in NAMES.items())
-    start, end = (max(t[0] for t, _ in found.values()), max(t[-1] for t, _ in found.values()))
+def slip_picture(runs: dict[str, Carried]) -> None:
+    """docs/engines_slip.svg, of pours by what they are called."""
+    curves = tuple(Curve(label, label, "", run.times, 1e3 * run.slip) for label, run in runs.items())
+    first = next(iter(runs.values()))
     title = "Pour with a cup of 300 g, friction 0.5: motion of the cup in the hand"
-    _draw("engines_slip.svg", Chart(title, (Panel("slip", "slip", "mm", curves),), steps, float(start), float(end)))
+    panels = (Panel("slip", "slip", "mm", curves),)
+    steps = tuple(step for step in first.steps if step.end > first.times[0] and step.start < first.times[-1])
+    _draw("engines_slip.svg", Chart(title, panels, steps, float(first.times[0]), float(first.times[-1])))
 
 
 def drop_picture() -> None:
