@@ -66,9 +66,8 @@ def vice_rows() -> list[tuple[str, ...]]:
             height, force = vice(variant, mass, press, 1.5)
             creep = 1e3 * (height[500] - height[-1])
             held = force[500:]
-            cells.append(
-                f"{creep:.2g} mm/s, {held.mean():.2f} N +- {held.std():.2f}" if creep < EDGE * 1e3 else "falls"
-            )
+            speed = f"{creep:.2g}" if abs(creep) >= 1e-3 else "below 0.001"
+            cells.append(f"{speed} mm/s, {held.mean():.2f} N +- {held.std():.2f}" if creep < 1e3 * EDGE else "falls")
         rows.append((f"{1e3 * mass:g} g, pressed with {press:g} N", *cells))
     return rows
 
