@@ -208,6 +208,11 @@ def _refused(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> tuple[
         message = f"robot '{robot.name}' has no movable joint"
         hint = "write a passive object as a body of the scene: `urdf: {file: ...}`"
         return (task.source.finding(MOTIONLESS, ("robot",), message, hint=hint),)
+    return refused_by_engine(task, robot, scene)
+
+
+def refused_by_engine(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> tuple[Diagnostic, ...]:
+    """Errors for what the engine of the task cannot simulate."""
     simulation = task.spec.simulation
     if simulation.engine not in ENGINES.names:
         return ()

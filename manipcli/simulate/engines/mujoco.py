@@ -70,7 +70,7 @@ class MujocoEngine:
                 raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
         model = built.model
         n, m = len(robot.joint_names), len(scene.movable)
-        if (model.nq, model.nv) != (n + 7 * m, n + 6 * m) or np.any(model.jnt_qposadr[:n] != np.arange(n)):
+        if (model.nq, model.nv) != (n + 7 * m, n + 6 * m) or built.joints != tuple(range(n)):
             raise ManipcliError(f"MuJoCo loaded a different robot than '{robot.name}'")
         self._robot, self._model, self._data = robot, model, data
         self._step, self._step1, self._step2 = mujoco.mj_step, mujoco.mj_step1, mujoco.mj_step2
