@@ -22,6 +22,9 @@ from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
+from manipcli.model.robot import RobotModel
+from manipcli.model.self_collision import SelfCollisionMatrix
+from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.faults import RecordingRefused
@@ -58,10 +61,23 @@ __all__ = [
     "refused",
     "run_task",
     "schema",
+    "self_collisions",
     "simulation_of",
     "verify_log",
     "words",
 ]
+
+
+def self_collisions(
+    path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> tuple[RobotModel, SelfCollisionMatrix]:
+    """The robot of a robot file, a description or a task, and its self-collision matrix.
+
+    Raises:
+        InvalidInput: all errors of the file.
+    """
+    robot = load_sight(path, package_path=package_path, allow_outside=allow_outside).robot
+    return robot, self_collision_matrix(robot)
 
 
 def run_task(

@@ -38,6 +38,7 @@ from manipcli.cli.commands import (
 )
 from manipcli.cli.commands import list as list_
 from manipcli.core import collector
+from manipcli.core.activity import announced_to
 from manipcli.core.errors import Diagnostic, ExitCode, ManipcliError
 from manipcli.core.version import __version__
 from manipcli.record.faults import RecordingFailed
@@ -142,7 +143,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("ignore")  # findings report what numpy warns of
     console.prepare()
     try:
-        code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
+        with announced_to(console.talk):
+            code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
         if code == _INTERRUPTED_BY_TYPER:
             raise KeyboardInterrupt
         return int(code or ExitCode.PASSED)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.model.build_robot import rebuild_robot
+from manipcli.model.link_parts import LINK_PARTS
 from manipcli.model.robot import RobotModel
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.recording import Recording
@@ -37,7 +38,12 @@ def recorded_controllers_file(recording: Recording, path: Path) -> Located[Contr
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:
     """The robot of a log: from its expanded URDF and resolved robot file, without mesh files."""
-    return rebuild_robot(recorded_robot_file(recording, path).spec, attached(recording, path, URDF))
+    return robot_of(recording, path, recorded_robot_file(recording, path).spec)
+
+
+def robot_of(recording: Recording, path: Path, spec: RobotSpec) -> RobotModel:
+    """The robot of a log with this robot file, without mesh files."""
+    return rebuild_robot(spec, attached(recording, path, URDF), link_parts=recording.attachments.get(LINK_PARTS))
 
 
 def recorded_scene(recording: Recording, path: Path) -> Scene:

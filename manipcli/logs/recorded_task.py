@@ -19,10 +19,9 @@ from manipcli.logs.recorded_files import (
     recorded_robot_file,
     recorded_scene,
     recorded_task_file,
+    robot_of,
 )
-from manipcli.model.build_robot import rebuild_robot
 from manipcli.plan.outline import PLAN_FILE, PlanOutline
-from manipcli.record.attachments import URDF
 from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.run.run_log import mesh_files
 from manipcli.scene.build_scene import build_scene
@@ -107,7 +106,7 @@ def recorded_task(
             made,
             bind(task, robot_file, controllers)[0],
             drawn,
-            robot_of=lambda file: meshes.robot(rebuild_robot(file.spec, attached(recording, path, URDF))),
+            robot_of=lambda file: meshes.robot(robot_of(recording, path, file.spec)),
             scene_of=scene_of,
         )
     files = mesh_files(made)

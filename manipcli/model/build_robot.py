@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from manipcli.core.errors import Diagnostic, Loc
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
@@ -17,6 +17,7 @@ from manipcli.description.packages import NotFound, Packages
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.joint_units import misread_units
+from manipcli.model.link_parts import LINK_PARTS, link_parts_from_json, split_links, with_parts
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalised_urdf import portable_urdf
 from manipcli.model.reporter import Reporter
@@ -62,24 +63,32 @@ def build_robot(
         assert parts is not None
         body.weld(reporter, each, parts, k)
     reporter.stop()
+    names = [name for k, name in enumerate(spec.collision_parts) if _known(reporter, name, body, k)]
+    body.links = list(split_links(reporter, body.links, names))
     return _assembled(reporter, spec, body), tuple(reporter.findings)
 
 
-def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
+def rebuild_robot(spec: RobotSpec, urdf: bytes, *, link_parts: bytes | None = None) -> RobotModel:
     """The robot of a log, from the complete description in it; meshes are not read.
 
     Args:
         spec: the resolved robot file; attached descriptions are already part of `urdf`.
         urdf: `RobotModel.urdf` of the robot.
+        link_parts: what `link_parts_to_json` gave for the robot.
 
     Raises:
-        InvalidInput: the description or the robot file is damaged.
+        InvalidInput: the description, the robot file or the parts are damaged.
     """
     parts = read_parts(unread_description(urdf, "robot.urdf"))
     reporter = Reporter(None)
     reporter.findings += parts.findings
     reporter.stop()
     body = _Body(parts.root, list(parts.links), list(parts.joints), list(parts.transmissions))
+    if link_parts is not None:
+        try:
+            body.links = list(with_parts(body.links, *link_parts_from_json(link_parts)))
+        except ValueError as error:
+            raise InvalidInput([Diagnostic("LOG103", f"{LINK_PARTS}: {error}")]) from error
     return _assembled(reporter, spec, body)
 
 
@@ -312,6 +321,10 @@ def _soft(
         message = f"joint '{joint}': soft lower limit {soft.lower:g} is not below soft upper limit {soft.upper:g}"
         reporter.error("ROBOT307", message, ("limits", joint))
     return soft
+
+
+def _known(reporter: Reporter, name: str, body: _Body, k: int) -> bool:
+    return _known_link(reporter, name, body.links, ("collision_parts", k))
 
 
 def _known_link(reporter: Reporter, name: str, links: Sequence[Link], loc: Loc) -> bool:

@@ -9,12 +9,13 @@ body and the allowed contacts, and returns a `CollisionQuery` for any number of 
 
 Parts are named as in contacts: `robot/<link>`, or the body. A carried body is part of the robot: it moves with its
 link and is checked against the scene and the other links. Never checked: links with at most one moving joint between
-them; links that overlap with all joints at zero; bodies of the scene against each other.
+them; links that overlap with all joints at zero and in most configurations (`self_collision.lasting_overlaps`); bodies
+of the scene against each other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -23,6 +24,7 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.self_collision import lasting_overlaps
 from manipcli.scene.scene import Scene
 from manipcli.shapes.proximity import coal_shape
 
@@ -104,6 +106,8 @@ class CollisionChecker:
         carried: Carried | None = None,
         ignore: Iterable[Pair] = (),
         margin: float = 0.0,
+        contents: Sequence[Carried] = (),
+        margins: Mapping[frozenset[str], float] = {},
         absent: Iterable[str] = (),
         only: str | None = None,
     ) -> CollisionQuery:
@@ -112,9 +116,11 @@ class CollisionChecker:
         Args:
             poses: `X_WO` of each of `scene.movable`, in that order; None: the poses of the task.
             carried: a movable body that the robot holds.
+            contents: bodies that move with it.
+            margins: other margins [m] of single pairs of parts.
             ignore: pairs of parts whose contact is allowed (see `pairs`), in any order.
             margin: parts closer than this [m] are in contact; a negative margin permits that overlap.
-            absent: bodies that are not checked (such as the contents of a carried cup).
+            absent: bodies that are not checked.
             only: a part; pairs without it are not checked.
         """
         where = {body.name: body.X_WO for body in self.scene.bodies}
@@ -122,27 +128,30 @@ class CollisionChecker:
             where |= {body.name: pose for body, pose in zip(self.scene.movable, poses, strict=True)}
         parts = list(self._links)
         gone = frozenset(absent)
+        held = {each.body: each for each in (() if carried is None else (carried, *contents))}
         for body, shapes in self._bodies.items():
             if body in gone:
                 continue
             role: Literal["carried", "scene"] = "scene"
             joint, X_JO = 0, _se3(where[body])
-            if carried is not None and carried.body == body:
+            if body in held:
                 model = self._kinematics.model
-                frame = model.frames[model.getFrameId(carried.link)]
+                frame = model.frames[model.getFrameId(held[body].link)]
                 role = "carried"
-                joint, X_JO = frame.parentJoint, frame.placement * _se3(carried.X_LO)
+                joint, X_JO = frame.parentJoint, frame.placement * _se3(held[body].X_LO)
             parts += [_Part(body, role, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
         allowed = self._ignored | {frozenset(pair) for pair in ignore}
         if carried is not None:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
-        return CollisionQuery(self._kinematics, parts, self._near, allowed, margin, only=only)
+        return CollisionQuery(self._kinematics, parts, self._near, allowed, margin, margins=margins, only=only)
 
     def _touching_at_zero(self) -> set[frozenset[str]]:
-        """Links that touch with every joint at zero (or at its limit nearest to zero), which is always allowed."""
-        moving = self._kinematics.robot.moving_joints
+        """Links modelled into each other, of those that touch with every joint at zero or at its nearest limit."""
+        robot = self._kinematics.robot
         zero = CollisionQuery(self._kinematics, self._links, self._near, self._ignored, 0.0)
-        return {frozenset((hit.a, hit.b)) for hit in zero.every([joint.limits.nearest(0.0) for joint in moving])}
+        hits = zero.every([joint.limits.nearest(0.0) for joint in robot.moving_joints])
+        links = {(hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")): hit.distance for hit in hits}
+        return {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in lasting_overlaps(robot, links)}
 
 
 class CollisionQuery:
@@ -156,6 +165,7 @@ class CollisionQuery:
         allowed: set[frozenset[str]],
         margin: float,
         *,
+        margins: Mapping[frozenset[str], float] = {},
         only: str | None = None,
     ) -> None:
         import pinocchio as pin
@@ -179,12 +189,23 @@ class CollisionQuery:
                     self._geometry.addCollisionPair(pin.CollisionPair(i, j))
         self._data = kinematics.model.createData()
         self._state = pin.GeometryData(self._geometry)
-        for request in self._state.collisionRequests:
-            request.security_margin = margin
+        for pair, request in zip(self._geometry.collisionPairs, self._state.collisionRequests, strict=True):
+            own = frozenset((self._names[pair.first], self._names[pair.second])) if margins else frozenset()
+            request.security_margin = margins.get(own, margin)
             request.enable_contact = True
         self._broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             kinematics.model, self._geometry, self._state
         )
+
+    @property
+    def shapes(self) -> tuple[pin.GeometryModel, Sequence[str]]:
+        """The checked pairs of shapes, and the part of each shape. Do not modify."""
+        return self._geometry, self._names
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Of the robot."""
+        return self._kinematics
 
     def check(self, q: npt.ArrayLike) -> CollisionHit | None:
         """The deepest touching pair at joint positions `q` (n) of all moving joints; None without a contact."""

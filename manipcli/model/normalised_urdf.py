@@ -20,7 +20,7 @@ from manipcli.description.elements import Inertial, Joint, Link, TransmissionTag
 from manipcli.description.urdf.joint import UNBOUNDED
 from manipcli.model.robot import RobotModel
 from manipcli.shapes.mesh import clean_mesh
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere, drawn_once
 
 MAX_LINE = 4096
 """Longest line that is written [bytes]."""
@@ -31,10 +31,11 @@ NUDGE = 1e-6
 def portable_urdf(
     name: str, links: Sequence[Link], joints: Sequence[Joint], transmissions: Sequence[TransmissionTag]
 ) -> str:
-    """The complete description as text with `package://` meshes; reading it gives the same links and joints."""
+    """The complete description as text with `package://` meshes; reading it gives the same links and joints,
+    but whole meshes where links have convex parts of them."""
     lines = _head(name)
     for link in links:
-        lines += _link(link, lambda mesh: mesh.uri)
+        lines += _link(dataclasses.replace(link, collisions=drawn_once(link.collisions)), lambda mesh: mesh.uri)
     for joint in joints:
         lines += _joint(joint)
     for tag in transmissions:

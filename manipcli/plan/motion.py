@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.collision import Carried
+from manipcli.model.collision import Carried, Pair
 from manipcli.plan.trajectory import JointTrajectory
 
 Strictness = Literal["strict", "best_effort"]
@@ -74,6 +74,8 @@ class Motion:
         awaits: the step's `until` is waited for here; where no motion awaits, it is at the step's end.
         guarded: it stops as soon as `until` holds.
         switch: of controllers, before anything else; None for no switch.
+        begins: the state in which it begins, for reports; None where nothing moves.
+        allowed: pairs of parts that may touch in it, besides the hand and what it holds.
     """
 
     label: str
@@ -83,6 +85,8 @@ class Motion:
     awaits: bool = False
     guarded: bool = False
     switch: Switch | None = None
+    begins: PlanningState | None = None
+    allowed: frozenset[Pair] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

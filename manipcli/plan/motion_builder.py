@@ -254,7 +254,12 @@ class MotionBuilder:
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
-        self._motions.append(Motion(CLOSING, trajectory=None, grip=grip, duration=duration))
+        self._motions.append(
+            Motion(
+                CLOSING, trajectory=None, grip=grip, duration=duration, begins=self._now,
+                allowed=self._allowed | planner.hand_contacts(body),
+            )
+        )  # fmt: skip
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
@@ -365,16 +370,25 @@ class MotionBuilder:
         query, move = self._query(allowed), self._verb == "move"
         refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
-        self._accept(label, trajectory, grip, duration if trajectory is None else max(duration, trajectory.duration))
+        whole = duration if trajectory is None else max(duration, trajectory.duration)
+        self._accept(label, trajectory, grip, whole, allowed=allowed)
 
-    def _accept(self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, duration: float) -> None:
+    def _accept(
+        self,
+        label: str,
+        trajectory: JointTrajectory | None,
+        grip: Grip | None,
+        duration: float,
+        *,
+        allowed: Pairs = NOTHING,
+    ) -> None:
         before = self._now
         if grip is not None:
             self._now = self._now.moved(self._with(grip.joints, grip.target))
         if trajectory is not None:
             self._now = self._now.moved(self._with(trajectory.names, trajectory.positions[-1]))
             self._now = carried_along(self._planner, before, self._now)
-        self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
+        self._motions.append(Motion(label, trajectory, grip, duration, begins=before, allowed=allowed | self._allowed))
 
     def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
         """The present position with other values of some joints; joints that mimic them follow."""

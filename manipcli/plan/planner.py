@@ -5,13 +5,15 @@ A step queries the `Planner` about a state, and builds its motions with a `Motio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
+from contextlib import suppress
+from copy import copy
 from itertools import combinations
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable, RefusalReason
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Transform, frozen
 from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, CollisionQuery, Pair, pairs
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
@@ -38,7 +40,7 @@ PUT_APART = "move them apart: set `start: POSE` in the task, or `mount` in the r
 """The hint for a robot that is too near to something before it moves."""
 OF_TWO_LINKS = (
     "add the pair to `collision_ignore` in the robot file, if the real links are apart (a mesh counts as its convex "
-    "hull); correct an attached hand with its `pose` under `attach`"
+    "hull, unless the link is under `collision_parts`); correct an attached hand with its `pose` under `attach`"
 )
 """The hint for two links of the robot that collide."""
 ROBOT = "robot/"
@@ -57,6 +59,8 @@ class Planner:
         rng: np.random.Generator,
         gripper_joints: tuple[str, ...],
         gripper_speed: float,
+        clearance: float = CLEARANCE,
+        clearances: Mapping[frozenset[str], float] = {},
     ) -> None:
         """
         Args:
@@ -65,7 +69,12 @@ class Planner:
             rng: draws the restarts of the inverse kinematics.
             gripper_joints: joints that a gripper controller moves; all others follow trajectories.
             gripper_speed: of the hand's references [rad/s or m/s].
+            clearance: distance [m] that parts keep which must not touch.
+            clearances: the same for single pairs of parts.
         """
+        self.clearance = clearance
+        self.clearances = clearances
+        self._allowed = NOTHING
         self.robot = robot
         self.scene = scene
         self.period = period
@@ -107,6 +116,20 @@ class Planner:
     def tool_link(self) -> str:
         """The link that carries the tool, and what the hand holds."""
         return self.solver.link
+
+    def allowing(self, pairs: Pairs) -> Planner:
+        """The same planner for a step in which these pairs may touch; it shares everything else."""
+        if not pairs:
+            return self
+        with suppress(NotPlannable):
+            _ = self.solver  # made once, for both
+        other = copy(self)
+        other._allowed = self._allowed | pairs
+        return other
+
+    def keeps(self, a: str, b: str) -> float:
+        """The clearance [m] that two parts keep."""
+        return self.clearances.get(frozenset((a, b)), self.clearance)
 
     def tool_pose(self, state: PlanningState) -> Transform:
         """X_WT."""
@@ -181,41 +204,66 @@ class Planner:
         return self.tool_pose(state).inverse() @ X_WO
 
     def contents(self, state: PlanningState, container: str) -> tuple[str, ...]:
-        """The movable bodies whose centre lies in the interior of this one."""
+        """The movable bodies whose centre lies in the interior of this one, and what is heaped on it or on them."""
         interior = self.scene.body(container).interior
         if interior is None:
             return ()
         X_SW = (self.body_pose(state, container) @ interior.X_OS).inverse()
-        return tuple(
-            body.name
+        places = {
+            body.name: X_SW @ X_WO @ Transform.of(xyz=body.centre)
             for body, X_WO in zip(self.scene.movable, state.bodies, strict=True)
-            if body.name != container and _within(interior, X_SW @ X_WO @ Transform.of(xyz=body.centre))
-        )
+            if body.name != container
+        }
+        found = {name for name, X_SP in places.items() if _within(interior, X_SP)}
+        above = {name for name, X in places.items() if name not in found and self._heaped(interior, name, X)}
+        while on := {name for name in above if self._touches(state, name, {container, *found})}:
+            found |= on
+            above -= on
+        return tuple(name for name in places if name in found)
+
+    def _heaped(self, interior: Interior, name: str, X_SP: Transform) -> bool:
+        """Whether a body is above the interior, by no more than its own size."""
+        depth = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
+        high = float(X_SP.p[2]) - depth / 2.0
+        flat = Transform.of(xyz=(X_SP.p[0], X_SP.p[1], 0.0))
+        return 0.0 <= high <= float(np.max(self.scene.body(name).size)) and _within(interior, flat)
+
+    def _touches(self, state: PlanningState, name: str, others: Set[str]) -> bool:
+        """Whether a movable body touches one of the others."""
+        return any(name in pair and not others.isdisjoint(pair) for pair in self.touching(state, name))
 
     def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
-        """Collision query in this state with the scene and the robot itself, with the margin `CLEARANCE`.
+        """Collision query in this state with the scene and the robot itself, with the clearances of the task.
 
-        The hand may touch the held object; the contents of that object are left out.
+        The hand may touch the held object. What that contains moves with it, and may touch what the object may.
 
         Args:
             allowed: further pairs that may touch.
         """
         carried = state.carried
-        gone: tuple[str, ...] = ()
+        allowed |= self._allowed
+        contents: tuple[Carried, ...] = ()
         if carried is not None:
             allowed |= self.hand_contacts(carried.body)
-            gone = self.contents(state, carried.body)
-        moving = (*gone, carried.body) if carried is not None else gone
+            X_LW = carried.X_LO @ self.body_pose(state, carried.body).inverse()
+            contents = tuple(
+                Carried(name, carried.link, _rounded(X_LW @ self.body_pose(state, name)))
+                for name in self.contents(state, carried.body)
+            )
+            on_body = {name for pair in allowed if carried.body in pair for name in pair} - {carried.body}
+            allowed |= {(each.body, name) for each in contents for name in on_body}
+        moving = {each.body for each in (() if carried is None else (carried, *contents))}
         standing = tuple(
             None if body.name in moving else X_WO for body, X_WO in zip(self.scene.movable, state.bodies, strict=True)
         )
-        key = (standing, carried, allowed, gone)
+        key = (standing, carried, allowed, contents)
         if key not in self._queries:
             if len(self._queries) == _QUERIES:
                 del self._queries[next(iter(self._queries))]
             self._queries[key] = self.checker.at(
-                state.bodies, carried=carried, ignore=allowed, margin=CLEARANCE, absent=gone
-            )
+                state.bodies, carried=carried, contents=contents, ignore=allowed, margin=self.clearance,
+                margins=self.clearances,
+            )  # fmt: skip
         return self._queries[key]
 
     def free_start(self, state: PlanningState, allowed: Pairs = NOTHING) -> None:
@@ -269,7 +317,7 @@ class Planner:
             cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} {when}"
         else:
             near = f"{hit.amount} apart"
-            cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
+            cause = f"'{hit.a}' {verb} within {self._clearance_text(hit)} of '{hit.b}' ({near}) {when}"
         reason: RefusalReason | None = "in_the_way" if hint == NO_WAY_AROUND else None
         return NotPlannable(cause, hint=hint, reason=reason, parts=frozenset((hit.a, hit.b)))
 
@@ -281,14 +329,18 @@ class Planner:
 
     def in_the_way(self, hit: CollisionHit) -> str:
         """A hit as text; with the clearance where the two do not overlap."""
-        return str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {1000 * CLEARANCE:.0f} mm"
+        return str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {self._clearance_text(hit)}"
+
+    def _clearance_text(self, hit: CollisionHit) -> str:
+        return f"{1000.0 * self.keeps(hit.a, hit.b):.3g} mm"
 
     def touching(self, state: PlanningState, body: str) -> Pairs:
         """The pairs of a movable body with its support and what it touches."""
         root = self.robot.root
         X_LO = self.robot.X_WB.inverse() @ self.body_pose(state, body)
         carried = Carried(body=body, link=root, X_LO=X_LO)
-        there = self.checker.at(state.bodies, carried=carried, margin=TOUCHING, only=body)
+        margin = TOUCHING if self.clearance <= CLEARANCE else self.clearance + TOUCHING - CLEARANCE
+        there = self.checker.at(state.bodies, carried=carried, margin=margin, only=body)
         return frozenset((hit.a, hit.b) for hit in there.every(state.position))
 
     def grasping(self, state: PlanningState, body: str, *, margin: float = 0.0) -> CollisionQuery:
@@ -299,6 +351,11 @@ class Planner:
         """Distance [m] of the empty robot from this body, negative where they overlap; at most `CLEARANCE`."""
         hits = self.grasping(state, body, margin=CLEARANCE).every(state.position)
         return min((hit.distance for hit in hits), default=CLEARANCE)
+
+
+def _rounded(X: Transform) -> Transform:
+    """The pose without the rounding of the products that gave it, so that queries with the same contents are shared."""
+    return Transform(R=frozen(np.round(X.R, 12)), p=frozen(np.round(X.p, 12)))
 
 
 def _within(interior: Interior, X_SP: Transform) -> bool:

@@ -12,7 +12,7 @@ from manipcli.model.state import Contact
 from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.recording import TaskEvent
 from manipcli.scene.scene import Scene
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere, drawn_once
 
 WORLD = "world"
 ALIGN = 8
@@ -54,9 +54,9 @@ def tf_message(transforms: Sequence[tuple[str, str, Transform]], ns: int) -> byt
 def marker_message(scene: Scene, ns: int) -> bytes:
     """visualization_msgs/MarkerArray: every shape of every body, in the body's own frame."""
     writer = CdrWriter()
-    writer.u32(sum(len(body.geometries) for body in scene.bodies))
+    writer.u32(sum(len(drawn_once(body.geometries)) for body in scene.bodies))
     for body in scene.bodies:
-        for k, geometry in enumerate(body.geometries):
+        for k, geometry in enumerate(drawn_once(body.geometries)):
             _marker(writer, body.name, k, geometry, ns)
     return writer.data
 

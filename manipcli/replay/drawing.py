@@ -21,7 +21,7 @@ from manipcli.replay.placing import Poses
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.mesh_formats import UnusableMesh
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere, drawn_once
 
 Layer = Literal["visual", "collision", "inertia"]
 
@@ -169,7 +169,7 @@ def _body(body: Body, missing: list[str]) -> Iterator[Drawable]:
 def _shapes(
     layer: Layer, frame: str, geometries: tuple[Geometry, ...], rgba: Rgba | None, missing: list[str]
 ) -> Iterator[Drawable]:
-    for k, geometry in enumerate(geometries):
+    for k, geometry in enumerate(geometries if layer == "collision" else drawn_once(geometries)):
         try:
             surfaces = shape_surfaces(geometry.shape, hull=layer == "collision")
         except UnusableMesh as error:
@@ -185,7 +185,7 @@ def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
 
     Args:
         shape: the shape.
-        hull: use the convex hull of a mesh instead of its triangles.
+        hull: use the convex hull of a mesh, or its part, instead of its triangles.
 
     Raises:
         UnusableMesh: the mesh cannot be drawn.
@@ -197,6 +197,8 @@ def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
             return (sphere_surface(shape),)
         case Cylinder():
             return (cylinder_surface(shape),)
+        case Mesh(part=part) if hull and part is not None:
+            return (smoothed(np.array(part.points), np.array(part.triangles)).scaled(shape.scale),)
         case Mesh():
             whole = tuple(part.scaled(shape.scale) for part in mesh_surfaces(shape.path))
             return (_hull(whole),) if hull else whole

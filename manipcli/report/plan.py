@@ -11,6 +11,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
+from manipcli.model.collision import CollisionHit
 from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.report.json import Json, dumps
@@ -63,11 +64,23 @@ def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
     return max(used, key=lambda use: use.fraction, default=None)
 
 
-def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) -> str:
-    """A table with one row per motion; the step's name is shown at its first motion only."""
+def render_text(
+    task: str,
+    motions: Sequence[PlannedMotion],
+    robot: RobotModel,
+    clearances: Sequence[CollisionHit | None],
+) -> str:
+    """A table with one row per motion; the step's name is shown at its first motion only.
+
+    Args:
+        task: its name.
+        motions: of the plan.
+        robot: of the task.
+        clearances: the least clearance of each motion.
+    """
     rows = []
     previous = None
-    for motion in motions:
+    for motion, near in zip(motions, clearances, strict=True):
         most = limiting(motion.trajectory, robot) if motion.trajectory is not None else None
         rows.append(
             (
@@ -77,23 +90,31 @@ def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) 
                 f"{motion.duration:.3f} s",
                 f"{most.quantity} of {most.joint}" if most is not None else "-",
                 f"{100.0 * most.fraction:.1f} %" if most is not None else "-",
+                f"{1000.0 * near.distance:.1f} mm" if near is not None else "-",
+                f"{near.a} and {near.b} at {near.time:.2f} s" if near is not None else "-",
             )
         )
         previous = motion.step_id
-    headers = ("step", "verb", "motion", "duration", "nearest limit", "used")
+    headers = ("step", "verb", "motion", "duration", "nearest limit", "used", "clearance", "between")
     total = sum(motion.duration for motion in motions)
     summary = f"✓ {task} planned: {number_of(len(motions), 'motion')}, {total:.2f} s"
-    return f"{table(headers, rows, right=('duration', 'used'))}\n\n{summary}"
+    return f"{table(headers, rows, right=('duration', 'used', 'clearance'))}\n\n{summary}"
 
 
-def render_json(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) -> str:
-    """The plan as one JSON object; durations in s, `used` as a fraction of the limit."""
+def render_json(
+    task: str,
+    motions: Sequence[PlannedMotion],
+    robot: RobotModel,
+    clearances: Sequence[CollisionHit | None],
+) -> str:
+    """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m; see
+    `render_text`."""
     return dumps(
         {
             "task": task,
             "verdict": "passed",
             "duration": round(sum(motion.duration for motion in motions), 9),
-            "motions": [_motion(motion, robot) for motion in motions],
+            "motions": [_motion(motion, robot, near) for motion, near in zip(motions, clearances, strict=True)],
             "errors": [],
         }
     )
@@ -127,7 +148,7 @@ def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> li
     return [f"{value:.9g}" for value in values[:, trajectory.names.index(joint)]]
 
 
-def _motion(motion: PlannedMotion, robot: RobotModel) -> Json:
+def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None) -> Json:
     trajectory = motion.trajectory
     most = limiting(trajectory, robot) if trajectory is not None else None
     return {
@@ -139,4 +160,7 @@ def _motion(motion: PlannedMotion, robot: RobotModel) -> Json:
         "limited_by": None
         if most is None
         else {"joint": most.joint, "quantity": most.quantity, "used": round(most.fraction, 6)},
+        "clearance": None
+        if near is None
+        else {"between": [near.a, near.b], "distance": round(near.distance, 6), "time": round(near.time, 6)},
     }

@@ -17,6 +17,7 @@ from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL
 from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import Verdict
+from manipcli.model.link_parts import LINK_PARTS, link_parts_to_json
 from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.channels import ControllerChannel, Recorded, SensorChannel
@@ -93,6 +94,8 @@ def open_log(
         (SCENE, JSON, scene_to_json(task.true.scene)),
         (PLAN_FILE, JSON, plan.outline.to_json()),
     ]
+    if (parts := link_parts_to_json(task.robot)) is not None:
+        attachments.append((LINK_PARTS, JSON, parts))
     recorder = None
     try:
         recorder = Recorder(

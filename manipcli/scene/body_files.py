@@ -1,8 +1,9 @@
-"""Bodies from files: the convex hull of a mesh, or a URDF with one link."""
+"""Bodies from files: a mesh, or a URDF with one link; meshes count as their convex hulls or convex parts."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,20 +17,22 @@ from manipcli.description.lint.rigid import box_about
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.scene.body_shapes import COLORS, BodyShape
+from manipcli.shapes.convex_parts import concave, convex_parts
 from manipcli.shapes.mesh import SUFFIXES
 from manipcli.shapes.primitives import Geometry, Mesh, Rgba
 from manipcli.shapes.proximity import coal_shape
-from manipcli.spec.task import MeshSpec, UrdfSpec
+from manipcli.spec.task import MeshCollision, MeshSpec, UrdfSpec
 
 
 def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
-    """A mesh in its own frame, with the bounding box and mass properties of its convex hull at uniform density.
+    """A mesh in its own frame, with the bounding box and mass properties of its convex hull or of its convex parts.
 
     The inertial is for a density of 1 kg/m3 and is scaled to the mass of the body.
 
     Raises:
         NotFound: the file does not exist.
         ValueError: the file has another format, is unreadable, or encloses no volume.
+        UnusableMesh: its convex parts cannot be made.
     """
     path = packages.resolve(spec.file, anywhere=True)
     if path.suffix.lower() not in SUFFIXES:
@@ -37,22 +40,45 @@ def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
     # A path is relative to the task file, which a log does not contain.
     uri = spec.file if spec.file.startswith("package:") else packages.portable(path)
     shape = Mesh(uri=uri, path=path, scale=(spec.scale, spec.scale, spec.scale))
+    geometries = in_parts((Geometry(X_LS=Transform.identity(), shape=shape, rgba=rgba),), spec.collision)
     try:
-        hull = coal_shape(shape)
+        hulls = [coal_shape(each.shape) for each in geometries]
     except (ValueError, RuntimeError) as error:
         raise ValueError(f"'{spec.file}' cannot be used as a mesh: it has no convex hull") from error
-    points = np.array(hull.points())
-    volume = float(hull.computeVolume())
+    points = np.concatenate([np.array(hull.points()) for hull in hulls])
+    volumes = np.array([hull.computeVolume() for hull in hulls])
+    volume = float(volumes.sum())
     if not (math.isfinite(volume) and volume > 0.0 and np.all(np.isfinite(points))):
         raise ValueError(f"'{spec.file}' cannot be used as a mesh: its convex hull has no volume")
     low, high = points.min(axis=0), points.max(axis=0)
+    centres = np.array([hull.computeCOM() for hull in hulls])
+    centre = volumes @ centres / volume
+    inertia = np.zeros((3, 3))  # about the common centre: the parallel axis theorem
+    for hull, mass, d in zip(hulls, volumes, centres - centre, strict=True):
+        inertia += hull.computeMomentofInertiaRelatedToCOM() + mass * (d @ d * np.eye(3) - np.outer(d, d))
     return BodyShape(
-        geometries=(Geometry(X_LS=Transform.identity(), shape=shape, rgba=rgba),),
+        geometries=geometries,
         interior=None,
         size=frozen(high - low),
         centre=frozen((high + low) / 2.0),
-        inertial=principal(volume, hull.computeCOM(), hull.computeMomentofInertiaRelatedToCOM()),
+        inertial=principal(volume, centre, inertia),
     )
+
+
+def in_parts(geometries: Sequence[Geometry], collision: MeshCollision | None) -> tuple[Geometry, ...]:
+    """The geometries with convex parts in place of each mesh that `collision` applies to; None: of a concave mesh.
+
+    Raises:
+        UnusableMesh: convex parts of a mesh cannot be made.
+    """
+    made: list[Geometry] = []
+    for each in geometries:
+        mesh = each.shape
+        if isinstance(mesh, Mesh) and collision != "hull" and (collision == "parts" or concave(mesh.path)):
+            made += [replace(each, shape=replace(mesh, part=part)) for part in convex_parts(mesh.path)]
+        else:
+            made.append(each)
+    return tuple(made)
 
 
 def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
@@ -66,6 +92,7 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
     Raises:
         NotFound: the file does not exist.
         InvalidInput: the file has errors, each with its place.
+        UnusableMesh: convex parts of a mesh cannot be made.
         ValueError: it has more than one link, no collision shape, or (for a link with mass) no moments of inertia.
     """
     path = packages.resolve(spec.file, anywhere=True)
@@ -82,6 +109,7 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
         raise ValueError(f"link '{link.name}' of '{spec.file}' has no collision shape")
     seen = next((shape.rgba for shape in link.visuals if shape.rgba is not None), COLORS["urdf"])
     shapes = tuple(replace(shape, rgba=rgba or shape.rgba or seen) for shape in link.collisions)
+    shapes = in_parts(shapes, spec.collision)
     box = box_about(shapes)
     assert box is not None  # every mesh has been read
     low, high = box

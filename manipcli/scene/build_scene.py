@@ -18,6 +18,7 @@ from manipcli.scene.mass_properties import union
 from manipcli.scene.scene import Body, Frame, Interior, Scene
 from manipcli.scene.scene_names import Locate, misnamed
 from manipcli.scene.start_overlap import overlaps
+from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
 from manipcli.spec.base import Model
 from manipcli.spec.task import BodySpec, TaskSpec
@@ -123,6 +124,9 @@ class _Builder:
             shape = self._made(spec, rgba)
         except NotFound as error:
             self._error("TASK222", f"body '{name}': {error.message}", (*loc, kind, "file"), error.hint)
+            return
+        except UnusableMesh as error:
+            self._error("TASK222", f"body '{name}': its mesh {error.reason}", (*loc, kind, "file"), error.hint)
             return
         except InvalidInput as error:
             self.findings.extend(error.findings)

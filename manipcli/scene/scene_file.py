@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, TypeAdapter
+from pydantic import Field, TypeAdapter, model_validator
 
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.scene.scene import Body, Frame, Interior, Scene
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere
+from manipcli.shapes.primitives import Box, ConvexPart, Cylinder, Geometry, Mesh, Shape, Sphere
 from manipcli.spec.base import Model
 
 Numbers3 = tuple[float, float, float]
@@ -46,7 +46,22 @@ class _Mesh(Model):
     scale: Numbers3
 
 
-_Shape = Annotated[_Box | _Sphere | _Cylinder | _Mesh, Field(discriminator="type")]
+class _MeshPart(Model):
+    type: Literal["mesh_part"]
+    uri: str
+    scale: Numbers3
+    index: Annotated[int, Field(ge=0)]
+    points: tuple[Numbers3, ...]
+    triangles: tuple[tuple[int, int, int], ...]
+
+    @model_validator(mode="after")
+    def _connected(self) -> _MeshPart:
+        if any(not 0 <= k < len(self.points) for triangle in self.triangles for k in triangle):
+            raise ValueError("a triangle has no such point")
+        return self
+
+
+_Shape = Annotated[_Box | _Sphere | _Cylinder | _Mesh | _MeshPart, Field(discriminator="type")]
 
 
 class _Geometry(Model):
@@ -91,7 +106,7 @@ class _Scene(Model):
 
 
 def scene_to_json(scene: Scene) -> bytes:
-    """The scene as JSON: deterministic bytes, exact numbers; meshes by their URI."""
+    """The scene as JSON: deterministic bytes, exact numbers; meshes by their URI, their convex parts whole."""
     bodies = tuple(
         _Body(
             name=body.name,
@@ -173,7 +188,7 @@ def _matrix(values: Array) -> Matrix:
     return (_three(values[0]), _three(values[1]), _three(values[2]))
 
 
-def _shape(shape: Shape) -> _Box | _Sphere | _Cylinder | _Mesh:
+def _shape(shape: Shape) -> _Box | _Sphere | _Cylinder | _Mesh | _MeshPart:
     match shape:
         case Box(size=size):
             return _Box(type="box", size=size)
@@ -181,11 +196,13 @@ def _shape(shape: Shape) -> _Box | _Sphere | _Cylinder | _Mesh:
             return _Sphere(type="sphere", radius=radius)
         case Cylinder(radius=radius, length=length):
             return _Cylinder(type="cylinder", radius=radius, length=length)
+        case Mesh(uri=uri, scale=scale, part=ConvexPart(index, points, triangles)):
+            return _MeshPart(type="mesh_part", uri=uri, scale=scale, index=index, points=points, triangles=triangles)
         case Mesh(uri=uri, scale=scale):
             return _Mesh(type="mesh", uri=uri, scale=scale)
 
 
-def _read_shape(shape: _Box | _Sphere | _Cylinder | _Mesh) -> Shape:
+def _read_shape(shape: _Box | _Sphere | _Cylinder | _Mesh | _MeshPart) -> Shape:
     match shape:
         case _Box(size=size):
             return Box(size)
@@ -195,6 +212,8 @@ def _read_shape(shape: _Box | _Sphere | _Cylinder | _Mesh) -> Shape:
             return Cylinder(radius, length)
         case _Mesh(uri=uri, scale=scale):
             return Mesh(uri=uri, path=Path(uri), scale=scale)
+        case _MeshPart(uri=uri, scale=scale, index=index, points=points, triangles=triangles):
+            return Mesh(uri=uri, path=Path(uri), scale=scale, part=ConvexPart(index, points, triangles))
 
 
 def _hollow(interior: Interior | None) -> _Interior | None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.scene.scene import Body
-from manipcli.shapes.primitives import Geometry
 from manipcli.shapes.proximity import coal_shape, distance
+
+if TYPE_CHECKING:
+    from manipcli.shapes.proximity import CollisionGeometry
 
 TOLERANCE = 1e-3
 """Overlap [m] up to which two bodies only touch: rounding, and what settling separates harmlessly."""
@@ -22,6 +25,7 @@ def overlaps(bodies: Sequence[Body]) -> Iterator[tuple[str, str, float]]:
     Bounding boxes rule out most pairs; the rest are compared shape by shape.
     """
     boxes = [_world_box(body) for body in bodies]
+    made: dict[int, list[tuple[Transform, CollisionGeometry]]] = {}  # a mesh can have many convex parts
     for i, j in combinations(range(len(bodies)), 2):
         a, b = bodies[i], bodies[j]
         if a.fixed and b.fixed:
@@ -29,7 +33,12 @@ def overlaps(bodies: Sequence[Body]) -> Iterator[tuple[str, str, float]]:
         (low_a, high_a), (low_b, high_b) = boxes[i], boxes[j]
         if bool(np.any(np.minimum(high_a, high_b) - np.maximum(low_a, low_b) < TOLERANCE)):
             continue
-        depth = max((_depth(a, ga, b, gb) for ga in a.geometries for gb in b.geometries), default=0.0)
+        for k in (i, j):
+            if k not in made:
+                made[k] = [(bodies[k].X_WO @ each.X_LS, coal_shape(each.shape)) for each in bodies[k].geometries]
+        depth = max(
+            (-distance(one, X_a, other, X_b).distance for X_a, one in made[i] for X_b, other in made[j]), default=0.0
+        )
         if depth > TOLERANCE:
             yield a.name, b.name, depth
 
@@ -39,9 +48,3 @@ def _world_box(body: Body) -> tuple[Array, Array]:
     centre = body.X_WO.apply(body.centre)
     half = np.abs(body.X_WO.R) @ (body.size / 2.0)
     return centre - half, centre + half
-
-
-def _depth(a: Body, shape_a: Geometry, b: Body, shape_b: Geometry) -> float:
-    """Depth of the overlap [m]; 0 if the shapes are apart."""
-    X_a, X_b = a.X_WO @ shape_a.X_LS, b.X_WO @ shape_b.X_LS
-    return max(0.0, -distance(coal_shape(shape_a.shape), X_a, coal_shape(shape_b.shape), X_b).distance)

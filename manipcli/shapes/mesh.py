@@ -236,9 +236,17 @@ def _checked(
 def clean_mesh(mesh: Mesh, folder: Path) -> Path:
     """A new file in `folder` with the unscaled triangles of `mesh`: OBJ for OBJ, to keep its parts, else binary STL.
 
+    Of a mesh with a `part`, only that part; its file is not read.
+
     Raises:
         InvalidInput: the mesh file cannot be used.
     """
+    if mesh.part is not None:
+        corners = np.array(mesh.part.points)[np.array(mesh.part.triangles)]
+        content = binary_stl(corners)
+        path = folder / f"{hashlib.sha256(content).hexdigest()[:16]}.stl"
+        path.write_bytes(content)
+        return path
     try:
         triangles = read_mesh(mesh.path)
     except UnusableMesh as error:

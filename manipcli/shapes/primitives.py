@@ -33,13 +33,30 @@ class Cylinder:
     length: float
 
 
+Point = tuple[float, float, float]
+Triangle = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class ConvexPart:
+    """A convex part of a mesh, number `index` of its parts: corners [m / scale] and triangles, which face outwards."""
+
+    index: int
+    points: tuple[Point, ...]
+    triangles: tuple[Triangle, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh file: `uri` as `package://NAME/...`, `path` of the file, `scale` per axis."""
+    """A mesh file: `uri` as `package://NAME/...`, `path` of the file, `scale` per axis.
+
+    For contact it counts as its convex hull. With a `part`, only as that part of it; the file is then only drawn.
+    """
 
     uri: str
     path: Path
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    part: ConvexPart | None = None
 
 
 Shape = Box | Sphere | Cylinder | Mesh
@@ -52,3 +69,12 @@ class Geometry:
     X_LS: Transform
     shape: Shape
     rgba: Rgba | None = None
+
+
+def drawn_once(geometries: tuple[Geometry, ...]) -> tuple[Geometry, ...]:
+    """The geometries without the second and later parts of a mesh, whose file the first part shows."""
+    return tuple(
+        each
+        for each in geometries
+        if not isinstance(each.shape, Mesh) or each.shape.part is None or not each.shape.part.index
+    )

@@ -33,7 +33,7 @@ class Proximity:
 
 
 def coal_shape(shape: Shape) -> CollisionGeometry:
-    """The shape for coal; a mesh becomes its convex hull.
+    """The shape for coal; a mesh, or its part, becomes its convex hull.
 
     Raises:
         ValueError: the mesh cannot be read, or is flat.
@@ -47,6 +47,8 @@ def coal_shape(shape: Shape) -> CollisionGeometry:
             return coal.Sphere(radius)
         case Cylinder(radius=radius, length=length):
             return coal.Cylinder(radius, length)
+        case Mesh(part=part, scale=scale) if part is not None:
+            return _hull(np.array(part.points) * np.array(scale))
         case Mesh(uri=uri, path=path, scale=scale):
             try:
                 mesh = read_mesh(path)
@@ -71,7 +73,7 @@ def surface(shape: Shape, *, most_triangles: int) -> CollisionGeometry | None:
     """The triangles of a mesh instead of its hull; None for a mesh with more than `most_triangles`."""
     import coal
 
-    if not isinstance(shape, Mesh):
+    if not isinstance(shape, Mesh) or shape.part is not None:
         return coal_shape(shape)
     mesh = read_mesh(shape.path)
     if len(mesh.faces) > most_triangles:

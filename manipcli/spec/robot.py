@@ -261,6 +261,11 @@ class RobotSpec(Model):
         10.0, description="Acceleration limit of joints without one [rad/s^2 or m/s^2], above 0. Default 10."
     )
     collision_ignore: tuple[tuple[str, str], ...] = Field((), description="Pairs of links that may touch.")
+    collision_parts: tuple[str, ...] = Field(
+        (),
+        description="Links whose collision meshes count as their convex parts, not as one convex hull each (a concave "
+        "mesh needs `manipcli[coacd]`). Default: none.",
+    )
     friction: Annotated[float, Field(ge=0)] = Field(
         1.0, description="Friction coefficient of the robot; the engine multiplies it by the other body's. Default 1."
     )

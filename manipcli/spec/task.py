@@ -16,6 +16,7 @@ from manipcli.core.text import escape
 from manipcli.spec.agree import AgreeSpec
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
+from manipcli.spec.clearance import ClearanceSpec, PartPair
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
 from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
@@ -68,19 +69,29 @@ class TraySpec(Model):
     wall: Size = Field(0.005, description="Thickness of walls and floor [m], 1 um to 100 m. Default 5 mm.")
 
 
+MeshCollision = Literal["hull", "parts"]
+"""The shape for contact of a mesh: its convex hull, or convex parts of it."""
+_COLLISION: Final = (
+    "Shape of a mesh for contact: `hull`, its convex hull; `parts`, its convex parts, so that a bowl is hollow (needs "
+    "`manipcli[coacd]`). Default: `hull` for a mesh that fills at least 90 % of its hull, else `parts`."
+)
+
+
 class MeshSpec(Model):
-    """A mesh file (STL, OBJ, Collada), used as its convex hull; the engine uses one hull per part of an OBJ."""
+    """A mesh file (STL, OBJ, Collada); for contact it is its convex hull or convex parts."""
 
     file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
     scale: Annotated[float, Field(ge=1e-6, le=1e6, description="Factor on all three axes, 1e-6 to 1e6. Default 1.")] = (
         1.0
     )
+    collision: MeshCollision | None = Field(None, description=_COLLISION)
 
 
 class UrdfSpec(Model):
     """A single-link URDF file as an object."""
 
     file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
+    collision: MeshCollision | None = Field(None, description=_COLLISION)
 
 
 class BodySpec(Model):
@@ -95,7 +106,7 @@ class BodySpec(Model):
     cylinder: CylinderSpec | None = Field(None, description="Shape: a solid upright cylinder.")
     cup: CupSpec | None = Field(None, description="Shape: an open cup.")
     tray: TraySpec | None = Field(None, description="Shape: an open tray.")
-    mesh: MeshSpec | None = Field(None, description="Shape: the convex hull of a mesh file.")
+    mesh: MeshSpec | None = Field(None, description="Shape: a mesh file.")
     urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
     pose: PoseSpec | None = Field(None, description="Start pose of its frame in the world.")
     rests_on: str | None = Field(
@@ -221,6 +232,11 @@ class StepSpec(KeyedSpec):
     timeout: Annotated[Pause, Field(gt=0)] | None = Field(
         None, description="Time after which the step fails [s], above 0 to 1 h."
     )
+    allow: tuple[PartPair, ...] = Field(
+        (),
+        description="Pairs of parts that may touch in this step: `[[robot/palm, shelf], [cup, tray]]`; a part is a "
+        "body, `robot/LINK`, or `robot` for each of its links.",
+    )
     on_fail: OnFail = Field(
         "stop",
         description="After a failure: `stop` ends the run, `continue` goes on (the failure has no effect on the "
@@ -287,6 +303,9 @@ class TaskSpec(Model):
         True,
         description="Whether a step is re-planned when its measured start differs from the planned one, and the "
         "tolerances of that comparison. Default true.",
+    )
+    clearance: ClearanceSpec = Field(
+        ClearanceSpec(), description="The distance that planned motions keep between parts that must not touch."
     )
     vary: dict[str, VarySpec] = Field(
         {},

@@ -17,6 +17,7 @@ from manipcli.judge.expectation import expectation_problems, labels, until_probl
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, no_hand
+from manipcli.plan.part_pairs import pair_problems
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.move import MoveSpec
 from manipcli.plan.unknown_names import UnknownPosture
@@ -91,6 +92,8 @@ def not_there(
     for k in range(0 if kept else len(spec.steps)):
         reported = {p.message for number, loc, p in of_steps if number == ABSENT and loc[1] == k}
         yield from _in_retry(task, k, context, reported)
+    for loc, p in _of_pairs(spec, context):
+        yield task.source.finding(ABSENT, (*loc, *p.loc), p.message, hint=p.hint)
     poses = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in poses:
         message = f"robot '{robot.name}' has no pose '{spec.start}'"
@@ -128,6 +131,15 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
                 yield ABSENT, ("steps", k, "until"), p
         if member.guarded(step.body):
             yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
+
+
+def _of_pairs(spec: TaskSpec, context: CheckContext) -> Iterator[tuple[Loc, Problem]]:
+    """Problems of the pairs of parts under `allow` of steps and under `clearance`."""
+    for k, step in enumerate(spec.steps):
+        for n, pair in enumerate(step.allow):
+            yield from ((("steps", k), p) for p in pair_problems(context, pair, ("allow", n)))
+    for n, each in enumerate(spec.clearance.pairs):
+        yield from (((), p) for p in pair_problems(context, each.between, ("clearance", "pairs", n, "between")))
 
 
 def _unguarded(step: StepSpec, spec: TaskSpec) -> Iterator[Problem]:

@@ -12,12 +12,15 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
 from manipcli.plan.candidates import Candidates, first
 from manipcli.plan.claimed_joints import Claims
+from manipcli.plan.clearance import least_clearance
 from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.outline import PlanOutline, StepOutline
+from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
@@ -67,6 +70,16 @@ class Plan:
             for step in self.steps
             for motion in step.plan.motions
         )
+
+    def clearances(self) -> tuple[CollisionHit | None, ...]:
+        """The least clearance of each of `motions`: parts, distance and time; None where nothing moves."""
+        found = []
+        for step in self.steps:
+            motions = step.plan.motions
+            begins = [motion.begins for motion in motions[1:]]
+            ends = [state or step.plan.end for state in (*begins, step.plan.end)]
+            found += [least_clearance(self.planner, motion, end) for motion, end in zip(motions, ends, strict=True)]
+        return tuple(found)
 
     @property
     def outline(self) -> PlanOutline:
@@ -143,6 +156,7 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
 def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
     if state.at_start:
         planner.outside(state)
+    planner = planner.allowing(expanded_pairs(planner.robot, planner.scene, step.allow))
     return STEPS[step.verb].candidates(step.body, planner, state)
 
 
@@ -191,4 +205,10 @@ def _planner(task: Task) -> Planner:
         rng=np.random.default_rng(task.spec.simulation.seed),
         gripper_joints=Claims.of(task.controllers).hand,
         gripper_speed=min(speeds, default=SPEED),
+        clearance=task.spec.clearance.default,
+        clearances={
+            frozenset(pair): each.distance
+            for each in task.spec.clearance.pairs
+            for pair in expanded_pairs(task.robot, task.scene, [each.between])
+        },
     )

@@ -187,16 +187,16 @@ def test_the_last_point_of_a_trajectory_is_checked() -> None:
     assert checker.at().check_trajectory([2], np.zeros(3), np.arange(3.0), still) is not None
 
 
-def test_links_that_touch_at_zero_are_made_so() -> None:
-    """A plate on link b that reaches the base in the stretched arm: no collision there, or ever, of that pair."""
-    plate = link("b", ((ROD, 0.0, 0.0), Sphere(RADIUS)), ((-ROD, 0.0, 0.0), Box((0.3, 0.3, 0.3))))
+@pytest.mark.parametrize(("edge", "modelled"), [(3.0, True), (0.3, False)])
+def test_links_modelled_into_each_other_are_not_checked(edge: float, modelled: bool) -> None:
+    """A plate on link b that reaches the base in the stretched arm, and in most configurations or in few."""
+    plate = link("b", ((ROD, 0.0, 0.0), Sphere(RADIUS)), ((-ROD, 0.0, 0.0), Box((edge, edge, 0.3))))
     made = robot()
     made = RobotModel(
         made.name, made.root, (*made.links[:2], plate, made.links[3]), made.joints, (), (), (), made.X_WB, ""
     )
-    checker = CollisionChecker(Kinematics(made), scene())
-    assert checker.at().check(np.zeros(3)) is None
-    assert checker.at().check(np.array([0.0, 0.0, np.pi])) is not None
+    hits = CollisionChecker(Kinematics(made), scene()).at().every(np.zeros(3))
+    assert (("robot/b", "robot/base") in [(hit.a, hit.b) for hit in hits]) != modelled
 
 
 def test_a_mesh_counts_as_its_convex_hull(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ CASE = CaseReport(
 OBJECTS = {
     "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
-    "findings", "disagreements", "numbers", "motions", "motions.limited_by",
+    "findings", "disagreements", "numbers", "motions", "motions.limited_by", "motions.clearance", "pairs",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators", "limits"}
@@ -105,6 +105,12 @@ def test_keys_of_what_is_checked() -> None:
 
 
 @pytest.mark.slow
+def test_keys_of_the_self_collision_matrix(capsys: pytest.CaptureFixture[str]) -> None:
+    robot = DOCS.parents[1] / "robots" / "differential_wrist" / "robot.yaml"
+    assert main(["check", str(robot), "--collisions", "--format", "json"]) == 0
+    assert set(_documented(list(_rows())[5])) == set(_written(json.loads(capsys.readouterr().out)))
+
+
 def test_keys_of_what_is_planned(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", str(DOCS.parents[1] / "examples" / "04_own_robot" / "task.yaml"), "--format", "json"]) == 0
     assert set(_documented(list(_rows())[4])) == set(_written(json.loads(capsys.readouterr().out)))

@@ -21,6 +21,12 @@ def check(
         typer.Argument(metavar="FILE...", help="Task, robot, controllers, URDF or xacro files.", show_default=False),
     ],
     *,
+    collisions: Annotated[
+        bool,
+        typer.Option(
+            "--collisions", help="Show the self-collision matrix of the robot of one robot file, URDF or task."
+        ),
+    ] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -37,6 +43,8 @@ def check(
     from manipcli import pipeline
     from manipcli.report import json, text
 
+    if collisions:
+        return _self_collisions(files, format_, tuple(package_path or ()), allow_outside=allow_outside)
     findings = pipeline.check_files(
         tuple(files),
         overrides=tuple(overrides or ()),
@@ -57,3 +65,16 @@ def check(
     if "controllers" in kinds and "task" not in kinds:
         console.talk("joints and gains of controllers were not compared with a robot: check a task that names both")
     return ExitCode.FAILED if failed else ExitCode.PASSED
+
+
+def _self_collisions(
+    files: list[Path], format_: Format, package_path: tuple[Path, ...], *, allow_outside: bool
+) -> ExitCode:
+    from manipcli import pipeline
+    from manipcli.report.self_collision import render_json, render_text
+
+    if len(files) > 1:
+        raise InvalidInput([Diagnostic("USE059", f"--collisions takes one file; given: {len(files)}")])
+    robot, matrix = pipeline.self_collisions(files[0], package_path=package_path, allow_outside=allow_outside)
+    console.result((render_json if format_ == "json" else render_text)(robot.name, matrix))
+    return ExitCode.PASSED

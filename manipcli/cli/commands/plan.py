@@ -28,7 +28,7 @@ def plan(
 ) -> ExitCode:
     """Plan a task and show its motions.
 
-    Shows the duration of each motion and the joint that limits it; simulates nothing.
+    Shows the duration of each motion, the joint that limits it, and its least clearance; simulates nothing.
     """
     from manipcli import pipeline
     from manipcli.report.plan import render_json, render_text, write_csv
@@ -43,7 +43,7 @@ def plan(
         allow_outside=allow_outside,
     )
     try:
-        motions = pipeline.plan_task(loaded).motions
+        planned = pipeline.plan_task(loaded)
     except NotPlannable as refusal:
         if format_ != "json":
             raise
@@ -51,11 +51,12 @@ def plan(
 
         console.result(render_verdict(pipeline.refused(loaded, refusal)))
         return refusal.exit_code
+    motions = planned.motions
     if csv is not None:
         from manipcli.core.whole_file import whole_file
 
         with whole_file(csv) as partial, partial.open("w", encoding="utf-8", newline="") as stream:
             write_csv(motions, stream)
     render = render_json if format_ == "json" else render_text
-    console.result(render(loaded.spec.task, motions, loaded.robot))
+    console.result(render(loaded.spec.task, motions, loaded.robot, planned.clearances()))
     return ExitCode.PASSED

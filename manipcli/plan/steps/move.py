@@ -79,7 +79,11 @@ class MoveSpec(Model):
         "Default `free`.",
     )
     velocity_scaling: VelocityScaling = 1.0
-    touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
+    touch: tuple[str, ...] = Field(
+        (),
+        description="Bodies that the hand, and what it holds, may touch; the step's `allow` names other pairs. "
+        "Default: none.",
+    )
     guarded: bool = Field(False, description="Stop as soon as the step's `until` holds. Default false.")
 
     @field_validator("to", mode="before")

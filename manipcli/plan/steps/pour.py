@@ -71,6 +71,8 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
+    poured = frozenset((name, spec.into) for name in planner.contents(state, spec.object))
+
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
         a = _horizontal_axis(R_WT0)
@@ -78,7 +80,7 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         lip = mouth + clearance * UP
         R_tilt = matrix_from_axis_angle(a, theta)
         p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
-        builder = MotionBuilder(planner, state)
+        builder = MotionBuilder(planner, state, allowed=poured)
         builder.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
         builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
         builder.dwell("dwell", spec.dwell)
