@@ -305,7 +305,7 @@ class MotionBuilder:
         except NotPlannable as refusal:
             if label == self._verb:
                 raise
-            raise refusal.but(cause=f"{label}: {refusal.cause}") from refusal
+            raise refusal.but(cause=f"{label}: {refusal.cause}", motions=tuple(self._motions)) from refusal
 
     def _solved(
         self,
@@ -368,7 +368,11 @@ class MotionBuilder:
     ) -> None:
         """Accept a motion if it is free of collisions."""
         query, move = self._query(allowed), self._verb == "move"
-        refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
+        try:
+            refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
+        except NotPlannable as refusal:
+            tried = Motion(label, trajectory, None, 0.0 if trajectory is None else trajectory.duration, begins=self._now)
+            raise refusal.but(motions=(*self._motions, tried)) from refusal
         duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
         whole = duration if trajectory is None else max(duration, trajectory.duration)
         self._accept(label, trajectory, grip, whole, allowed=allowed)

@@ -1,0 +1,90 @@
+"""A planned step as a trajectory_msgs/JointTrajectory in YAML, which a `follow` step reads back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.plan.motion import Motion, PlanningState
+from manipcli.plan.trajectory import JointTrajectory
+
+Span = tuple[Motion, PlanningState, PlanningState]
+"""A motion with the states before and after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    times: list[float]
+    position: list[Array]
+    velocity: list[Array]
+    acceleration: list[Array]
+
+    def add(self, time: float, q: Array, v: Array, a: Array) -> None:
+        """A point at the time of the one before it is the same point."""
+        if self.times and time - self.times[-1] < 1e-9:
+            return
+        self.times.append(time)
+        self.position.append(q)
+        self.velocity.append(v)
+        self.acceleration.append(a)
+
+
+def step_trajectory(spans: Sequence[Span], columns: dict[str, int]) -> JointTrajectory | None:
+    """The trajectories of all motions of a step as one, at rest while only the hand moves; None if the arm rests.
+
+    Args:
+        spans: motions of the step.
+        columns: of each joint in `PlanningState.position`.
+    """
+    moved = {name for motion, _, _ in spans if motion.trajectory is not None for name in motion.trajectory.names}
+    names = tuple(name for name in columns if name in moved)
+    if not names:
+        return None
+    chosen, still = [columns[name] for name in names], np.zeros(len(names))
+    rows, begins = _Rows([], [], [], []), 0.0
+    for motion, before, _ in spans:
+        here = before.position[chosen]
+        rows.add(begins, here, still, still)
+        if motion.trajectory is not None:
+            _add(rows, begins, motion.trajectory, names, here)
+            here = rows.position[-1]
+        begins += motion.duration
+        rows.add(begins, here, still, still)
+    return JointTrajectory.of_arrays(
+        names, np.array(rows.times), np.array(rows.position), np.array(rows.velocity), np.array(rows.acceleration)
+    )
+
+
+def _add(rows: _Rows, begins: float, trajectory: JointTrajectory, names: Sequence[str], here: Array) -> None:
+    at = [names.index(name) for name in trajectory.names]
+    still = np.zeros(len(trajectory.names))
+    for k, time in enumerate(trajectory.times.tolist()):
+        q, v, a = np.array(here), np.zeros(len(names)), np.zeros(len(names))
+        q[at] = trajectory.positions[k]
+        v[at] = still if trajectory.velocities is None else trajectory.velocities[k]
+        a[at] = still if trajectory.accelerations is None else trajectory.accelerations[k]
+        rows.add(begins + time, q, v, a)
+
+
+def message(trajectory: JointTrajectory, comment: str) -> str:
+    """The message in YAML; numbers read back bit for bit, times to the nanosecond."""
+    lines = [f"# {comment}", "header: {frame_id: ''}", f"joint_names: [{', '.join(trajectory.names)}]", "points:"]
+    velocities, accelerations = trajectory.velocities, trajectory.accelerations
+    assert velocities is not None and accelerations is not None  # `step_trajectory` gives both
+    for k, time in enumerate(trajectory.times.tolist()):
+        sec, nanosec = divmod(round(time * 1e9), 1_000_000_000)
+        lines.append(
+            f"- {{positions: {_list(trajectory.positions[k])}, velocities: {_list(velocities[k])}, "
+            f"accelerations: {_list(accelerations[k])}, "
+            f"time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _list(values: Array) -> str:
+    """Floats with a point: YAML 1.1 reads `1e-05` as a string."""
+    texts = (repr(float(value)) for value in values)
+    return "[" + ", ".join(text.replace("e", ".0e") if "e" in text and "." not in text else text for text in texts) + "]"
