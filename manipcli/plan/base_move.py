@@ -7,16 +7,14 @@ direction that is found first is then halved between its ring and the one inside
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final, Protocol
 
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 
-if TYPE_CHECKING:
-    from manipcli.plan.inverse_kinematics import InverseKinematics
-
-RINGS: Final = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+RINGS: Final = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6)
 """[m] Distances from the base that are tried."""
 DIRECTIONS: Final = 8
 SEEDS: Final = 4
@@ -24,7 +22,21 @@ SEEDS: Final = 4
 HALVINGS: Final = 4
 
 
-def base_move(solver: InverseKinematics, X_WT: Transform, seed: Array) -> Array | None:
+class _Attempt(Protocol):
+    @property
+    def converged(self) -> bool: ...
+
+
+class Solver(Protocol):
+    """What the search needs of `InverseKinematics`."""
+
+    @property
+    def base(self) -> Transform: ...
+    def random_configurations(self, seed: Array, rng: np.random.Generator, count: int) -> Iterator[Array]: ...
+    def track(self, X_WT: Transform, seed: Array) -> _Attempt: ...
+
+
+def base_move(solver: Solver, X_WT: Transform, seed: Array) -> Array | None:
     """The least found offset (2,) [m] of the base in x and y of the world with which the arm reaches `X_WT`.
 
     At most `len(RINGS) * DIRECTIONS * SEEDS` attempts, and `HALVINGS * SEEDS` more. Obstacles are not considered.
@@ -57,13 +69,13 @@ def base_move(solver: InverseKinematics, X_WT: Transform, seed: Array) -> Array 
     return None
 
 
-def base_advice(solver: InverseKinematics, X_WT: Transform, seed: Array) -> str:
+def base_advice(solver: Solver, X_WT: Transform, seed: Array) -> str:
     """The found offset as a hint."""
     offset = base_move(solver, X_WT, seed)
     if offset is None:
         return f"no position of the base within {RINGS[-1]:g} m along the ground reaches it"
-    x, y = (float(value) for value in offset)
+    x, y = (float(value) for value in solver.base.p[:2] + offset)
     return (
-        f"with the base moved by {math.hypot(x, y):.2f} m, to ({solver.base.p[0] + x:.2f}, {solver.base.p[1] + y:.2f}) m "
+        f"with the base moved by {float(np.hypot(*offset)):.2f} m, to x = {x:.2f} m, y = {y:.2f} m "
         "(`mount` in the robot file), the arm reaches it, obstacles aside"
     )

@@ -371,7 +371,9 @@ class MotionBuilder:
         try:
             refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         except NotPlannable as refusal:
-            tried = Motion(label, trajectory, None, 0.0 if trajectory is None else trajectory.duration, begins=self._now)
+            tried = Motion(
+                label, trajectory, None, 0.0 if trajectory is None else trajectory.duration, begins=self._now
+            )
             raise refusal.but(motions=(*self._motions, tried)) from refusal
         duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
         whole = duration if trajectory is None else max(duration, trajectory.duration)

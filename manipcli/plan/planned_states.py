@@ -62,15 +62,13 @@ def planned_states(
         trajectory = motion.trajectory
         columns = list(planner.robot.indices(trajectory.names))
         rows_at = np.clip(times, trajectory.times[0], trajectory.times[-1])
-        sampled = trajectory.sample(rows_at)
+        q, v, a = trajectory.sample(rows_at)
         moving = (times <= trajectory.times[-1])[:, None]
-        position[:, columns] = sampled.positions
+        position[:, columns] = q
         position = np.asarray(with_mimics(planner.robot, position))
-        if sampled.velocities is not None:
-            velocity[:, columns] = np.where(moving, sampled.velocities, 0.0)
-        if sampled.accelerations is not None:
-            acceleration[:, columns] = np.where(moving, sampled.accelerations, 0.0)
-    bodies = [_bodies(planner, begins, q) for q in position]
+        velocity[:, columns] = np.where(moving, v, 0.0)
+        acceleration[:, columns] = np.where(moving, a, 0.0)
+    bodies = [_bodies(planner, begins, row) for row in position]
     if motion.grip is not None or motion.trajectory is not None:
         bodies[-1] = end.bodies
     torque = _torques(planner, begins, times, position, velocity, acceleration)

@@ -37,9 +37,7 @@ def by_stage(refused: Refused) -> tuple[RefusedCandidates, ...]:
         cause = one.refusal.cause
         groups.setdefault((step, stage_of(cause), NUMBER.sub("#", cause)), []).append(one)
     found = [
-        RefusedCandidates(
-            step, stage, len(of), of[0].refusal.cause, tuple(one.name for one in of if one.name)[:NAMED]
-        )
+        RefusedCandidates(step, stage, len(of), of[0].refusal.cause, tuple(one.name for one in of if one.name)[:NAMED])
         for (step, stage, _), of in groups.items()
     ]
     return tuple(sorted(found, key=lambda group: -group.count))
@@ -63,9 +61,7 @@ def explained(refusal: NotPlannable, refused: Refused) -> NotPlannable:
 
 def change_for_most(refused: Refused) -> str:
     """The body to move that is in the way of most candidates; "" if none is in the way of at least half of them."""
-    bodies = Counter(
-        part for _, one in refused for part in sorted(one.refusal.parts) if not part.startswith("robot/")
-    )
+    bodies = Counter(part for _, one in refused for part in sorted(one.refusal.parts) if not part.startswith("robot/"))
     if not bodies:
         return ""
     body, count = bodies.most_common(1)[0]

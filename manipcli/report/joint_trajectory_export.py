@@ -87,4 +87,6 @@ def message(trajectory: JointTrajectory, comment: str) -> str:
 def _list(values: Array) -> str:
     """Floats with a point: YAML 1.1 reads `1e-05` as a string."""
     texts = (repr(float(value)) for value in values)
-    return "[" + ", ".join(text.replace("e", ".0e") if "e" in text and "." not in text else text for text in texts) + "]"
+    return (
+        "[" + ", ".join(text.replace("e", ".0e") if "e" in text and "." not in text else text for text in texts) + "]"
+    )

@@ -156,13 +156,9 @@ def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None,
         "limited_by": None
         if most is None
         else {"joint": most.joint, "quantity": most.quantity, "used": round(most.fraction, 6)},
-        "bound_by": None
-        if margins.binding is None
-        else picked(margins.binding, "joint quantity share"),
+        "bound_by": None if margins.binding is None else picked(margins.binding, "joint quantity share"),
         "margins": plain(margins.margins),
-        "manipulability": None
-        if margins.manipulability is None
-        else picked(margins.manipulability, "least time"),
+        "manipulability": None if margins.manipulability is None else picked(margins.manipulability, "least time"),
         "clearance": None
         if near is None
         else {"between": [near.a, near.b], "distance": round(near.distance, 6), "time": round(near.time, 6)},

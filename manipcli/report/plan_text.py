@@ -6,18 +6,20 @@ from collections.abc import Sequence
 
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
+from manipcli.plan.motion_margins import MotionMargins
 from manipcli.report.plan import PlannedTask
 from manipcli.report.table import table
 
 
 def render_text(task: str, plan: PlannedTask) -> str:
     """Tables with one row per motion (the step's name only at its first), per margin, and per step with candidates."""
-    parts = [_motions(plan), _margins(plan)]
+    margins = plan.margins()
+    parts = [_motions(plan, margins), _margins(plan, margins)]
     if candidates := _candidates(plan):
         parts.append(candidates)
     total = sum(motion.duration for motion in plan.motions)
     parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {total:.2f} s")
-    return "\n\n".join(parts)
+    return "\n\n".join(part for part in parts if part)
 
 
 def render_refused(candidates: Sequence[RefusedCandidates]) -> str:
@@ -26,10 +28,10 @@ def render_refused(candidates: Sequence[RefusedCandidates]) -> str:
     return table(("refused", "step", "at", "because"), rows, right=("refused",))
 
 
-def _motions(plan: PlannedTask) -> str:
+def _motions(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
     rows = []
     previous = None
-    for motion, near, margins in zip(plan.motions, plan.clearances(), plan.margins(), strict=True):
+    for motion, near, margins in zip(plan.motions, plan.clearances(), found, strict=True):
         bound, dexterity = margins.binding, margins.manipulability
         rows.append(
             (
@@ -48,7 +50,7 @@ def _motions(plan: PlannedTask) -> str:
     return table(headers, rows, right=("duration", "clearance"))
 
 
-def _margins(plan: PlannedTask) -> str:
+def _margins(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
     """The nearest joint of each kind of limit in each motion."""
     rows = [
         (
@@ -58,14 +60,12 @@ def _margins(plan: PlannedTask) -> str:
             f"{100.0 * margin.used:.1f} %",
             f"{margin.time:.2f} s",
         )
-        for motion, margins in zip(plan.motions, plan.margins(), strict=True)
+        for motion, margins in zip(plan.motions, found, strict=True)
         for first, margin in ((k == 0, one) for k, one in enumerate(margins.margins))
     ]
     return table(("motion", "limit", "nearest joint", "used", "at"), rows, right=("used", "at")) if rows else ""
 
 
 def _candidates(plan: PlannedTask) -> str:
-    rows = [
-        (step.id, one.name or "-", one.refusal.cause) for step in plan.steps for one in step.dropped
-    ]
+    rows = [(step.id, one.name or "-", one.refusal.cause) for step in plan.steps for one in step.dropped]
     return table(("step", "dropped candidate", "because"), rows) if rows else ""

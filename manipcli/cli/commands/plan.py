@@ -26,9 +26,7 @@ def plan(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(
-            "--picture", metavar="FILE", help="Draw each joint's motion with its limits: .svg, .png or .pdf."
-        ),
+        typer.Option("--picture", metavar="FILE", help="Draw each joint's motion with its limits: .svg, .png or .pdf."),
     ] = None,
     html: Annotated[
         Path | None,
@@ -136,5 +134,7 @@ def _export(planned: Plan, folder: Path) -> None:
         trajectory = step_trajectory([next(spans) for _ in step.plan.motions], columns)
         if trajectory is not None:
             path = folder / f"{k:02d}_{step.id}.yaml"
-            write_whole(path, message(trajectory, f"{step.verb} '{step.id}'; the hand's motion is not included").encode())
+            write_whole(
+                path, message(trajectory, f"{step.verb} '{step.id}'; the hand's motion is not included").encode()
+            )
             console.talk(f"written: {path}")
