@@ -17,7 +17,7 @@ START: Final = "start"
 NAMED: Final = 5
 """Names of candidates that a group lists."""
 _LABEL: Final = re.compile(r"([a-z_]+): ")
-_DURING: Final = re.compile(r" of '([a-z_]+)'")
+_DURING: Final = re.compile(r" s of '([a-z_]+)'")
 
 Refused = Sequence[tuple[str, Dropped]]
 """Id of the step and candidate, in the order of their refusal."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,10 @@ from manipcli.core.geometry import Array
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.plan.trajectory import JointTrajectory
 
+TOLERANCE: Final = 1e-6
+"""[rad or m] Deviation in position of the written splines."""
+JERK: Final = 0.001
+"""Deviation of the change of acceleration from point to point, as a share of the largest: `follow` verifies jerks."""
 Span = tuple[Motion, PlanningState, PlanningState]
 """A motion with the states before and after it."""
 
@@ -53,9 +58,39 @@ def step_trajectory(spans: Sequence[Span], columns: dict[str, int]) -> JointTraj
             here = rows.position[-1]
         begins += motion.duration
         rows.add(begins, here, still, still)
-    return JointTrajectory.of_arrays(
-        names, np.array(rows.times), np.array(rows.position), np.array(rows.velocity), np.array(rows.acceleration)
+    return thinned(
+        JointTrajectory.of_arrays(
+            names, np.array(rows.times), np.array(rows.position), np.array(rows.velocity), np.array(rows.acceleration)
+        )
     )
+
+
+def thinned(trajectory: JointTrajectory) -> JointTrajectory:
+    """Fewer points of a trajectory with accelerations, whose quintic splines differ from it by at most `TOLERANCE`.
+
+    Intervals are halved as long as they differ.
+    """
+    times, positions, velocities, accelerations = (
+        trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations
+    )  # fmt: skip
+    assert velocities is not None and accelerations is not None
+    last = len(times) - 1
+    kept = np.array([0, last])
+    steps = np.diff(accelerations, axis=0)
+    steepest = max(float(np.max(np.abs(steps))), 1e-9)
+    while True:
+        shorter = JointTrajectory.of_arrays(
+            trajectory.names, times[kept], positions[kept], velocities[kept], accelerations[kept]
+        )
+        p, _, a = shorter.sample(times)
+        off = np.max(np.abs(p - positions), axis=1)[1:] > TOLERANCE
+        off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > JERK * steepest
+        wrong = np.unique(np.searchsorted(kept, np.flatnonzero(off), side="right") - 1)
+        middles = (kept[wrong] + kept[wrong + 1]) // 2
+        more = np.setdiff1d(middles, kept)
+        if not len(more):
+            return shorter
+        kept = np.union1d(kept, more)
 
 
 def _add(rows: _Rows, begins: float, trajectory: JointTrajectory, names: Sequence[str], here: Array) -> None:
@@ -85,8 +120,10 @@ def message(trajectory: JointTrajectory, comment: str) -> str:
 
 
 def _list(values: Array) -> str:
-    """Floats with a point: YAML 1.1 reads `1e-05` as a string."""
-    texts = (repr(float(value)) for value in values)
-    return (
-        "[" + ", ".join(text.replace("e", ".0e") if "e" in text and "." not in text else text for text in texts) + "]"
-    )
+    return f"[{', '.join(_number(float(value)) for value in values)}]"
+
+
+def _number(value: float) -> str:
+    """With a point: YAML 1.1 reads `1e-05` as a string."""
+    text = repr(value)
+    return text if "." in text else text.replace("e", ".0e")

@@ -85,7 +85,7 @@ class Plan:
 
     def spans(self) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:
         """Each motion with the states before and after it."""
-        found = []
+        found: list[tuple[Motion, PlanningState, PlanningState]] = []
         before = self.start
         for step in self.steps:
             found += spans(step.plan.motions, before, step.plan.end)
