@@ -141,7 +141,8 @@ class InverseKinematics:
             X_WT: the goal.
             seed: (n) all moving joints.
             rng: draws the restarts.
-            refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count.
+            refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count. Its
+                `parts`, if it has any, are those in the way.
 
         Raises:
             NotPlannable: no attempt converges; names the least error, the distance to the goal and the joints at their
@@ -180,6 +181,7 @@ class InverseKinematics:
                 f"the arm reaches ({place}) m only where {refusal}",
                 hint=f"move the goal away from the obstacle{rotate}",
                 reason="touches",
+                parts=getattr(refusal, "parts", frozenset()),
             )
         hint = f"move the goal nearer{rotate}"
         kind: RefusalReason | None = None

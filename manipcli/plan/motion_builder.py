@@ -23,7 +23,7 @@ from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
-from manipcli.plan.planner import NOTHING, Pairs, Planner
+from manipcli.plan.planner import NOTHING, InTheWay, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sweep import grip_time, refuse_collision
@@ -330,7 +330,10 @@ class MotionBuilder:
             count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
             share = np.linspace(0.0, 1.0, count + 1)
             blocked = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
-            return None if blocked is None else f"{planner.in_the_way(blocked)}, on the path there"
+            if blocked is None:
+                return None
+            text, parts = planner.in_the_way(blocked)
+            return InTheWay(f"{text}, on the path there", parts)
 
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 

@@ -35,7 +35,7 @@ WALLED = (
   wall: {box: {size: [2 cm, 0.8, 0.15]}, pose: {xyz: [0.62, 0, 0.475]}, fixed: true}
   can: {cylinder: {radius: 36 mm, height: 110 mm}, mass: 150 g, rests_on: desk, at: [0.75, 0.0]}
 steps:
-  - pick: {object: can, approach: {from: side}, grasp: {posture: wrap}}
+  - pick: {object: can, approach: {from: side}, grasp: {posture: wrap, height: 68 mm}}
 """
 )
 FAR = HEAD + DESK + "steps:\n  - move: {pose: {xyz: [1.6, 0.3, 0.8]}}\n"
@@ -111,7 +111,8 @@ def test_torques_are_those_of_holding_still(written: Write) -> None:
     """Oracle: at rest, torque is gravity; with a carried body, its weight times the Jacobian of its centre."""
     text = HEAD + DESK
     text += "  can: {cylinder: {radius: 36 mm, height: 110 mm}, mass: 500 g, rests_on: desk, at: [0.75, 0.0]}\n"
-    text += "steps:\n  - pick: {object: can, grasp: {posture: wrap}}\n  - lift: {object: can}\n  - wait: 0.1 s\n"
+    text += "steps:\n  - pick: {object: can, grasp: {posture: wrap, height: 68 mm}}\n"
+    text += "  - lift: {object: can}\n  - wait: 0.1 s\n"
     plan = planned(written(text))
     motion, before, end = plan.spans()[-1]
     states = planned_states(plan.planner, motion, end, begins=before)
