@@ -96,3 +96,11 @@ def test_a_pose_out_of_reach_names_the_nearest_pose(bench: Make) -> None:
     point = refusal.cause.split("with the tool at (")[1].split(")")[0]
     nearest = np.array([float(value) for value in point.split(", ")])
     assert np.linalg.norm(nearest - (1.6, 0.3, 0.8)) == pytest.approx(off / 1000.0, abs=2e-3)
+
+
+def test_a_goal_in_the_desk_names_the_pair_that_collides(bench: Make) -> None:
+    refusal = bench().refused("move", {"point": [0.75, 0.2, 0.38]})
+    assert "only where" in refusal.cause
+    assert "desk" in refusal.parts
+    assert any(part.startswith("robot/") for part in refusal.parts)
+    assert all(part in refusal.cause for part in refusal.parts)
