@@ -25,6 +25,7 @@ from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Unit
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.robot import (
@@ -50,6 +51,7 @@ ELSEWHERE: dict[type, str] = {
     BodySpec: "[bodies](task.md#scene)",
     FrameSpec: "[frames](task.md#frames)",
     PoseSpec: "a [pose](task.md#poses)",
+    PlannerSpec: "a [mapping](task.md#planner)",
     RecordSpec: "a [mapping](task.md#record)",
     ReplanSpec: "a [mapping](task.md#replan)",
     VarySpec: "[distributions](task.md#vary)",
@@ -93,9 +95,41 @@ The whole task is planned, step by step, before anything moves.
 """
 
 
+KEEP = """\
+## Constraints on motions
+
+```yaml
+- move: {pose: {xyz: [0.5, 0.2, 0.7], rpy: [0, 90 deg, 0]}}
+  keep: {upright: 10 deg, slosh: 15 deg, tool_speed: 0.25}
+- move: {to: home}
+  keep:
+    - {above: desk, by: 5 cm}
+    - {above: shelf}
+```
+
+`keep` applies to all motions of the arm in a step; the table says where a constraint is left out. Where the straight
+path in joint space violates one, the straight line of the tool is tried, then a path is searched whose configurations
+are projected onto the constraints. `tool_speed`, `tool_acceleration` and `slosh` bound the timing: the motion is the
+fastest one that keeps them. Every control tick of the final motion is checked; a refusal names the constraint, the
+amount and the time.
+
+`slosh` bounds the apparent gravity g - a at the contents (their mean centre of mass; the centre of an empty
+container), a the acceleration there. A liquid's surface at rest in the container keeps this angle to the rim. Waves
+are not modelled.
+
+An object with contents is kept within 20 deg of upright without `keep`, or, if it is held tilted, within 2 deg more
+than that; except where `pour` tilts it and where a motion ends with it tilted more.
+
+Effort limits of joints bound the timing of every motion: |M a + C v + g + friction| with what the hand holds, and its
+contents, and rotor inertia. Friction is that of the joints (`dynamics` of the URDF), without the actuators' own. A
+motion that keeps them at the limits of velocity, acceleration and jerk is not changed. A joint whose load at rest
+takes more than 95 % of its limit is left out, and `check` reports it (CTRL155).
+"""
+
+
 def page() -> str:
     """The whole text."""
-    parts = [INTRODUCTION + table(StepSpec), "## The steps\n\n" + _contents()]
+    parts = [INTRODUCTION + table(StepSpec), KEEP, "## The steps\n\n" + _contents()]
     parts += [part for one in STEPS for part in _section(one)]
     return "\n\n".join(parts)
 

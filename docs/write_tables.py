@@ -22,6 +22,7 @@ from write_steps import table
 
 from manipcli.control.controller import ControllerMember
 from manipcli.control.controllers import CONTROLLERS
+from manipcli.plan.path_planners import PATH_PLANNERS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import agree, baseline, clearance, controllers, reactions, robot, task, vary
 from manipcli.spec.base import about
@@ -44,7 +45,7 @@ def renewed(page: str) -> str:
 
 
 def _model(name: str) -> type[BaseModel]:
-    engines = {member.spec.__name__: member.spec for member in ENGINES}
+    engines = {member.spec.__name__: member.spec for member in (*ENGINES, *PATH_PLANNERS)}
     simulation = task_spec().model_fields["simulation"].default
     if name in engines or name == type(simulation).__name__:
         return engines.get(name, type(simulation))

@@ -155,7 +155,9 @@ def _end_of(job: Job, beats: _Beats, prepared: Prepared | None = None) -> End:
     if job.page is not None:
         beats.activity("writing a page")
         notes += _noted("no page", lambda: write_page(job, report, found))
-    return End(report, findings, found, beats.warnings, tuple(notes), measured(job, report))
+    numbers = []
+    notes += _noted("not compared", lambda: numbers.append(measured(job, report)))
+    return End(report, findings, found, beats.warnings, tuple(notes), next(iter(numbers), None))
 
 
 def _noted(what: str, make: Callable[[], None]) -> tuple[str, ...]:

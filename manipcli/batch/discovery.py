@@ -8,11 +8,8 @@ from pathlib import Path
 
 from manipcli.batch.first_look import SUFFIXES, first_look
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
-from manipcli.judge.measured_run import Variant
-from manipcli.report.suite.suite import AGREEMENT, Case
-
-ENGINE = "engine_"
-"""Beginning of the tag with the engine."""
+from manipcli.judge.measured_run import variants_of
+from manipcli.report.suite.suite import AGREEMENT, ENGINE, Case
 
 
 def read_case(path: Path, *, shown: str | None = None) -> Case:
@@ -76,9 +73,7 @@ def variants_of_case(case: Case, engines: Sequence[str], *, check_step: bool) ->
     if case.findings or not (engines or check_step):
         return (case,)
     tags = tuple(tag for tag in case.tags if not tag.startswith(ENGINE))
-    own = next((tag.removeprefix(ENGINE) for tag in case.tags if tag.startswith(ENGINE)), "")
-    halves = (False, True) if check_step else (False,)
-    variants = tuple(Variant(engine, half) for engine in (engines or (own,)) for half in halves)
+    variants = variants_of(engines or (case.engine,), check_step=check_step)
     runs = (replace(case, variant=variant, tags=(*tags, f"{ENGINE}{variant.engine}")) for variant in variants)
     return (*runs, replace(case, compared=variants, tags=(*tags, AGREEMENT)))
 

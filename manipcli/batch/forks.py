@@ -33,8 +33,6 @@ main(int(sys.argv[2]))
 """The server has the module path of its parent, and not the working directory (`-P`)."""
 ONE_THREAD: Final = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 """Default environment: with one run per core, threads of libraries would compete for the cores."""
-ENGINE: Final = "engine_"
-"""Prefix of the tag that names the engine of a case."""
 START_TIME: Final = 120.0
 """[s] limit for the imports of a server."""
 ANSWER_TIME: Final = 20.0
@@ -252,7 +250,7 @@ class ForkPool:
         if self._first is None:
             return None
         first = self._first
-        engine = next((tag.removeprefix(ENGINE) for tag in job.case.tags if tag.startswith(ENGINE)), "")
+        engine = job.case.engine
         try:
             forked = first.fork(channel, output, engine=engine)
         except (NoFork, OSError) as cause:

@@ -1,18 +1,15 @@
-"""`--engines` and `--check-step` of `run` and `test`, and the runs that they select."""
+"""`--engines` and `--check-step` of `run` and `test`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, listed
-
-if TYPE_CHECKING:
-    from manipcli.judge.measured_run import Variant
 
 Engines = Annotated[
     str | None,
@@ -57,14 +54,6 @@ def engine_names(word: str | None, *, check_step: bool, overrides: Sequence[str]
     if findings:
         raise InvalidInput(findings)
     return names
-
-
-def variants_of(engines: Sequence[str], *, check_step: bool) -> tuple[Variant, ...]:
-    """The runs: each engine, with `check_step` followed by its run at half the step."""
-    from manipcli.judge.measured_run import Variant
-
-    halves = (False, True) if check_step else (False,)
-    return tuple(Variant(engine, half_step) for engine in engines for half_step in halves)
 
 
 def _finding(word: str, message: str, hint: str | None) -> Diagnostic:

@@ -17,7 +17,7 @@ class TrackingError:
 
     Args:
         reference: (2, n) positions and velocities, read at every `update`.
-        facts: of joints of which some are endless: their error is the shortest rotation; None: none is.
+        facts: of the joints; the error of an endless joint is the shortest rotation. None: no joint is endless.
 
     Attributes:
         errors: (2, n), overwritten at every `update`.

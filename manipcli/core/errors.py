@@ -108,9 +108,9 @@ class InvalidArgument(InvalidInput, ValueError):
         super().__init__((Diagnostic(code=code, message=message, hint=hint),))
 
 
-RefusalReason = Literal["orientation", "touches", "in_the_way", "line"]
+RefusalReason = Literal["orientation", "touches", "in_the_way", "line", "constraint"]
 """`orientation`: the arm cannot reach the tool orientation; `touches`: every solution is in collision; `in_the_way`: an
-obstacle blocks the motion; `line`: the tool cannot follow a straight line."""
+obstacle blocks the motion; `line`: the tool cannot follow a straight line; `constraint`: a `keep` is violated."""
 
 
 class NotPlannable(ManipcliError):

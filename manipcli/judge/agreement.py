@@ -32,7 +32,7 @@ class Disagreement:
         outcomes: in the two runs; empty for a number.
         texts: the reason of each outcome, "" without one.
         values: numbers of the two runs; None where there are none.
-        allowed: the allowed difference; None where none is.
+        allowed: the allowed difference of a number; None without a limit.
         place: in the task file.
     """
 

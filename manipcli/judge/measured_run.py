@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -23,6 +23,12 @@ class Variant(NamedTuple):
     def name(self) -> str:
         """`mujoco`, `mujoco-half_step`: in ids of tests, names of logs and tables."""
         return f"{self.engine}-{HALF_STEP}" if self.half_step else self.engine
+
+
+def variants_of(engines: Sequence[str], *, check_step: bool) -> tuple[Variant, ...]:
+    """The runs of a task: in each engine, with `check_step` followed by its run at half the step."""
+    halves = (False, True) if check_step else (False,)
+    return tuple(Variant(engine, half_step) for engine in engines for half_step in halves)
 
 
 def engine_override(variant: Variant) -> str:

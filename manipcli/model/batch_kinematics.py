@@ -70,6 +70,15 @@ def still_links(robot: RobotModel) -> frozenset[str]:
     return frozenset(name for name, (joint, _) in link_places(robot).items() if joint < 0)
 
 
+def joints_above(robot: RobotModel, last: int) -> tuple[int, ...]:
+    """Indices of the moving joints from the base to moving joint `last`, included; -1 is the world."""
+    before, chain = _terms(robot).before, []
+    while last >= 0:
+        chain.append(last)
+        last = before[last]
+    return tuple(reversed(chain))
+
+
 class _Terms:
     """The constants of a robot's moving joints, relative to the parent link and to the moving joint `before`."""
 

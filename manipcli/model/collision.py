@@ -24,9 +24,10 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.motion_bound import MotionBound, Mover
 from manipcli.model.self_collision import lasting_overlaps
 from manipcli.scene.scene import Scene
-from manipcli.shapes.proximity import coal_shape
+from manipcli.shapes.proximity import bounding_ball, coal_shape
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from manipcli.shapes.proximity import CollisionGeometry
 
 RESOLUTION = 0.01  # rad or m: largest joint motion between two checked positions of a trajectory
+_LIGHTEST = 0.05  # weight of a pair that moves little
 _SEEN = 5e-5  # m: smaller values would be printed as 0.0 mm
 
 Pair = tuple[str, str]
@@ -172,6 +174,12 @@ class CollisionQuery:
 
         self._pin = pin
         self._kinematics = kinematics
+        self.margin = margin
+        self._own_margins = margins
+        self._inflated: dict[tuple[float, ...], InflatedQuery] = {}
+        self._parts = tuple(parts)
+        self._made = (kinematics, self._parts, near, allowed)
+        self._only = only
         self._names = [part.name for part in parts]
         self._geometry = pin.GeometryModel()
         for k, part in enumerate(parts):
@@ -207,6 +215,12 @@ class CollisionQuery:
         """Of the robot."""
         return self._kinematics
 
+    @property
+    def pairs(self) -> frozenset[Pair]:
+        """The pairs of parts that are checked."""
+        names = self._names
+        return frozenset((names[pair.first], names[pair.second]) for pair in self._geometry.collisionPairs)
+
     def check(self, q: npt.ArrayLike) -> CollisionHit | None:
         """The deepest touching pair at joint positions `q` (n) of all moving joints; None without a contact."""
         return min(self.every(q), key=lambda hit: hit.distance) if self.touches(q) else None
@@ -228,6 +242,23 @@ class CollisionQuery:
                 depth = min(float(contact.penetration_depth) for contact in result.getContacts())
                 deepest[a, b] = min(depth, deepest.get((a, b), np.inf))
         return tuple(CollisionHit(a=a, b=b, distance=depth) for (a, b), depth in sorted(deepest.items()))
+
+    @property
+    def least_margin(self) -> float:
+        """The smallest margin [m] of any pair."""
+        return min((self.margin, *self._own_margins.values()))
+
+    def nearer(self, share: float) -> CollisionQuery:
+        """The same query with this share of every margin."""
+        margins = {pair: share * margin for pair, margin in self._own_margins.items()}
+        return CollisionQuery(*self._made, share * self.margin, margins=margins, only=self._only)
+
+    def inflated(self, levels: Sequence[float]) -> InflatedQuery:
+        """The same query with larger margins [m]; see `InflatedQuery`."""
+        key = tuple(levels)
+        if key not in self._inflated:
+            self._inflated[key] = InflatedQuery(self, key)
+        return self._inflated[key]
 
     def check_trajectory(
         self,
@@ -254,6 +285,69 @@ class CollisionQuery:
         return None
 
 
+class InflatedQuery:
+    """A query with several margins: at level c every pair has its margin, plus `levels[c]` times the pair's weight; the
+    first of the levels is 0.
+
+    The weight is the pair's motion for equal speeds of all joints, relative to the pair that moves most.
+
+    Attributes:
+        bound: bounds of the motion of the movers.
+        summed: (movers, pairs) 1 where a mover's motion changes the distance of a pair; pairs of one link with bodies
+            of the scene are one column.
+        weights: (pairs).
+    """
+
+    def __init__(
+        self,
+        query: CollisionQuery,
+        levels: Sequence[float],
+    ) -> None:
+        self._query = query
+        self._pin, self._kinematics, self._geometry = query._pin, query._kinematics, query._geometry
+        parts, kinematics, geometry = query._parts, query._kinematics, query._geometry
+        self._data = kinematics.model.createData()
+        moves = _moves(kinematics.model)
+        movers: dict[tuple[int, int], int] = {}
+        columns: dict[tuple[int, ...], int] = {}
+        self._column: list[int] = []  # of every pair
+        for pair in geometry.collisionPairs:
+            i, j = pair.first, pair.second
+            a, b = parts[i].joint, parts[j].joint
+            rows = []
+            if moves[a][b]:
+                rows.append(movers.setdefault((i, b), len(movers)))
+            if moves[b][a]:
+                rows.append(movers.setdefault((j, a), len(movers)))
+            self._column.append(columns.setdefault(tuple(rows), len(columns)))
+        self.bound = MotionBound(kinematics, [_mover(parts[k], seen_from) for k, seen_from in movers])
+        self.summed = np.zeros((len(movers), len(columns)))
+        for key, column in columns.items():
+            self.summed[list(key), column] = 1.0
+        reach = self.bound.reach.sum(axis=1) @ self.summed
+        self.weights = np.maximum(reach / max(1e-9, float(reach.max(initial=0.0))), _LIGHTEST)
+        self._margins = [c * self.weights for c in levels]
+        self._levels: list[tuple[pin.GeometryData, object] | None] = [None] * len(levels)
+
+    def touches(self, q: Array, level: int) -> bool:
+        """Whether any parts are closer than their margin of this level."""
+        if level == 0:
+            return self._query.touches(q)
+        made = self._levels[level]
+        if made is None:
+            made = self._levels[level] = self._make(self._margins[level])
+        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, made[1], q, True))
+
+    def _make(self, margins: Array) -> tuple[pin.GeometryData, object]:
+        pin = self._pin
+        state = pin.GeometryData(self._geometry)
+        own = self._query._state.collisionRequests
+        for request, least, column in zip(state.collisionRequests, own, self._column, strict=True):
+            request.security_margin = least.security_margin + float(margins[column])
+        broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._kinematics.model, self._geometry, state)
+        return state, broad
+
+
 @dataclass(frozen=True, slots=True)
 class _Part:
     """A shape of a link or of a body; `placement` is in the frame of `joint` (0: the world)."""
@@ -263,6 +357,19 @@ class _Part:
     joint: int
     placement: pin.SE3
     shape: CollisionGeometry
+
+
+def _moves(model: pin.Model) -> list[list[bool]]:
+    """[a][b]: whether some joint moves what is fixed to joint a relative to what is fixed to b (0: the world)."""
+    chains: list[set[int]] = [set()]
+    for k in range(1, model.njoints):
+        chains.append({*chains[model.parents[k]], k})
+    return [[not a <= b for b in chains] for a in chains]
+
+
+def _mover(part: _Part, seen_from: int) -> Mover:
+    centre, radius = bounding_ball(part.shape)
+    return Mover(part.joint, seen_from, part.placement.act(centre), radius)
 
 
 def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:

@@ -7,6 +7,8 @@ Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 (inverse
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,6 +113,17 @@ class Kinematics:
         V = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         linear: Array = V.linear
         return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
+
+    def carrying(self, link: str, loads: Iterable[tuple[float, Transform, Array]]) -> Kinematics:
+        """The same robot with rigid `loads` on a link: mass [kg], X_LI of its inertial frame, inertia (3, 3) in I."""
+        other = copy(self)
+        other._model = model = self._model.copy()
+        frame = model.frames[self._frames[link]]
+        for mass, X_LI, inertia in loads:
+            body = self._pin.Inertia(mass, np.zeros(3), np.array(inertia))
+            model.appendBodyToJoint(frame.parentJoint, body, frame.placement * self._se3(X_LI))
+        other._data = model.createData()
+        return other
 
     def gravity(self, q: Array) -> Array:
         """g(q) (n,) [N m or N], the gravity load of the joints. A view, overwritten by the next call."""

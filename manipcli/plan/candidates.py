@@ -51,12 +51,14 @@ class Candidates:
             its own.
         decides: what later steps depend on; the search comes back only to steps that decide something.
         explain: (refusal of all) -> the same with a better hint.
+        further: the candidates after these, if there are any: costlier ones. Their refusal counts, not that of these.
     """
 
     options: Iterable[Candidate]
     what: str = ""
     decides: Decision = "nothing"
     explain: Callable[[NotPlannable], NotPlannable] = lambda refusal: refusal
+    further: Callable[[], Candidates | None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,11 @@ class Attempts:
                 return Chosen(candidate, candidate.plan(), tuple(self.dropped))
             except NotPlannable as refusal:
                 self.dropped.append(Dropped(candidate.name, refusal))
-        raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
+        further = self._candidates.further()
+        if further is None:
+            raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
+        self._candidates, self._options, self.dropped = further, iter(further.options), []
+        return self.take()
 
 
 def first(candidates: Candidates, exclude: Iterable[Array] = ()) -> StepPlan:

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
-from manipcli.model.collision import CollisionQuery
+from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 
@@ -106,3 +107,18 @@ def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequenc
         own = {f"robot/{link}" for link in moved_links(robot, [joints[j] for j in finger])}
         found += sorted((hit.distance, link) for hit in hits for link in {hit.a, hit.b} & own)[:1]
     return min(found)[1] if found and len(found) >= min(2, len(parts)) else None
+
+
+def closed_hand(joint: str, carried: Carried | None) -> NotPlannable:
+    """The refusal of a motion of a joint of a hand that an earlier step closed."""
+    what = "an earlier step closed" if carried is None else f"holds '{carried.body}'"
+    hint = f"open the hand with `release`{'' if carried is None else ' or `place`'}"
+    return NotPlannable(f"joint '{joint}' belongs to the hand, which {what}", hint=hint)
+
+
+def no_gripper(posture: str) -> NotPlannable:
+    """The refusal of a step that moves the hand to a pose without a gripper controller."""
+    return NotPlannable(
+        f"pose '{posture}' has no joint that a gripper controller moves",
+        hint="add a controller of type `gripper` for the hand's joints to the controllers file",
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limit_check import overshoot, verify
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.retimer import retime
+from manipcli.plan.timing_bound import TimingBound
 from manipcli.plan.trajectory import JointTrajectory
 
 Walk = Callable[[InverseKinematics], Array]
@@ -22,7 +23,13 @@ _TRIES: Final = 3  # one attempt repairs 46 of 64 random lines along limits, thr
 
 
 def timed_line(
-    walk: Walk, solver: InverseKinematics, limits: MotionLimits, *, period: float, insist: bool
+    walk: Walk,
+    solver: InverseKinematics,
+    limits: MotionLimits,
+    *,
+    period: float,
+    insist: bool,
+    bounds: Callable[[Array], Sequence[TimingBound]] = lambda _: (),
 ) -> JointTrajectory:
     """The fastest motion along what `walk` finds, at rest at both ends.
 
@@ -37,11 +44,17 @@ def timed_line(
         limits: of the same joints, in their order.
         period: control period [s].
         insist: see above.
+        bounds: on the timing of a joint path (k, n).
 
     Raises:
         NotPlannable: there is no such path, or its motion exceeds a limit.
     """
-    trajectory = retime(walk(solver), limits, period=period)
+
+    def timed(solver: InverseKinematics) -> JointTrajectory:
+        points = walk(solver)
+        return retime(points, limits, period=period, bounds=bounds(points))
+
+    trajectory = timed(solver)
     margin = np.zeros(len(limits.names))
     for _ in range(_TRIES if insist else 0):
         over = overshoot(trajectory, limits)
@@ -49,7 +62,7 @@ def timed_line(
             break
         margin += 2.0 * over
         try:
-            trajectory = retime(walk(solver.drawn_in(margin)), limits, period=period)
+            trajectory = timed(solver.drawn_in(margin))
         except NotPlannable:  # the line needs that joint throughout: `verify` reports the limit that it exceeds
             break
     verify(trajectory, limits)

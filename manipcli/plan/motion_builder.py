@@ -5,33 +5,33 @@ Every motion is timed, verified against the limits and free of collisions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
-from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
+from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
-from manipcli.plan.hand import closed_on, pressing
+from manipcli.plan import constrained_motion as timed
+from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
+from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
-from manipcli.plan.line import Walk, timed_line
+from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
-from manipcli.plan.planner import NOTHING, InTheWay, Pairs, Planner
+from manipcli.plan.path import ANGULAR_STEP, follow_poses, joint_path, linear_path
+from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
-from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sweep import grip_time, refuse_collision
-from manipcli.plan.trajectory import CUBIC, JointTrajectory
-from manipcli.plan.trajectory_sampling import LONGEST
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory_sampling import resampled
 
-BRANCH = 0.3
-"""[rad or m] Configurations of the arm that differ by less in every joint count as the same."""
 GRAZE = 1e-4
 """[m] How much nearer than before a withdrawing finger may come: rounding, and the arm's own curve."""
 
@@ -78,8 +78,10 @@ class MotionBuilder:
         empty = replace(self._now, carried=None, closed=False)
         return empty if grip is None else empty.moved(self._with(grip.joints, grip.target))
 
-    def joints(self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0) -> None:
-        """Move straight in joint space; joints of the hand are moved by their own controller at the same time.
+    def joints(
+        self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0, free: bool = True
+    ) -> None:
+        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.
@@ -88,16 +90,13 @@ class MotionBuilder:
         values = dict(zip(names, target, strict=True))
         arm = [name for name in names if name not in hand]
         if self._now.closed and len(arm) < len(names):
-            carried = self._now.carried
-            what = "an earlier step closed" if carried is None else f"holds '{carried.body}'"
-            named = next(name for name in names if name in hand)
-            raise NotPlannable(
-                f"joint '{named}' belongs to the hand, which {what}",
-                hint=f"open the hand with `release`{'' if carried is None else ' or `place`'}",
-            )
-        with self._labelled(label):
-            trajectory = self._rest_to_rest(arm, [values[name] for name in arm], speed) if arm else None
-        self._add(label, trajectory, self._grip({name: values[name] for name in names if name in hand}))
+            raise closed_hand(next(name for name in names if name in hand), self._now.carried)
+        grip = self._grip({name: values[name] for name in names if name in hand})
+        if arm:
+            goal = np.array([values[name] for name in arm])
+            self._free(label, self._limits(arm, speed), goal, grip, (lambda _: goal[None]) if free else None)
+        else:
+            self._add(label, None, grip)
 
     def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
         """Why no free configuration of the arm has the tool at `X_WT` and the hand at its pose `hand`; None if any has.
@@ -119,13 +118,15 @@ class MotionBuilder:
         speed: float = 1.0,
         hand: str | None = None,
         free: bool = False,
+        searched: bool = True,
         leaving: Open = "nothing",
         avoid: Sequence[Array] = (),
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
         Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
-        path is. So are those near one of `avoid`, (n) each. Part of the orientation may be left open.
+        path is. So are those near one of `avoid`, (n) each. Part of the orientation may be left open. Where no straight
+        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`).
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
@@ -133,8 +134,28 @@ class MotionBuilder:
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid)
-            trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
-        self._add(label, trajectory, grip)
+        limits = self._limits(solver.joints, speed)
+
+        def goals(rng: np.random.Generator) -> Array:
+            return branches(solver, X_WT, goal, rng, query=self._query(), limits=limits)
+
+        self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=X_WT)
+
+    def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
+        """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
+
+        What holds contents is only moved on the line, which keeps it upright.
+        """
+        planner, carried = self._planner, self._now.carried
+        try:
+            self.straight(label, X_WT, speed=speed)
+        except NotPlannable as refusal:
+            if carried is None or planner.contents(self._now, carried.body) or planner.searching() is None:
+                raise
+            try:
+                self.reach(label, X_WT, speed=speed)
+            except NotPlannable as other:
+                raise (other if other.reason == "in_the_way" else refusal) from None
 
     def straight(
         self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
@@ -144,8 +165,23 @@ class MotionBuilder:
         A line that is the step itself may run along joint limits.
         """
         with self._labelled(label):
-            trajectory = self._straight(X_WT, speed, insist=label == self._verb, leaving=leaving)
+            walk = partial(linear_path, q=self._now.position, X_WT=X_WT)
+            trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
+
+    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Open = "nothing") -> None:
+        """Move the tool through near poses, from the present one; part of the orientation may be left open."""
+        with self._labelled(label):
+            walk = partial(follow_poses, q=self._now.position, poses=poses)
+            trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
+        self._add(label, trajectory, None)
+
+    def through(self, label: str, names: Sequence[str], waypoints: Array) -> None:
+        """Move along a smooth curve through `waypoints` (k, n) as fast as the limits allow; the first is here."""
+        with self._labelled(label):
+            limits = self._limits(names, 1.0)
+            trajectory = timed.smooth_motion(self._planner, self._now, label, limits, joint_path(waypoints))
+        self._add(label, trajectory, None)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
         """Move the tool on a straight line to a pose, away from a `body` that the now open hand was closed on.
@@ -154,7 +190,7 @@ class MotionBuilder:
         body that does not sit in the middle of the hand.
         """
         with self._labelled("withdraw"):
-            trajectory = self._straight(X_WT, speed)
+            trajectory = self._timed("withdraw", partial(linear_path, q=self._now.position, X_WT=X_WT), speed)
         allowed = NOTHING
         if grazing:
             planner = self._planner
@@ -171,24 +207,16 @@ class MotionBuilder:
             Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
             for k in range(count + 1)
         ]
-        with self._labelled(label):
-            trajectory = self._timed(lambda solver: follow_poses(solver, self._now.position, poses), speed)
-        self._add(label, trajectory, None)
+        self.along(label, poses, speed=speed)
 
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
 
-        Limits are symmetric and the path was free forwards, so nothing is planned or checked.
+        Limits are symmetric and the path was free forwards: only torques are checked, as friction acts the other way.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
-        assert (
-            done.velocities is not None and done.accelerations is not None
-        )  # every motion but those of `follow` has both
-        trajectory = JointTrajectory.of_arrays(
-            names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
-            velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
-        )  # fmt: skip
-        self._accept(label, trajectory, None, trajectory.duration)
+        trajectory = timed.reversed_motion(self._planner, self._now, label, done)
+        self._accept(label, trajectory, None)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
         """Follow given points from the end of the last motion, sampled at every control tick and at their end.
@@ -201,18 +229,10 @@ class MotionBuilder:
         Raises:
             NotPlannable: it exceeds them, takes longer than `LONGEST`, or is in collision.
         """
-        if points.duration > LONGEST:
-            raise NotPlannable(f"the trajectory takes {points.duration:g} s; the limit is {LONGEST:g} s")
-        period = self._planner.period
-        ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
-        times = np.append(np.arange(ticks) * period, points.duration)
-        q, v, a = points.sample(times)
-        smooth = bool(np.isfinite(limits.acceleration).all())
-        trajectory = JointTrajectory.of_arrays(
-            points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
-        )
+        trajectory = resampled(points, limits, self._planner.period)
         with self._labelled(label):
             verify(trajectory, limits, given=points)
+            timed.refuse_violation(self._planner, self._now, label, trajectory)
         self._add(label, trajectory, None)
 
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
@@ -233,10 +253,9 @@ class MotionBuilder:
         planner = self._planner
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
-            raise _no_gripper(posture)
-        duration = grip_time(self._planner, self._now, grip)
+            raise no_gripper(posture)
         if body is None:
-            self._accept(CLOSING, None, grip, duration)
+            self._accept(CLOSING, None, grip)
             self._now = replace(self._now, closed=True)
             return
         query = planner.grasping(self._now, body)
@@ -254,12 +273,9 @@ class MotionBuilder:
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
-        self._motions.append(
-            Motion(
-                CLOSING, trajectory=None, grip=grip, duration=duration, begins=self._now,
-                allowed=self._allowed | planner.hand_contacts(body),
-            )
-        )  # fmt: skip
+        allowed = self._allowed | planner.hand_contacts(body)
+        duration = grip_time(planner, self._now, grip)
+        self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed))
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
@@ -273,7 +289,7 @@ class MotionBuilder:
         """
         grip = self._grip(self._posture(posture))
         if grip is None:
-            raise _no_gripper(posture)
+            raise no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
             held = self._now.carried.body
@@ -297,15 +313,8 @@ class MotionBuilder:
         """Predict the contents of the carried object on the floor of the container `into`."""
         self._now = spilled(self._planner, self._now, into)
 
-    @contextmanager
-    def _labelled(self, label: str) -> Iterator[None]:
-        """Prefixes refusals with the label of their motion."""
-        try:
-            yield
-        except NotPlannable as refusal:
-            if label == self._verb:
-                raise
-            raise refusal.but(cause=f"{label}: {refusal.cause}", motions=tuple(self._motions)) from refusal
+    def _labelled(self, label: str) -> AbstractContextManager[None]:
+        return labelled(label, self._verb, self._motions)
 
     def _solved(
         self,
@@ -319,22 +328,7 @@ class MotionBuilder:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        query = self._query()
-
-        def refuse(q: Array) -> object | None:
-            if any(np.abs(q - other).max() < BRANCH for other in avoid):
-                return "the arm has a configuration that was tried"
-            hit = query.check(q)
-            if hit is not None or not free:
-                return None if hit is None else planner.in_the_way(hit)
-            count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
-            share = np.linspace(0.0, 1.0, count + 1)
-            blocked = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
-            if blocked is None:
-                return None
-            text, parts = planner.in_the_way(blocked)
-            return InTheWay(f"{text}, on the path there", parts)
-
+        refuse = refusing(planner, self._query(), seed, free=free, avoid=avoid)
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
     def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
@@ -347,51 +341,43 @@ class MotionBuilder:
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
 
-    def _rest_to_rest(self, names: Sequence[str], target: npt.ArrayLike, speed: float) -> JointTrajectory:
-        limits = self._limits(names, speed)
-        start = self._now.position[self._planner.robot.indices(tuple(names))]
-        trajectory = rest_to_rest(start, target, limits, period=self._planner.period)
-        verify(trajectory, limits)
-        return trajectory
+    def _free(
+        self, label: str, limits: MotionLimits, target: Array, grip: Grip | None, goals: Goals | None,
+        line: Transform | None = None,
+    ) -> None:  # fmt: skip
+        """Add a motion straight to `target`; where it is in collision and `goals` are given, around obstacles.
 
-    def _straight(
-        self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+        `line`: the tool pose at the target, if the arm may arrive there in another configuration.
+        """
+        query, end = self._query(), self._with(limits.names, target)
+        with self._labelled(label):
+            straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
+        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
+        self._accept(label, free, grip)
+
+    def _timed(
+        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
-        return self._timed(
-            lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist, leaving=leaving
-        )
-
-    def _timed(self, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing") -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
-        solver = self._planner.solver.leaving(leaving)
-        return timed_line(walk, solver, limits, period=self._planner.period, insist=insist)
+        return timed.tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
         """Accept a motion if it is free of collisions."""
         query, move = self._query(allowed), self._verb == "move"
-        try:
+        length = 0.0 if trajectory is None else trajectory.duration
+        with tried(*self._motions, Motion(label, trajectory, grip=None, duration=length, begins=self._now)):
             refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
-        except NotPlannable as refusal:
-            tried = Motion(
-                label, trajectory, None, 0.0 if trajectory is None else trajectory.duration, begins=self._now
-            )
-            raise refusal.but(motions=(*self._motions, tried)) from refusal
-        duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
-        whole = duration if trajectory is None else max(duration, trajectory.duration)
-        self._accept(label, trajectory, grip, whole, allowed=allowed)
+        self._accept(label, trajectory, grip, allowed=allowed)
 
     def _accept(
-        self,
-        label: str,
-        trajectory: JointTrajectory | None,
-        grip: Grip | None,
-        duration: float,
-        *,
-        allowed: Pairs = NOTHING,
+        self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
         before = self._now
+        duration = 0.0 if grip is None else grip_time(self._planner, before, grip)
+        if trajectory is not None:
+            duration = max(duration, trajectory.duration)
         if grip is not None:
             self._now = self._now.moved(self._with(grip.joints, grip.target))
         if trajectory is not None:
@@ -413,10 +399,3 @@ class MotionBuilder:
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
         return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
-
-
-def _no_gripper(posture: str) -> NotPlannable:
-    return NotPlannable(
-        f"pose '{posture}' has no joint that a gripper controller moves",
-        hint="add a controller of type `gripper` for the hand's joints to the controllers file",
-    )

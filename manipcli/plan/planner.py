@@ -22,9 +22,13 @@ from manipcli.plan.claimed_joints import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.motion import PlanningState
+from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
+from manipcli.plan.path_search import PathSearch
 from manipcli.scene.scene import Interior, Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.shapes.primitives import Cylinder
+from manipcli.spec.keep import KeepSpec
+from manipcli.spec.planner import PlannerSpec
 
 Pairs = frozenset[Pair]
 """Pairs of parts that may touch; a part is a body, or `robot/<link>`."""
@@ -35,7 +39,7 @@ CLEARANCE = 0.004
 TOUCHING = 0.0045
 """[m] Bodies nearer than this count as touching: what a held object may leave or approach. It is above the clearance,
 so that every body within the clearance is exempt."""
-NO_WAY_AROUND = "first `move` to a pose from which the path is free (no path around obstacles is searched)"
+NO_WAY_AROUND = "first `move` to a pose from which the path is free"
 """The hint for a motion that is in collision."""
 PUT_APART = "move them apart: set `start: POSE` in the task, or `mount` in the robot file to move its base"
 """The hint for a robot that is too near to something before it moves."""
@@ -72,6 +76,7 @@ class Planner:
         gripper_speed: float,
         clearance: float = CLEARANCE,
         clearances: Mapping[frozenset[str], float] = {},
+        paths: PlannerSpec | None = None,
     ) -> None:
         """
         Args:
@@ -82,6 +87,7 @@ class Planner:
             gripper_speed: of the hand's references [rad/s or m/s].
             clearance: distance [m] that parts keep which must not touch.
             clearances: the same for single pairs of parts.
+            paths: settings of the search for paths around obstacles; None: the defaults.
         """
         self.clearance = clearance
         self.clearances = clearances
@@ -98,8 +104,25 @@ class Planner:
         hand |= {joint.parent for joint in robot.joints if joint.name in gripper_joints}
         ignore = (*robot.collision_ignore, *combinations(sorted(hand), 2))
         self.checker = CollisionChecker(self.kinematics, scene, ignore=ignore)
+        self.keep: tuple[KeepSpec, ...] = ()
         self._solver: InverseKinematics | None = None
         self._queries: dict[tuple[object, ...], CollisionQuery] = {}
+        self._paths = RrtConnectSpec() if paths is None else paths
+        self._search: PathSearch | None = None
+        self._obstructed = False
+
+    def searching_paths(self) -> Planner | None:
+        """A view that searches paths where a free motion is obstructed; None if no motion was, or none is searched."""
+        if not (self._obstructed and self._paths.samples):
+            return None
+        view = copy(self)
+        view._search = PathSearch.of(self._paths, self.rng)
+        return view
+
+    def searching(self) -> PathSearch | None:
+        """The search for a motion that is not free on its straight path; None while only those are tried."""
+        self._obstructed = True
+        return self._search
 
     @property
     def solver(self) -> InverseKinematics:
@@ -129,13 +152,22 @@ class Planner:
         return self.solver.link
 
     def allowing(self, pairs: Pairs) -> Planner:
-        """The same planner for a step in which these pairs may touch; it shares everything else."""
-        if not pairs:
-            return self
+        """A view for one attempt at a step, in which these pairs may touch; it shares everything else."""
         with suppress(NotPlannable):
             _ = self.solver  # made once, for both
         other = copy(self)
         other._allowed = self._allowed | pairs
+        other._obstructed, other._search = False, None
+        return other
+
+    def keeping(self, keep: tuple[KeepSpec, ...]) -> Planner:
+        """The same planner for a step with these constraints; it shares everything else."""
+        if not keep:
+            return self
+        with suppress(NotPlannable):
+            _ = self.solver  # made once, for both
+        other = copy(self)
+        other.keep = keep
         return other
 
     def keeps(self, a: str, b: str) -> float:

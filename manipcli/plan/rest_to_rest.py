@@ -7,23 +7,34 @@ acceleration and jerk; Ruckig (Berscheid and Kroeger, RSS 2021) solves that one-
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.plan.motion_limits import MotionLimits
+from manipcli.plan.timing_bound import TimingBound
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.trajectory_sampling import on_ticks, refuse_endless
 
 
-def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits, *, period: float) -> JointTrajectory:
+def rest_to_rest(
+    start: npt.ArrayLike,
+    goal: npt.ArrayLike,
+    limits: MotionLimits,
+    *,
+    period: float,
+    bounds: Sequence[TimingBound] = (),
+) -> JointTrajectory:
     """The fastest straight move from `start` to `goal` (n) within `limits`, one point per control tick.
 
     Args:
         start, goal: (n) in the order of `limits.names`, rad or m.
         limits: velocity, acceleration, and jerk where finite.
         period: control period [s].
+        bounds: kept by stretching time.
 
     Raises:
         NotPlannable: the limits make it too long, or a position is not finite.
@@ -56,7 +67,7 @@ def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits
     def curve(times: Array) -> tuple[Array, Array, Array]:
         return _line(q0, delta, np.array([profile.at_time(t) for t in times.tolist()]).reshape(-1, 3))
 
-    return on_ticks(curve, profile.duration, target=q1, limits=limits, period=period)
+    return on_ticks(curve, profile.duration, target=q1, limits=limits, period=period, bounds=bounds)
 
 
 def _line(q0: Array, delta: Array, s: Array) -> tuple[Array, Array, Array]:

@@ -7,7 +7,7 @@ controller goals.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from manipcli.conditions.condition import Problem
@@ -15,7 +15,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.motion import PlanningState, StepPlan, Switch
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
@@ -44,6 +44,7 @@ class StepMember(Generic[S]):
         request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
+        moves: whether it moves the arm, so that `keep` means something.
     """
 
     name: str
@@ -53,11 +54,25 @@ class StepMember(Generic[S]):
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
+    moves: bool = True
 
     def plan(self, spec: S, planner: Planner, state: PlanningState) -> StepPlan:
-        """The plan of the first candidate that has one.
+        """The plan of the first candidate that has one, with straight paths only.
 
         Raises:
             NotPlannable: none has.
         """
         return first(self.candidates(spec, planner, state))
+
+    def ways(self, spec: S, planner: Planner, state: PlanningState, allowed: Pairs = NOTHING) -> Candidates:
+        """The candidates with straight paths; then, if a free motion was obstructed, those with searched paths.
+
+        `allowed`: pairs of parts that may touch.
+        """
+        straight = planner.allowing(allowed)
+
+        def around() -> Candidates | None:
+            view = straight.searching_paths()
+            return None if view is None else self.candidates(spec, view, state)
+
+        return replace(self.candidates(spec, straight, state), further=around)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.model.collision import RESOLUTION, CollisionQuery
+from manipcli.model.collision import RESOLUTION, CollisionHit, CollisionQuery
 from manipcli.model.configuration import with_mimics
+from manipcli.model.edge_check import EdgeCheck
 from manipcli.plan.hand import ramp
 from manipcli.plan.motion import Grip, PlanningState
 from manipcli.plan.planner import Planner
@@ -67,7 +70,41 @@ def refuse_collision(
     Raises:
         NotPlannable: names the pair, and the time in the motion of this `label`.
     """
+    hit = first_hit(planner, state, query, trajectory, grip)
+    if hit is not None:
+        raise blocked(planner, state, hit, label, move=move)
+
+
+def first_hit(
+    planner: Planner,
+    state: PlanningState,
+    query: CollisionQuery,
+    trajectory: JointTrajectory | None,
+    grip: Grip | None,
+    *,
+    slack: float | None = None,
+) -> CollisionHit | None:
+    """The first collision of this motion with the `query`, at points a fixed step apart.
+
+    Where they are free and the query has a margin, the bound of the motion between them is checked, too (`EdgeCheck`,
+    with this `slack`).
+    """
     times, positions = swept(planner, state, trajectory, grip)
     hit = query.check_trajectory(range(positions.shape[1]), state.position, times, positions)
-    if hit is not None:
-        raise planner.refusal(state, hit, "comes", f"at t = {hit.time:.2f} s of '{label}'", move=move)
+    if hit is not None or query.margin <= 0.0 or len(positions) < 2:
+        return hit
+    check = EdgeCheck(query, slack=slack)
+    where = check.free_polyline(positions)
+    if where is None:
+        return None
+    assert check.blocked is not None
+    near = query.check(check.blocked)
+    assert near is not None
+    return replace(near, time=float(times[where]))
+
+
+def blocked(
+    planner: Planner, state: PlanningState, hit: CollisionHit, label: str, *, move: bool = False
+) -> NotPlannable:
+    """The refusal of the motion of this `label`, which begins in `state`, for a collision."""
+    return planner.refusal(state, hit, "comes", f"at t = {hit.time:.2f} s of '{label}'", move=move)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.timing_bound import TimingBound, kept
+from manipcli.plan.trajectory import CUBIC, JointTrajectory
 
 Curve = Callable[[Array], tuple[Array, Array, Array]]
 """times (k,) [s] -> position, velocity, acceleration, each (k, n)."""
@@ -70,6 +71,7 @@ def on_ticks(
     target: Array,
     limits: MotionLimits,
     period: float,
+    bounds: Sequence[TimingBound] = (),
 ) -> JointTrajectory:
     """Sample `curve` over [0, nominal] at every multiple of `period`, stretched to end on a tick, at rest on `target`.
 
@@ -80,7 +82,7 @@ def on_ticks(
         curve: rest-to-rest motion.
         nominal: its duration [s].
         target: (n) position at its end, reached exactly.
-        limits: what the samples must keep.
+        limits, bounds: what the samples must keep.
         period: control period [s].
 
     Raises:
@@ -97,10 +99,49 @@ def on_ticks(
         q, v, a = curve(np.minimum(times * scale, nominal))
         v, a = v * scale, a * scale**2
         q[-1], v[-1], a[-1] = target, 0.0, 0.0
-        over = excess(v, a, limits, period=period)
+        over = max([excess(v, a, limits, period=period), *(bound.stretch(q, v, a) for bound in bounds)])
         if over <= 1.0 + 1e-9:
             break
         stretch = over * (1.0 + 1e-9) / scale
     return JointTrajectory.of_arrays(
         names=limits.names, times=frozen(times), positions=frozen(q), velocities=frozen(v), accelerations=frozen(a)
     )
+
+
+def resampled(points: JointTrajectory, limits: MotionLimits, period: float) -> JointTrajectory:
+    """Given points as one per control tick and one at their end; accelerations where the `limits` bound them.
+
+    Raises:
+        NotPlannable: longer than `LONGEST`.
+    """
+    if points.duration > LONGEST:
+        raise NotPlannable(f"the trajectory takes {points.duration:g} s; the limit is {LONGEST:g} s")
+    ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
+    times = np.append(np.arange(ticks) * period, points.duration)
+    q, v, a = points.sample(times)
+    smooth = bool(np.isfinite(limits.acceleration).all())
+    return JointTrajectory.of_arrays(
+        points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
+    )
+
+
+def backwards(motion: JointTrajectory) -> JointTrajectory:
+    """The same motion in reverse; it must have velocities and accelerations."""
+    assert motion.velocities is not None and motion.accelerations is not None
+    return JointTrajectory.of_arrays(
+        names=motion.names, times=motion.times, positions=frozen(motion.positions[::-1]),
+        velocities=frozen(-motion.velocities[::-1]), accelerations=frozen(motion.accelerations[::-1]),
+    )  # fmt: skip
+
+
+def stretched(motion: JointTrajectory, bounds: Sequence[TimingBound], period: float) -> JointTrajectory:
+    """The motion, slower by one factor for all of it where it exceeds a bound; with velocities and accelerations."""
+    if kept(bounds, motion):
+        return motion
+    q, v, a = motion.positions, motion.velocities, motion.accelerations
+    assert v is not None and a is not None
+    factor = max(bound.stretch(q, v, a) for bound in bounds)
+    times = np.arange(math.ceil(motion.duration * factor / period - 1e-6) + 1) * period
+    scale = motion.duration / times[-1]
+    q, v, a = motion.sample(np.minimum(times * scale, motion.duration))
+    return JointTrajectory.of_arrays(motion.names, times, q, v * scale, a * scale**2)

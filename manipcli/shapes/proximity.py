@@ -89,6 +89,12 @@ def surface(shape: Shape, *, most_triangles: int) -> CollisionGeometry | None:
     return model
 
 
+def bounding_ball(shape: CollisionGeometry) -> tuple[Array, float]:
+    """Centre (3,) and radius [m] of a ball around a shape, in its frame."""
+    shape.computeLocalAABB()
+    return np.array(shape.aabb_center), float(shape.aabb_radius)
+
+
 def distance(a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: Transform) -> Proximity:
     """Distance, midpoint and normal between two shapes."""
     import coal

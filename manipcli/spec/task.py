@@ -19,6 +19,8 @@ from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.clearance import ClearanceSpec, PartPair
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
+from manipcli.spec.keep import Keeps
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
@@ -232,6 +234,11 @@ class StepSpec(KeyedSpec):
     timeout: Annotated[Pause, Field(gt=0)] | None = Field(
         None, description="Time after which the step fails [s], above 0 to 1 h."
     )
+    keep: Keeps = Field(
+        (),
+        description="Constraints on the step's motions, one mapping or a list: `keep: {upright: 10 deg, tool_speed: "
+        "0.25}`. A path that keeps them is searched; the motion is checked at every control tick.",
+    )
     allow: tuple[PartPair, ...] = Field(
         (),
         description="Pairs of parts that may touch in this step: `[[robot/palm, shelf], [cup, tray]]`; a part is a "
@@ -290,6 +297,9 @@ class TaskSpec(Model):
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
     simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")
+    planner: PlannerSpec = Field(
+        PlannerSpec(), description="How paths around obstacles are searched. Default: `rrt_connect`."
+    )
     record: RecordSpec = Field(RecordSpec(), description="Recorded topics and their rates.")
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")

@@ -36,7 +36,8 @@ from manipcli.spec.task import StepSpec, TaskSpec
 
 
 class SpecMember(Protocol):
-    """A step, condition or engine as the specs need it: its key in YAML, and the spec of the block under it."""
+    """A step, condition, engine or path planner as the specs need it: its key or `type` in YAML, and the spec of its
+    block."""
 
     @property
     def name(self) -> str: ...
@@ -58,15 +59,17 @@ class ControllerSpecMember(Protocol):
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
 E = TypeVar("E", bound=SpecMember)
+P = TypeVar("P", bound=SpecMember)
 L = TypeVar("L", bound=ControllerSpecMember)
 
 _STEP = tuple(name for name in StepSpec.model_fields if name != "verb")
 _EXPECTATION = tuple(ExpectationSpec.model_fields)
 
 
-def task_model(steps: Seam[S], conditions: Seam[C], engines: Seam[E]) -> type[TaskSpec]:
-    """`TaskSpec` with the steps, conditions and engines of the seams; the same class for the same members."""
-    return _task_model(_members(steps), _members(conditions), _members(engines))
+def task_model(steps: Seam[S], conditions: Seam[C], engines: Seam[E], planners: Seam[P]) -> type[TaskSpec]:
+    """`TaskSpec` with the steps, conditions, engines and path planners of the seams; the same class for the same
+    members."""
+    return _task_model(_members(steps), _members(conditions), _members(engines), _members(planners))
 
 
 Members = tuple[tuple[str, type[Model]], ...]
@@ -77,19 +80,26 @@ def _members(seam: Seam[S]) -> Members:
 
 
 @lru_cache(maxsize=8)
-def _task_model(steps: Members, conditions: Members, engines: Members) -> type[TaskSpec]:
+def _task_model(steps: Members, conditions: Members, engines: Members, planners: Members) -> type[TaskSpec]:
     condition = _conditions(conditions)
     expectation = _expectations(conditions, condition)
     until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`object` has no operator `|`)
     steps_of = [_wrapped(StepSpec, name, spec, {"until": until}) for name, spec in steps]
     step = _union("verb", steps_of, common=_STEP)
     simulation = simulation_model(engines)
+    planner = _planners(planners)
     # These types exist only at run time; type checkers cannot follow them.
     model = create_model(
         "TaskSpec",
         __base__=TaskSpec,
         __doc__=TaskSpec.__doc__,
         simulation=(simulation, Field(simulation(), description=TaskSpec.model_fields["simulation"].description)),
+        planner=(
+            planner,
+            Field(  # type: ignore[arg-type]
+                planners[0][1](), description=TaskSpec.model_fields["planner"].description
+            ),
+        ),
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
         watch=(tuple[_watches([name for name, _ in conditions], condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
@@ -111,6 +121,19 @@ def simulation_model(engines: Members) -> type[SimulationSpec]:
         **own,
     )
     return cast(type[SimulationSpec], made)
+
+
+def _planners(members: Members) -> object:
+    """Union of the path planners by their `type`, the first by default."""
+    any_of: object = reduce(or_, [spec for _, spec in members[1:]], members[0][1])
+    if len(members) > 1:
+        any_of = Annotated[any_of, Field(discriminator="type")]
+    default = members[0][0]
+
+    def typed(value: object) -> object:
+        return {"type": default, **value} if isinstance(value, dict) and "type" not in value else value
+
+    return Annotated[any_of, BeforeValidator(typed)]
 
 
 def controllers_model(controllers: Seam[L]) -> type[ControllersSpec]:

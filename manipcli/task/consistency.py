@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import Final
 
-from manipcli.conditions.condition import CheckContext, Problem
+from manipcli.conditions.condition import CheckContext, Problem, unknown_body
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
@@ -39,6 +39,7 @@ NOT_SWITCHED: Final = 233
 GUARDED: Final = 242
 MOTIONLESS: Final = 244
 UNFELT: Final = 245
+UNMOVED: Final = 247
 """Numbers of the codes of findings about a task."""
 OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
 """Codes of findings on a controllers file about joints that are missing or not its own."""
@@ -129,6 +130,14 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
         if step.until is not None:
             for p in until_problems(step.until, step.id, context, CONDITIONS):
                 yield ABSENT, ("steps", k, "until"), p
+        if step.keep and not member.moves:
+            message = f"`keep` has no effect: `{step.verb}` does not move the arm"
+            yield UNMOVED, ("steps", k), Problem(("keep",), message, "remove `keep`")
+        for j, keep in enumerate(step.keep):
+            if keep.above is not None:
+                yield from (
+                    (ABSENT, ("steps", k, "keep"), p) for p in unknown_body(context.scene, keep.above, (j, "above"))
+                )
         if member.guarded(step.body):
             yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
 
@@ -220,6 +229,11 @@ def _refused(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> tuple[
         message = f"robot '{robot.name}' has no movable joint"
         hint = "write a passive object as a body of the scene: `urdf: {file: ...}`"
         return (task.source.finding(MOTIONLESS, ("robot",), message, hint=hint),)
+    return refused_by_engine(task, robot, scene)
+
+
+def refused_by_engine(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> tuple[Diagnostic, ...]:
+    """Errors for what the engine of the task cannot simulate."""
     simulation = task.spec.simulation
     if simulation.engine not in ENGINES.names:
         return ()

@@ -184,10 +184,11 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
 
 
 def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
+    planner = planner.keeping(step.keep)
     if state.at_start:
         planner.outside(state)
-    planner = planner.allowing(expanded_pairs(planner.robot, planner.scene, step.allow))
-    return STEPS[step.verb].candidates(step.body, planner, state)
+    allowed = expanded_pairs(planner.robot, planner.scene, step.allow)
+    return STEPS[step.verb].ways(step.body, planner, state, allowed)
 
 
 def start_position(task: Task) -> Array:
@@ -205,12 +206,18 @@ def _steps(
         at = task.file.place("steps", k, *((steps[k].verb, *refusal.loc) if refusal.loc else ()))
         return refusal.but(step=steps[k].id, place=at)
 
+    def placed(k: int, candidates: Candidates) -> Candidates:
+        def further() -> Candidates | None:
+            more = candidates.further()
+            return None if more is None else placed(k, more)
+
+        return replace(candidates, explain=lambda why: located(k, candidates.explain(why)), further=further)
+
     def opens(k: int, state: PlanningState) -> Candidates:
         try:
-            candidates = _candidates(planner, steps[k], state)
+            return placed(k, _candidates(planner, steps[k], state))
         except NotPlannable as refusal:
             raise located(k, refusal) from refusal
-        return replace(candidates, explain=lambda refusal: located(k, candidates.explain(refusal)))
 
     def on_step(k: int, again: bool) -> None:
         on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
@@ -247,4 +254,5 @@ def _planner(task: Task) -> Planner:
             for each in task.spec.clearance.pairs
             for pair in expanded_pairs(task.robot, task.scene, [each.between])
         },
+        paths=task.spec.planner,
     )

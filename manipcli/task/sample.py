@@ -23,6 +23,7 @@ from manipcli.spec.override import Override, read_overrides
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.changed_files import Changes, Files
+from manipcli.task.consistency import refused_by_engine
 from manipcli.task.named_file import named_file
 from manipcli.task.task import GroundTruth, Task
 from manipcli.task.vary import Varied, draw
@@ -87,7 +88,7 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
         robot_of, scene_of: build the robot and the scene of a changed file.
 
     Raises:
-        InvalidInput: a drawn value is out of range, or the scene cannot be built with it.
+        InvalidInput: a drawn value is out of range, the scene cannot be built with it, or the engine refuses it.
     """
     values = dict(drawn.values)
     changes = [(quantity, values[quantity.path]) for quantity in varied if quantity.path in values]
@@ -103,6 +104,8 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
             scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
             controllers=true.controllers,
         )
+        if refused := refused_by_engine(task.file, truth.robot, truth.scene):
+            raise InvalidInput(refused)
     except InvalidInput as invalid:
         findings = [
             replace(finding, message=f"{finding.message} (sample {drawn.number})") for finding in invalid.findings

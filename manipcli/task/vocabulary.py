@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from manipcli.conditions.members import CONDITIONS
 from manipcli.control.controllers import CONTROLLERS
+from manipcli.plan.path_planners import PATH_PLANNERS
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.base import about
@@ -16,8 +17,8 @@ from manipcli.spec.unions import controllers_model, task_model
 
 
 def task_spec() -> type[TaskSpec]:
-    """`TaskSpec` with all verbs, conditions and engines; always the same class."""
-    return task_model(STEPS, CONDITIONS, ENGINES)
+    """`TaskSpec` with all verbs, conditions, engines and path planners; always the same class."""
+    return task_model(STEPS, CONDITIONS, ENGINES, PATH_PLANNERS)
 
 
 def controllers_spec() -> type[ControllersSpec]:

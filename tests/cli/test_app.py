@@ -27,12 +27,14 @@ from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPla
 from manipcli.core.geometry import Transform
 from manipcli.description.elements import Joint, JointLimits
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.collision import CollisionHit
 from manipcli.model.robot import RobotModel
 from manipcli.plan.motion_margins import Binding, Margin, MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
 
+NEAR = CollisionHit("cup", "robot/palm", 0.0123, time=1.5)
 PASSED = Verdict(
     task="pour",
     verdict="passed",
@@ -298,12 +300,12 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
     pipeline.plan_task = lambda _: SimpleNamespace(
-        motions=(_motion(),), steps=(), clearances=lambda: (None,), margins=lambda: (margins,)
+        motions=(_motion(),), steps=(), clearances=lambda: (NEAR,), margins=lambda: (margins,)
     )
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
     assert "j1 velocity, 60 % of the time" in (out := capsys.readouterr().out)
-    assert "75.0 %" in out
+    assert "75.0 %" in out and "12.3 mm" in out and "cup and robot/palm at 1.50 s" in out
     rows = csv.read_text().splitlines()
     assert rows[0] == "step,motion,time,j1_position,j1_velocity,j1_acceleration"
     assert rows[2] == "move_1,move,1.000000,0.5,1.5,0"
@@ -311,6 +313,7 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
 
     assert main(["plan", "t.yaml", "--format", "json"]) == 0
     answer = json.loads(capsys.readouterr().out)
+    assert answer["motions"][0]["clearance"] == {"between": ["cup", "robot/palm"], "distance": 0.0123, "time": 1.5}
     assert answer["motions"][0]["limited_by"] == {"joint": "j1", "quantity": "velocity", "used": 0.75}
 
 
@@ -318,7 +321,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=(), clearances=tuple)
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
     assert "' does not exist" in capsys.readouterr().err
 
@@ -394,7 +397,7 @@ def test_what_is_on_a_full_disk_is_named_and_no_bug(
 
 def test_a_file_on_a_full_disk_is_named(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=(), clearances=tuple)
     assert main(["plan", "t.yaml", "--csv", "/dev/full"]) == 3
     assert capsys.readouterr().err == "error[INT001]: /dev/full: the disk is full (No space left on device)\n"
 

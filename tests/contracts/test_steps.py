@@ -36,12 +36,26 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "move on a line": (
         ("move", {"pose": {"xyz": [0, 0.2, -0.1], "rpy": [0.3, 0, 0]}, "frame": "tool", "path": "linear"}), ()
     ),
+    "move on an arc": (
+        ("move", {"pose": {"xyz": [0, 0.2, 0.1]}, "frame": "tool", "path": {"arc": {"via": [0, 0.1, 0.12]}}}), ()
+    ),
+    "move through a point": (
+        (
+            "move",
+            {
+                "pose": {"xyz": [0, 0.2, 0.0]}, "frame": "tool",
+                "path": {"via": [{"xyz": [0, 0.1, 0.1], "radius": 0.05}]},
+            },
+        ),
+        (),
+    ),
     "move to a point": (("move", {"point": [0.6, 0.1, 0.7]}), ()),
     "move to a point on a line, pointing": (
         ("move", {"point": [0, 0.1, -0.1], "pointing": [0.2, 0, 1], "frame": "tool", "path": "linear"}), ()
     ),
     "move what is held": (("move", {"to": "home"}), (PICK, LIFT)),
     "follow": (("follow", {"joint_names": ["joint_1", "joint_2"], "points": POINTS}), ()),
+    "follow, retimed": (("follow", {"joint_names": ["joint_1", "joint_2"], "points": POINTS, "retime": True}), ()),
     "grasp": (("grasp", {"posture": "wrap"}), ()),
     "release": (("release", {}), (("grasp", {"posture": "wrap"}),)),
     "wait": (("wait", "1 s"), ()),

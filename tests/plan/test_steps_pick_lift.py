@@ -256,7 +256,7 @@ def test_only_a_pick_speaks_of_its_height_where_closing_fingers_have_no_room(ben
     narrow.now, _ = clear.at(clear.now, clear.plan("pick", spec), "close")
     refusal = narrow.refused("grasp", {"object": "block"})
     assert "'plate'" in refusal.cause and "of 'close'" in refusal.cause
-    assert refusal.hint == "first `move` to a pose from which the path is free (no path around obstacles is searched)"
+    assert refusal.hint == "first `move` to a pose from which the path is free"
 
 
 def test_a_cup_behind_a_wall_names_the_wall_and_the_motion(bench: Make) -> None:

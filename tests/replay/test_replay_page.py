@@ -20,9 +20,10 @@ from manipcli.core.geometry import matrix_from_quat
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
 from manipcli.replay.drawing import draw
+from manipcli.replay.ghost import ghost_of
 from manipcli.replay.page_server import PageServer
 from manipcli.replay.playback import RATE, Playback
-from manipcli.replay.player import player_page
+from manipcli.replay.player import player_html, player_page
 
 ROOT = Path(__file__).parents[2]
 CLICK = """(text => {
@@ -70,6 +71,25 @@ def _until(page: Page, condition: Callable[[np.ndarray], bool], seconds: float =
 def _is_drawn(image: np.ndarray) -> bool:
     """The table, in a colour that neither the background nor an empty page has."""
     return bool((np.ptp(image, axis=2) > 50).sum() > 10_000)
+
+
+@pytest.mark.slow
+def test_ghosts_are_where_the_other_run_was(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """Oracle: our kinematics of another run, with its bodies 10 cm aside and its joints turned by 0.1 rad."""
+    aside = playback.body_position + np.array([0.0, 0.1, 0.0])
+    other = replace(playback, position=playback.position + 0.1, body_position=aside)
+    path = tmp_path / "ghost.html"
+    path.write_text(player_html(playback, ghosts=[ghost_of("mujoco", other, playback)], whole_page=True), "utf-8")
+    browser.open(path.as_uri())
+    player = "document.querySelector('.mc-player').player"
+    browser.wait_for(f"!!{player}")
+    poses = other.poses()
+    for k in (0, len(playback.times) // 2):
+        time_of = float(playback.times[k])
+        (found,) = json.loads(str(browser.evaluate(f"JSON.stringify({player}.ghosts({time_of!r}))")))
+        np.testing.assert_allclose([one["p"] for one in found], poses.position[k], atol=1e-5)
+    assert browser.evaluate(f"{CLICK}('mujoco')"), "its switch"
+    assert not browser.complaints
 
 
 @pytest.mark.slow

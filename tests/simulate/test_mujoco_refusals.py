@@ -92,6 +92,18 @@ def test_restitution_is_refused_where_it_is_written(tmp_path: Path) -> None:
     assert (finding.place.line, finding.place.column) == (10, 18)
 
 
+def test_a_restitution_that_a_sample_draws_is_refused_before_the_run(tmp_path: Path) -> None:
+    file = written(tmp_path)
+    text = file.read_text().replace("restitution: 0.5", "restitution: 0")
+    file.write_text(f"{text}vary:\n  scene.ball.restitution: {{uniform: [0.1, 0.5]}}\n")
+    assert load_task(file)
+    with pytest.raises(InvalidInput, match=r"SIM131.*\(sample 3\)") as raised:
+        load_task(file, sample=3)
+    (finding,) = raised.value.findings
+    assert finding.place is not None
+    assert finding.place.line == 10
+
+
 def test_restitution_may_be_ignored(tmp_path: Path) -> None:
     assert MEMBER.refuses(WHOLE, scene(BALL), MujocoSpec(restitution="ignore")) == ()
     assert load_task(written(tmp_path, own=", mujoco: {restitution: ignore}"))

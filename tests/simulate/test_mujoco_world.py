@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from manipcli.control.command import JointCommand, Mode
+from manipcli.core.errors import ManipcliError
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial, Joint, JointLimits, Link, TransmissionTag
 from manipcli.model.robot import Actuator, RobotModel
@@ -240,3 +241,28 @@ def test_a_flat_mesh_has_two_sides(tmp_path: Path) -> None:
     sheet = body("sheet", mesh, (2.0, 0.0, 0.5), fixed=True)
     engine = stepped(opened(robot(), sheet, body("block", Box((0.1,) * 3), (2.0, 0.0, 0.551))), 300)
     assert engine.read().body_position[0][2] == pytest.approx(0.55, abs=1e-3)
+
+
+def test_a_contact_that_begins_at_a_distance_of_zero_is_a_change() -> None:
+    """Geoms that touch at exactly 0 have no force yet: the pair begins to touch in the next step."""
+    table = body("table", Box((1.0, 1.0, 0.25)), (2.0, 0.0, 0.375), fixed=True)
+    engine = stepped(opened(robot(), table, body("block", Box((0.25,) * 3), (2.0, 0.0, 0.625))), 1)
+    assert engine.contacts() == ()
+    engine.advance()
+    assert engine.touches_changed()
+    assert [(contact.a, contact.b) for contact in engine.contacts()] == [("block", "table")]
+    assert not engine.touches_changed()
+
+
+def test_a_robot_whose_joints_are_not_in_depth_first_order_is_an_error() -> None:
+    """Without the check, commands would reach other joints: MuJoCo numbers joints depth-first."""
+    model = robot()
+    solid, slide = model.links[1].inertial, model.joints[0]
+    joints = tuple(
+        replace(slide, name=name, parent=parent, child=child)
+        for name, parent, child in (("a", "base", "A"), ("b", "base", "B"), ("c", "A", "C"))
+    )
+    links = (model.links[0], *(Link(name, solid, (), ()) for name in "ABC"))
+    settings = EngineSettings(STEP, 1, np.zeros(3))
+    with pytest.raises(ManipcliError, match="a different robot"):
+        ENGINES["mujoco"].open(replace(model, links=links, joints=joints), Scene((), (), frozen(np.zeros(3))), settings)

@@ -19,6 +19,7 @@ from manipcli.core.registry import Seam
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task, load_task_text
 from manipcli.spec.located import Located
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Angle, JointValue, Length, Time
 from manipcli.spec.resolved import resolved
 from manipcli.spec.retry import retried
@@ -90,7 +91,8 @@ class Member:
 STEPS = Seam("step", (Member("move", Move), Member("pour", Pour), Member("wait", Wait)))
 CONDITIONS = Seam("condition", (Member("inside", Inside), Member("near", Near)))
 ENGINES = Seam("engine", (Member("pybullet", Solver), Member("kinematic", Plain)))
-MODEL = task_model(STEPS, CONDITIONS, ENGINES)
+PATH_PLANNERS = Seam("path planner", (Member("rrt_connect", PlannerSpec),))
+MODEL = task_model(STEPS, CONDITIONS, ENGINES, PATH_PLANNERS)
 
 TASK = """\
 task: pour

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from manipcli.cli import console
-from manipcli.cli.engine_options import variants_of
 from manipcli.cli.interrupts import Interrupts
 from manipcli.cli.options import OutputFormat
 from manipcli.cli.outputs import Outputs
@@ -43,6 +42,7 @@ def run_engines(
     """
     from manipcli import pipeline
     from manipcli.cli.progress import StepProgress
+    from manipcli.judge.measured_run import variants_of
     from manipcli.record.faults import RecordingFailed, RecordingRefused
     from manipcli.report.agreement import agreement_json, agreement_text
 

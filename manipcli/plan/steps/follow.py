@@ -81,12 +81,18 @@ class FollowSpec(Model):
     Between two points the curve is linear, cubic or quintic, by what both give. The robot moves to the first point from
     its position, at rest; continuous joints take the shortest rotation. Position and velocity limits apply to every
     curve. A linear curve has infinite acceleration at its points and a cubic one infinite jerk, so those limits apply
-    only to curves that can keep them.
+    only to curves that can keep them. With `retime` all of them apply, and times, velocities and accelerations of the
+    points have no effect.
     """
 
     header: dict[str, Any] = Field({}, description="Ignored, so that a message can be pasted.")
     joint_names: tuple[str, ...] = Field(min_length=1, description="The joints that move.")
     points: tuple[PointSpec, ...] = Field(min_length=1, description="In the order of their times; the last at rest.")
+    retime: bool = Field(
+        False,
+        description="Whether only the positions count: a smooth curve through them is timed as fast as the limits of "
+        "velocity, acceleration, jerk and effort allow. Default false.",
+    )
 
     @model_validator(mode="after")
     def _sizes(self) -> FollowSpec:
@@ -139,6 +145,10 @@ def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
         TrajectoryPoint(np.array(point.positions) - turns, point.seconds, point.velocities, point.accelerations)
         for point in spec.points
     ]
+    builder = MotionBuilder(planner, state, verb="follow")
+    if spec.retime:
+        builder.through("follow", names, np.vstack([start, *(np.asarray(point.positions) for point in points)]))
+        return builder.plan()
     if points[0].time_from_start <= 0.0:
         off = np.abs(first - start)
         worst = int(np.argmax(off))
@@ -151,7 +161,6 @@ def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
             )
         points[0] = replace(points[0], positions=start)
     trajectory = JointTrajectory(names, points, TrajectoryPoint(start))
-    builder = MotionBuilder(planner, state, verb="follow")
     builder.follow("follow", trajectory, limits=_limits(planner.robot, trajectory))
     return builder.plan()
 

@@ -68,4 +68,11 @@ def uncommanded(spec: GraspSpec, robot: RobotModel, claims: Claims) -> tuple[Pro
     return tool + unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="grasp", spec=GraspSpec, candidates=single(plan), check=check, uncommanded=uncommanded)
+MEMBER = StepMember(
+    name="grasp",
+    spec=GraspSpec,
+    candidates=single(plan),
+    check=check,
+    uncommanded=uncommanded,
+    moves=False,
+)

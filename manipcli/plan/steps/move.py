@@ -4,6 +4,8 @@
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, velocity_scaling: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
 - move: {point: [0.4, 0.1, 0.3], pointing: [0, 0, -1]}
+- move: {pose: {xyz: [0.4, 0.2, 0.3], rpy: [180 deg, 0, 0]}, path: {arc: {via: [0.5, 0.1, 0.4]}}}
+- move: {point: [0.4, 0.2, 0.3], path: {via: [{xyz: [0.4, 0, 0.3], radius: 5 cm}]}}
 - move: {pose: {xyz: [0, 0, 12 cm]}, frame: tool, path: linear, touch: [box]}
 - move: {pose: {xyz: [0, 0, 5 cm]}, frame: tool, path: linear, velocity_scaling: 0.02, touch: [button], guarded: true}
   until: {contact_force: {pair: [robot, button], above: 5 N, mean_over: 50 ms}}
@@ -30,16 +32,45 @@ from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import StepMember
+from manipcli.plan.tool_path import arc, blended
 from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
-from manipcli.spec.quantity import JointValue, Share
+from manipcli.spec.quantity import JointValue, Length, Share
 from manipcli.spec.robot import PoseSpec, Vector3
 
 VelocityScaling = Annotated[
     Share, Field(gt=0, le=1, description="Share of the velocity, acceleration and jerk limits.")
 ]
 RENAMED = {"speed": "velocity_scaling"}
+
+
+class ArcSpec(Model):
+    """A circular arc of the tool."""
+
+    via: Vector3 = Field(description="A point on the arc, in `frame` [m].")
+
+
+class ViaSpec(Model):
+    """A point that the tool's path passes, with a rounded corner."""
+
+    xyz: Vector3 = Field(description="The point, in `frame` [m].")
+    radius: Annotated[Length, Field(gt=0, le=10.0)] = Field(
+        description="Distance from it at which the path leaves the straight segment before it and joins the next [m]."
+    )
+
+
+class ToolPathSpec(Model):
+    """A curved path of the tool; its orientation changes at a constant rate over the length."""
+
+    arc: ArcSpec | None = Field(None, description="A circular arc to the goal.")
+    via: tuple[ViaSpec, ...] = Field((), description="Straight segments to the goal, through without stopping.")
+
+    @model_validator(mode="after")
+    def _one(self) -> ToolPathSpec:
+        if (self.arc is None) == (not self.via):
+            raise problem("conflict", "needs either `arc` or `via`", hint="for example `path: {arc: {via: [x, y, z]}}`")
+        return self
 
 
 class MoveSpec(Model):
@@ -72,11 +103,11 @@ class MoveSpec(Model):
         None, description="With `point`: the direction of the tool's z axis, in `frame`. Default: any."
     )
     frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
-    path: Literal["free", "joint", "linear"] = Field(
+    path: Literal["free", "joint", "linear"] | ToolPathSpec = Field(
         "free",
         description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
-        "configuration. `free`: the same, or to another configuration if the path to the nearest one is not free. "
-        "Default `free`.",
+        "configuration. `free`: the same; if that is not free, straight to another configuration, else around "
+        "obstacles (not with `touch` or `guarded`). Default `free`. A mapping: a curved path of the tool.",
     )
     velocity_scaling: VelocityScaling = 1.0
     touch: tuple[str, ...] = Field(
@@ -101,8 +132,9 @@ class MoveSpec(Model):
     def _one_target(self) -> MoveSpec:
         if [self.to, self.pose, self.point].count(None) != 2:
             raise ValueError("needs exactly one of `to` (a named pose or joints), `pose` and `point` (of the tool)")
-        if self.to is not None and self.path == "linear":
-            raise ValueError("`path: linear` needs a tool `pose` or `point`, not `to`")
+        if self.to is not None and self.path not in ("free", "joint"):
+            word = "linear" if self.path == "linear" else "{...}"
+            raise ValueError(f"`path: {word}` needs a tool `pose` or `point`, not `to`")
         if self.to is not None and self.frame != "world":
             message = "`frame` applies to a tool `pose` or `point`, not to a named pose or joint positions"
             raise problem("conflict", message, at=("frame",), hint="remove `frame`", key=True)
@@ -133,7 +165,7 @@ def candidates(spec: MoveSpec, planner: Planner, state: PlanningState) -> Candid
 
     def options() -> Iterator[Candidate]:
         yield Candidate(attempt)
-        many = spec.to is None and spec.path != "linear"
+        many = spec.to is None and spec.path in ("free", "joint")
         while many and 0 < len(found) < CONFIGURATIONS:
             tried = len(found)
             yield Candidate(attempt, name=f"configuration {tried + 1} of the arm")
@@ -147,23 +179,28 @@ def _plan(spec: MoveSpec, planner: Planner, state: PlanningState, *, avoid: Sequ
     """One motion; a named pose with joints of the hand moves the hand at the same time, unless it is closed."""
     allowed = planner.may_touch(state, spec.touch) if spec.touch else NOTHING
     builder = MotionBuilder(planner, state, verb="move", allowed=allowed)
+    # What is pushed or pressed on would be in no known place along a path around something else.
+    around = spec.path == "free" and not (spec.touch or spec.guarded)
     if isinstance(spec.to, str):
         pose = planner.robot.pose(spec.to)
         values = dict(zip(pose.joints, pose.positions, strict=True))
         arm = {name: value for name, value in values.items() if name not in planner.gripper_joints}
         chosen = arm if state.closed and arm else values
-        builder.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling)
+        builder.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling, free=around)
     elif spec.to is not None:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
-        builder.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling)
+        builder.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling, free=around)
     else:
         X_WT, leaving = _goal(spec, planner, state)
         if spec.path == "linear":
             builder.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
+        elif isinstance(spec.path, ToolPathSpec):
+            poses = _curve(spec.path, planner.frame(spec.frame, state), planner.tool_pose(state), X_WT)
+            builder.along("move", poses, speed=spec.velocity_scaling, leaving=leaving)
         else:
-            builder.reach(
-                "move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving, avoid=avoid
-            )
+            free = spec.path == "free"
+            speed = spec.velocity_scaling
+            builder.reach("move", X_WT, speed=speed, free=free, searched=around, leaving=leaving, avoid=avoid)
     planned = builder.plan()
     (motion,) = planned.motions
     end = planned.end
@@ -186,6 +223,13 @@ def _goal(spec: MoveSpec, planner: Planner, state: PlanningState) -> tuple[Trans
         return Transform.of(xyz=p, R=R), "rotation"
     z = X_WF.R @ np.array(spec.pointing)
     return Transform.of(xyz=p, R=pointed(R, z / np.linalg.norm(z))), "spin"
+
+
+def _curve(path: ToolPathSpec, X_WF: Transform, X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
+    """Poses of the tool along the path."""
+    if path.arc is not None:
+        return arc(X_WA, X_WF.apply(path.arc.via), X_WB)
+    return blended(X_WA, [(X_WF.apply(via.xyz), via.radius) for via in path.via], X_WB)
 
 
 def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

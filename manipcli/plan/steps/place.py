@@ -177,7 +177,7 @@ def _ways(
         X_WT = X_WL @ X_OT
         builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
-            builder.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.velocity_scaling)
+            builder.carry("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.velocity_scaling)
         support = planner.touching(builder.with_body(spec.object, X_WL), spec.object)
         with _hinted(_LOWER):
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)

@@ -81,7 +81,7 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         R_tilt = matrix_from_axis_angle(a, theta)
         p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
         builder = MotionBuilder(planner, state, allowed=poured)
-        builder.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
+        builder.carry("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
         builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
         builder.dwell("dwell", spec.dwell)
         if spec.tilt > math.pi / 2:

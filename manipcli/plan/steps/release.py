@@ -42,4 +42,11 @@ def uncommanded(spec: ReleaseSpec, robot: RobotModel, claims: Claims) -> tuple[P
     return unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="release", spec=ReleaseSpec, candidates=single(plan), check=check, uncommanded=uncommanded)
+MEMBER = StepMember(
+    name="release",
+    spec=ReleaseSpec,
+    candidates=single(plan),
+    check=check,
+    uncommanded=uncommanded,
+    moves=False,
+)

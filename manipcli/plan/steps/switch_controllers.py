@@ -99,6 +99,7 @@ MEMBER = StepMember(
     name="switch_controllers",
     spec=SwitchControllersSpec,
     candidates=single(plan),
+    moves=False,
     check=check,
     uncommanded=uncommanded,
     request=request,

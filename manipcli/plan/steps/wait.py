@@ -43,4 +43,11 @@ def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
     return builder.plan()
 
 
-MEMBER = StepMember(name="wait", spec=WaitSpec, candidates=single(plan), check=lambda *_: (), uncommanded=lambda *_: ())
+MEMBER = StepMember(
+    name="wait",
+    spec=WaitSpec,
+    candidates=single(plan),
+    check=lambda *_: (),
+    uncommanded=lambda *_: (),
+    moves=False,
+)

@@ -16,6 +16,8 @@ from manipcli.report.run_report import RunReport
 
 AGREEMENT: Final = "agreement"
 """In the id of the case that compares runs: `tasks/pour.yaml::pour[agreement]`."""
+ENGINE: Final = "engine_"
+"""Beginning of the tag that names the engine."""
 
 CaseWord = Literal["passed", "failed", "differs", "error", "invalid", "crashed", "hung"]
 """`differs`: the runs in several engines or steps do not agree;
@@ -54,6 +56,11 @@ class Case:
         words = [] if self.sample is None else [str(self.sample)]
         words += [AGREEMENT] if self.compared else [] if self.variant is None else [self.variant.name]
         return "-".join(words)
+
+    @property
+    def engine(self) -> str:
+        """The engine by its tag, the last one; "" without one."""
+        return next((tag.removeprefix(ENGINE) for tag in reversed(self.tags) if tag.startswith(ENGINE)), "")
 
     @property
     def name(self) -> str:

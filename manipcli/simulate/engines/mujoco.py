@@ -28,9 +28,10 @@ from manipcli.spec.base import Model
 from manipcli.spec.quantity import Time
 
 CONTACT_TIME: Final = 0.004
-"""[s] With MuJoCo's default of 20 ms, a heavy object sinks in by millimetres."""
+"""[s] With MuJoCo's default of 20 ms, a cup of 300 g with friction 0.5 slips by 2 mm while it is lifted and poured."""
 IMPRATIO: Final = 100.0
-"""With MuJoCo's default of 1, a lifted cup slips by 15 mm, with 10 by 2 mm."""
+"""With MuJoCo's default of 1, the same cup slips by 21 mm, with 10 by 4 mm, with 100 by less than 0.1 mm; with 1000 no
+less, and a run takes 8 % longer."""
 
 
 class MujocoSpec(Model):
@@ -69,7 +70,7 @@ class MujocoEngine:
                 raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
         model = built.model
         n, m = len(robot.joint_names), len(scene.movable)
-        if (model.nq, model.nv) != (n + 7 * m, n + 6 * m) or np.any(model.jnt_qposadr[:n] != np.arange(n)):
+        if (model.nq, model.nv) != (n + 7 * m, n + 6 * m) or built.joints != tuple(range(n)):
             raise ManipcliError(f"MuJoCo loaded a different robot than '{robot.name}'")
         self._robot, self._model, self._data = robot, model, data
         self._step, self._step1, self._step2 = mujoco.mj_step, mujoco.mj_step1, mujoco.mj_step2

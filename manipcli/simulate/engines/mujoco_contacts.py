@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from manipcli.model.state import Contact, ContactPoint
-
-KNOCK: Final = 1.5
-"""A contact point with more than this factor of the largest force, plus `KNOCK_LEAST`, is an impact."""
-KNOCK_LEAST: Final = 1.0
-"""[N]"""
-_sides = attrgetter("a", "b")
+from manipcli.simulate.engines.conventions import KNOCK_LEAST, knock, sides
 
 
 class _Pair(NamedTuple):
@@ -98,14 +92,16 @@ class Contacts:
                 points[names].append(point)
                 if distance < depths[names]:
                     depths[names] = distance
-        self._geoms, self._pairs = geoms.tobytes(), frozenset(points)
-        self._knock = KNOCK * greatest + KNOCK_LEAST
+        # A pair without force gets one without any change of the geoms: then `changed` compares the pairs.
+        self._geoms = geoms.tobytes() if contact.efc_address.min() >= 0 else b""
+        self._pairs = frozenset(points)
+        self._knock = knock(greatest)
         contacts = [
             Contact(a, b, sum([point.force for point in between]), depths[a, b], tuple(between))
             for (a, b), between in points.items()
         ]
         if len(contacts) > 1:
-            contacts.sort(key=_sides)
+            contacts.sort(key=sides)
         return tuple(contacts)
 
     def _touching(self, geoms: Any, address: Any) -> frozenset[tuple[str, str]]:

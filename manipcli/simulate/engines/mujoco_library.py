@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from types import ModuleType
 from typing import Final
 
 INSTALL: Final = "install it: pip install 'manipcli[mujoco]'"
+MAJOR: Final = "4"
+"""Version of mujoco-core that the engine is written for."""
 
 
 def installed() -> bool:
-    """Whether MuJoCo can be imported; it is not imported."""
-    return find_spec("mujoco") is not None
+    """Whether a suitable MuJoCo is installed; it is not imported."""
+    return version().partition(".")[0] == MAJOR
 
 
 def library() -> ModuleType:
@@ -27,7 +28,7 @@ def library() -> ModuleType:
 
 
 def version() -> str:
-    """Of the installed distribution; "unknown" if it is missing."""
+    """Of the installed distribution (`mujoco` contains mujoco-core); "unknown" if it is missing."""
     from importlib.metadata import PackageNotFoundError
     from importlib.metadata import version as installed_version
 

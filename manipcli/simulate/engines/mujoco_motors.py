@@ -17,13 +17,10 @@ from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
+from manipcli.simulate.engines.conventions import POSITION_TIME, UNLIMITED_EFFORT
 
-UNLIMITED_EFFORT: Final = 1e6
-"""Represents "no effort limit" [N m or N]."""
 LEAST_EFFORT: Final = 1e-12
 """[N m or N] Represents an effort limit of 0: MuJoCo has no friction row for 0."""
-POSITION_TIME: Final = 0.01
-"""[s] Time constant with which a position command is approached, as for PyBullet."""
 MOTOR_COMPLIANCE: Final = 0.1
 """Factor of the compliance of motors. MuJoCo's least lets a braked joint creep by some 1e-6 rad/s under its load; with
 0.001, the solver misses the optimum where a motor reaches its effort limit."""

@@ -80,6 +80,8 @@ def convex_parts(mesh: Mesh) -> list[Array]:
     Raises:
         InvalidInput: the mesh file cannot be used.
     """
+    if mesh.part is not None:
+        return [np.array(mesh.part.points) * np.array(mesh.scale)]
     try:
         triangles = read_mesh(mesh.path)
     except UnusableMesh as error:

@@ -31,7 +31,7 @@ MIN_INERTIA: Final = 1e-12
 
 
 class ContactLaw(NamedTuple):
-    """How contacts give way: time constant [s], and the depth [m] at which they reach their full impedance."""
+    """Compliance of contacts: time constant [s], and the depth [m] at which they reach their full impedance."""
 
     time: float
     depth: float
@@ -56,11 +56,13 @@ class Built:
             body, at its centre of mass and with the axes of its frame O.
         parts: name of the part of each MuJoCo body: of a body of the scene, or `robot/<link>`.
         links: MuJoCo's number of the body of each link.
+        joints: (n) MuJoCo's number of each moving joint of the robot.
     """
 
     model: Any
     parts: tuple[str, ...]
     links: dict[str, int]
+    joints: tuple[int, ...]
 
 
 def build(
@@ -103,7 +105,8 @@ def build(
     parts = {spec.body(f"body{k}").id: body.name for k, body in enumerate(scene.bodies)}
     links = {name: made.id for name, made in bodies.items()}
     parts |= {k: f"robot/{name}" for name, k in links.items()}
-    return Built(model, tuple(parts.get(k, "world") for k in range(model.nbody)), links)
+    joints = tuple(spec.joint(f"joint{k}").id for k, joint in enumerate(robot.joints) if joint.moves)
+    return Built(model, tuple(parts.get(k, "world") for k in range(model.nbody)), links, joints)
 
 
 def _options(mujoco: ModuleType, spec: Any, scene: Scene, step: float, impratio: float) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from operator import attrgetter, itemgetter
-from typing import Final
+from operator import itemgetter
 
 from manipcli.model.state import Contact, ContactPoint
+from manipcli.simulate.engines.conventions import KNOCK_LEAST, knock, sides
 
 Vector = tuple[float, float, float]
 Pair = tuple[int, int, int, int]
@@ -14,11 +14,6 @@ Pair = tuple[int, int, int, int]
 BulletPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float, float, Vector, float, Vector]
 """PyBullet's tuple for a contact point: a flag, bodies and links a and b, places on a and b, the normal on b (towards
 a), the distance, the normal force on a, and twice: friction on a along a direction."""
-KNOCK: Final = 1.5
-"""A contact point with more than this factor of the largest force, plus `KNOCK_LEAST`, is an impact."""
-KNOCK_LEAST: Final = 1.0
-"""[N]"""
-_sides = attrgetter("a", "b")
 _force = itemgetter(9)
 
 
@@ -40,7 +35,7 @@ class ContactWatch:
     def seen(self, points: Sequence[BulletPoint]) -> None:
         """Set the points to compare with."""
         self._pairs = _touching(points)
-        self._knock = KNOCK * self._greatest(points) + KNOCK_LEAST
+        self._knock = knock(self._greatest(points))
 
     def _greatest(self, points: Sequence[BulletPoint]) -> float:
         """[N] Largest force at a single point of the body."""
@@ -92,7 +87,7 @@ class ContactMerger:
             a, b, side = known.get(pair) or self._names(pair)
             found.append(Contact(a, b, force, depths[pair], tuple([_point(one, side) for one in touching[pair]])))
         if len(found) > 1:
-            found.sort(key=_sides)
+            found.sort(key=sides)
         return tuple(found)
 
     def _names(self, pair: Pair) -> tuple[str, str, float]:

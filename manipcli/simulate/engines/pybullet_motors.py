@@ -9,17 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from types import ModuleType
-from typing import Final
 
 from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand, Mode
 from manipcli.model.robot import RobotModel
-
-UNLIMITED_EFFORT: Final = 1e6
-"""Represents "no effort limit" for PyBullet [N m or N]."""
-POSITION_TIME: Final = 0.01
-"""[s] Time constant with which a position command is approached, for any physics step; close to ros_gz's default gain
-of 0.1 at 1 kHz."""
+from manipcli.simulate.engines.conventions import POSITION_TIME, UNLIMITED_EFFORT
 
 
 class Motors:

@@ -1,0 +1,35 @@
+"""`inside`: the held object, or the tool, in a box of the world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.core.units import readable
+from manipcli.plan.held_frame import held_points, points_of
+from manipcli.plan.keep import KeepMember, Kept
+from manipcli.plan.motion import PlanningState
+from manipcli.plan.planner import Planner
+from manipcli.spec.keep import KeepSpec
+
+
+def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | None:
+    """By the corners of the held object's bounding box."""
+    if spec.inside is None:
+        return None
+    centre, half = np.array(spec.inside.box.centre), 0.5 * np.array(spec.inside.box.size)
+    name = held_points(planner, state)[0]
+
+    def room(q: Array) -> Array:
+        """(k, 3) the least distance to the sides along each axis [m]."""
+        return np.asarray((half - np.abs(points_of(planner, state, q) - centre)).min(axis=1))
+
+    def text(q: Array) -> str:
+        left = room(q[None])[0]
+        axis = int(np.argmin(left))
+        return f"{name} leaves `inside: {{box: ...}}` by {readable(float(-left[axis]), 'm')} along {'xyz'[axis]}"
+
+    return Kept("inside", lambda q: room(q).min(axis=1), text)
+
+
+MEMBER = KeepMember("inside", opened)

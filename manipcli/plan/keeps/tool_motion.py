@@ -1,0 +1,33 @@
+"""`tool_speed` and `tool_acceleration`: of the tool's origin."""
+
+from __future__ import annotations
+
+from manipcli.core.geometry import Transform
+from manipcli.plan.keep import KeepMember, Kept
+from manipcli.plan.motion import PlanningState
+from manipcli.plan.planner import Planner
+from manipcli.plan.timing_bounds.tool_motion import ToolAcceleration, ToolSpeed
+from manipcli.spec.keep import KeepSpec
+
+
+def _speed(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | None:
+    limit = spec.tool_speed
+    if limit is None:
+        return None
+    return Kept("tool_speed", bound=lambda dynamics: ToolSpeed(dynamics, *_tool(planner), limit))
+
+
+def _acceleration(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | None:
+    limit = spec.tool_acceleration
+    if limit is None:
+        return None
+    return Kept("tool_acceleration", bound=lambda dynamics: ToolAcceleration(dynamics, *_tool(planner), limit))
+
+
+def _tool(planner: Planner) -> tuple[str, Transform]:
+    link, tool = planner.tool_link, planner.robot.tool  # refuses a robot without a tool frame
+    return link, Transform.identity() if tool is None else tool.X_LT
+
+
+SPEED = KeepMember("tool_speed", _speed)
+ACCELERATION = KeepMember("tool_acceleration", _acceleration)

@@ -1,0 +1,114 @@
+"""Search of a path around obstacles for the arm: the problem, the planner's answer, and why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.model.collision import CollisionQuery
+from manipcli.model.configuration import position_limits, with_mimics
+from manipcli.model.robot import RobotModel
+from manipcli.plan.free_space import FreeSpace
+from manipcli.plan.motion import Grip, PlanningState
+from manipcli.plan.path_planner import PathFailure, PathProblem
+from manipcli.plan.path_planners import PATH_PLANNERS
+from manipcli.plan.path_shortening import shortened
+from manipcli.spec.planner import PlannerSpec
+
+STEP = 2
+"""A step may use this many times the samples of one search. Each search may use this part of what is left: all for the
+first candidate, half for the second, a quarter for the third."""
+_UNLIMITED = np.pi  # rad or m beyond start and goals: samples of a joint without limits
+
+
+@dataclass(slots=True)
+class PathSearch:
+    """Searches of one step: `spec` has the planner's settings, `left` samples remain, `rng` draws them."""
+
+    spec: PlannerSpec
+    rng: np.random.Generator
+    left: int
+    failed: NotPlannable | None = None
+    """The latest refusal, which is repeated when no sample is left."""
+
+    @staticmethod
+    def of(spec: PlannerSpec, rng: np.random.Generator) -> PathSearch:
+        """For a new step; `rng` itself draws nothing."""
+        return PathSearch(spec, rng.spawn(1)[0], STEP * spec.samples)
+
+    def path(
+        self,
+        robot: RobotModel,
+        state: PlanningState,
+        query: CollisionQuery,
+        names: Sequence[str],
+        goals: Array,
+        grip: Grip | None,
+    ) -> Array:
+        """A short free path (k, m) of the joints `names` from `state` to one of the `goals` (j, m), also while the
+        hand moves as in `grip`.
+
+        Raises:
+            NotPlannable: there is none; names the narrowest place that was found.
+        """
+        if self.failed is not None and self.left <= 0:
+            raise self.failed
+        columns = list(robot.indices(tuple(names)))
+        space = FreeSpace(robot, query, names, _hands(robot, state.position, grip))
+        start = np.array(state.position[columns])
+        lower, upper = position_limits(robot.joint(name) for name in names)
+        ends = np.vstack((start, goals))
+        problem = PathProblem(
+            start=start,
+            goals=goals,
+            # A start outside the limits is reported when the trajectory is verified.
+            lower=np.where(np.isfinite(lower), np.minimum(lower, ends.min(axis=0)), ends.min(axis=0) - _UNLIMITED),
+            upper=np.where(np.isfinite(upper), np.maximum(upper, ends.max(axis=0)), ends.max(axis=0) + _UNLIMITED),
+            valid=space.valid,
+            edge=space.edge,
+        )
+        samples = max(1, -(-self.left // STEP))
+        member = PATH_PLANNERS[self.spec.type]
+        settings = member.spec.model_validate({**self.spec.model_dump(), "samples": samples})
+        found = member.make(settings).plan(problem, self.rng)
+        if isinstance(found, PathFailure):
+            self.left -= max(1, found.samples)
+            self.failed = self._refusal(space, found)
+            raise self.failed
+        return shortened(found, problem, self.rng, attempts=self.spec.shortcuts)
+
+    def _refusal(self, space: FreeSpace, failure: PathFailure) -> NotPlannable:
+        texts = [f"no path around obstacles: {failure.why}"]
+        hit = space.first_hit(failure.near_start, failure.near_goal)
+        if hit is not None:
+            apart = "overlap by" if hit.distance < 0.0 else "are only"
+            texts.append(
+                f"at the narrowest place found, '{hit.a}' and '{hit.b}' {apart} {hit.amount}"
+                + ("" if hit.distance < 0.0 else " apart")
+            )
+        commonest = space.commonest()
+        if commonest is not None:
+            (a, b), share = commonest
+            texts.append(f"'{a}' and '{b}' block {100.0 * share:.0f} % of the examined motions")
+        bodies = [] if hit is None else [name for name in (hit.a, hit.b) if not name.startswith("robot/")]
+        away = f"move '{bodies[0]}' away, or " if bodies else ""
+        hint = f"{away}first `move` to a pose nearer to the goal, or raise `planner: {{samples: ...}}`"
+        return NotPlannable("; ".join(texts), hint=hint, reason="in_the_way")
+
+
+def _hands(robot: RobotModel, position: Array, grip: Grip | None) -> list[Array]:
+    """(n) each: the positions of all joints with the hand at the start, in the middle and at the end of its motion."""
+    if grip is None:
+        return [position]
+    columns = robot.indices(grip.joints)
+    found = []
+    for share in (1.0, 0.0, 0.5):
+        q = np.array(position)
+        q[columns] += share * (grip.target - q[columns])
+        found.append(np.asarray(with_mimics(robot, q)))
+    still = bool(np.max(np.abs(grip.target - position[columns])) < 1e-6)
+    return found[:1] if still else found

@@ -1,0 +1,1 @@
+"""Members: bounds on the timing of a path."""

@@ -1,0 +1,177 @@
+"""Constraints on the motions of a step; the oracle is the forward kinematics of the description (`Bench.tool`)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.plan import kept_path
+from manipcli.plan.motion import Motion, PlanningState, StepPlan
+from manipcli.plan.steps import STEPS
+from manipcli.spec.keep import KeepSpec
+
+Bench = Any  # of conftest.py: a robot at a scene, on which steps are planned one after the other
+
+PICK = {"object": "cup", "grasp": {"posture": "wrap", "height": "68 mm"}}
+ACROSS = {"pose": {"xyz": [0.1, -0.2, 0.0]}, "frame": "tool"}
+
+
+@pytest.fixture(scope="module")
+def held(bench: Callable[..., Bench]) -> Bench:
+    """The cup picked and lifted."""
+    told = bench()
+    told.do("pick", PICK)
+    told.do("lift", {"object": "cup"})
+    return told
+
+
+def planned(bench: Bench, spec: object, *keep: object, verb: str = "move") -> StepPlan:
+    step = STEPS[verb]
+    planner = bench.planner.keeping(tuple(KeepSpec.model_validate(each) for each in keep))
+    return step.plan(step.spec.model_validate(spec), planner, bench.now)
+
+
+def tools(bench: Bench, plan: StepPlan, *, every: int = 1) -> tuple[Array, Motion]:
+    """X_WT (k, 4, 4) at every n-th control tick of a plan with one motion."""
+    (motion,) = plan.motions
+    assert motion.trajectory is not None
+    q = np.array(bench.now.position)
+    columns = bench.robot.indices(motion.trajectory.names)
+    found = []
+    for row in motion.trajectory.positions[::every]:
+        q[columns] = row
+        found.append(bench.tool(q))
+    return np.array(found), motion
+
+
+def cups(bench: Bench, plan: StepPlan, *, every: int = 10) -> Array:
+    """X_WO (k, 4, 4) of the cup."""
+    X_TO = np.linalg.inv(bench.tool(bench.now.position)) @ bench.body("cup").matrix
+    return np.asarray(tools(bench, plan, every=every)[0] @ X_TO)
+
+
+def tilt(X_WO: Array) -> float:
+    """The largest [deg]."""
+    return float(np.degrees(np.arccos(np.clip(X_WO[:, 2, 2], -1.0, 1.0)).max()))
+
+
+def test_a_cup_stays_upright_on_the_tools_line(held: Bench) -> None:
+    free = planned(held, ACROSS, {"upright": 1.0})
+    level = planned(held, ACROSS, {"upright": "1 deg"})
+    assert tilt(cups(held, free)) > 1.5
+    assert tilt(cups(held, level)) <= 1.0 + 1e-6
+    np.testing.assert_allclose(cups(held, level)[-1, :3, 3], cups(held, free)[-1, :3, 3], atol=0.005)
+
+
+def test_a_path_is_searched_where_the_line_is_no_help(held: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_path, "_tool_line", lambda *_: None)
+    level = planned(held, ACROSS, {"upright": "2 deg"})
+    again = planned(held, ACROSS, {"upright": "2 deg"})
+    assert tilt(cups(held, level)) <= 2.0 + 1e-6
+    (one,), (other,) = level.motions, again.motions
+    assert one.trajectory is not None and other.trajectory is not None
+    assert one.trajectory.velocities is not None
+    np.testing.assert_array_equal(one.trajectory.velocities[-1], 0.0)
+
+
+def test_what_a_constraint_allows_anyway_changes_nothing(held: Bench) -> None:
+    keep = {"upright": 1.5, "tool_speed": 50.0, "tool_acceleration": 500.0, "slosh": 1.4, "above": "desk"}
+    one, other = (tools(held, plan)[1].trajectory for plan in (planned(held, ACROSS), planned(held, ACROSS, keep)))
+    assert one is not None and other is not None
+    np.testing.assert_array_equal(one.positions, other.positions)
+
+
+@pytest.mark.parametrize("limit", [0.1, 0.3])
+def test_the_tool_keeps_its_speed(held: Bench, limit: float) -> None:
+    X_WT, _ = tools(held, planned(held, ACROSS, {"tool_speed": limit}))
+    speed = np.linalg.norm(np.diff(X_WT[:, :3, 3], axis=0), axis=1) / 1e-3
+    assert 0.98 * limit < speed.max() <= 1.005 * limit
+
+
+def test_the_tool_keeps_its_acceleration(held: Bench) -> None:
+    X_WT, _ = tools(held, planned(held, ACROSS, {"tool_acceleration": 0.5}))
+    acceleration = np.linalg.norm(np.diff(X_WT[:, :3, 3], 2, axis=0), axis=1) / 1e-6
+    assert 0.9 * 0.5 < acceleration.max() <= 1.005 * 0.5
+
+
+def test_nothing_sloshes(held: Bench) -> None:
+    """Second differences of the ball's position, in the cup's frame."""
+    plan = planned(held, ACROSS, {"slosh": "5 deg"})
+    X_WO = cups(held, plan, every=1)
+    ball = np.linalg.inv(held.body("cup").matrix) @ held.body("ball").matrix
+    p = (X_WO @ ball)[:, :3, 3]
+    up = np.diff(p, 2, axis=0) / 1e-6 - held.scene.gravity
+    f = np.einsum("kij,ki->kj", X_WO[1:-1, :3, :3], up)
+    angle = np.degrees(np.arctan2(np.hypot(f[:, 0], f[:, 1]), f[:, 2]))
+    assert angle.max() <= 5.0 * 1.01
+    faster = planned(held, ACROSS)
+    assert plan.duration > faster.duration
+
+
+def refusal(bench: Bench, spec: object, *keep: object) -> NotPlannable:
+    with pytest.raises(NotPlannable) as refused:
+        planned(bench, spec, *keep)
+    return refused.value
+
+
+def test_a_goal_that_violates_a_constraint_is_refused_with_the_amount(held: Bench) -> None:
+    spec = {"pose": {"xyz": [0, 0, 0], "rpy": [0, 0, "30 deg"]}, "frame": "tool"}
+    assert refusal(held, spec, {"upright": "10 deg"}).cause == (
+        "'cup' tilts by 30.0 deg, beyond `upright: 10 deg` at its end"
+    )
+
+
+def test_a_line_that_violates_a_constraint_is_refused_with_the_time(held: Bench) -> None:
+    X = held.planner.tool_pose(held.now)
+    spec = {"point": [float(X.p[0]), float(X.p[1]), float(X.p[2]) - 0.08], "path": "linear"}
+    found = refusal(held, spec, {"above": "desk", "by": "10 cm"})
+    said = r"'cup' is 55\.\d mm above the top of 'desk', beyond `above: desk, by: 100 mm` at t = 0\.3\d+ s"
+    assert re.fullmatch(said, found.cause), found.cause
+
+
+def test_a_volume_that_is_left_is_refused_with_the_axis(held: Bench) -> None:
+    p = held.body("cup").p
+    box = {"centre": [float(p[0]), float(p[1]), float(p[2]) + 0.05], "size": [0.1, 0.1, 0.4]}
+    spec = {**ACROSS, "path": "linear"}
+    assert "leaves `inside: {box: ...}` by 18" in refusal(held, spec, {"inside": {"box": box}}).cause
+    wide = {**box, "size": [0.8, 0.8, 0.8]}
+    planned(held, spec, {"inside": {"box": wide}})
+
+
+def test_contents_stay_in_the_cup_unless_the_move_is_to_tilt_it(held: Bench) -> None:
+    """`derived`: nothing is stated."""
+    over = {"pose": {"xyz": [0, 0, 0.05], "rpy": [0, 0, "60 deg"]}, "frame": "tool"}
+    assert tilt(cups(held, planned(held, over))) == pytest.approx(60.0, abs=0.1)
+
+
+def test_an_empty_hand_has_nothing_to_keep_upright(bench: Callable[..., Bench]) -> None:
+    told = bench()
+    spec = {"to": {"joint_1": -0.5, "joint_6": 0.9}}
+    one, other = planned(told, spec), planned(told, spec, {"upright": "1 deg"}, {"slosh": "1 deg"})
+    assert one.duration == other.duration
+
+
+def test_projection_ends_on_the_constraint() -> None:
+    """The unit disc: from outside to its edge, from inside nowhere."""
+
+    def margin(q: Array) -> Array:
+        return np.asarray(1.0 - np.linalg.norm(q, axis=1))
+
+    found = kept_path.projected(margin, np.array([3.0, 4.0]), 0.1)
+    assert found is not None
+    assert 0.1 <= margin(found[None])[0] <= 0.4
+    assert found[1] / found[0] == pytest.approx(4.0 / 3.0)
+    inside = np.array([0.1, 0.2])
+    np.testing.assert_array_equal(kept_path.projected(margin, inside, 0.1), inside)
+
+
+def test_states_are_not_changed(held: Bench) -> None:
+    before: PlanningState = held.now
+    planned(held, ACROSS, {"tool_speed": 0.2})
+    assert held.now is before
