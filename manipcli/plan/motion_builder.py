@@ -366,8 +366,7 @@ class MotionBuilder:
     ) -> None:
         """Accept a motion if it is free of collisions."""
         query, move = self._query(allowed), self._verb == "move"
-        length = 0.0 if trajectory is None else trajectory.duration
-        with tried(*self._motions, Motion(label, trajectory, grip=None, duration=length, begins=self._now)):
+        with tried(*self._motions, Motion(label, trajectory, None, 0.0, begins=self._now)):
             refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         self._accept(label, trajectory, grip, allowed=allowed)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -57,7 +58,11 @@ def _name(step: PlannedStep, one: Dropped) -> str:
 def _motions(one: Dropped) -> tuple[Motion, ...]:
     if one.plan is not None:
         return one.plan.motions
-    return tuple(motion for motion in one.refusal.motions if isinstance(motion, Motion))
+    motions = [motion for motion in one.refusal.motions if isinstance(motion, Motion)]
+    return tuple(
+        replace(motion, duration=max(motion.duration, motion.trajectory.duration)) if motion.trajectory else motion
+        for motion in motions
+    )
 
 
 def _run(plan: Plan, motions: Sequence[Motion], one: Dropped, clock: float) -> Playback:
