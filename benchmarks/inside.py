@@ -41,8 +41,9 @@ def watched_run(folder: Path) -> tuple[float, Cost]:
 
 
 def simulate_phase(folder: Path, overrides: tuple[str, ...] = ()) -> float:
-    """Seconds of the simulate phase of the pour."""
-    return run_task(POUR, log=folder / "pour.mcap", force=True, overrides=overrides).timing.simulate
+    """Seconds of the simulate phase of the pour, by `clock`."""
+    with patch("time.perf_counter", clock):
+        return run_task(POUR, log=folder / "pour.mcap", force=True, overrides=overrides).timing.simulate
 
 
 def recording(folder: Path) -> tuple[float, Cost]:

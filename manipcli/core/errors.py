@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import ClassVar, Final, Literal
+
+from manipcli.core.refused_candidates import RefusedCandidates
 
 Severity = Literal["error", "warning", "note"]
 EXPANDED: Final = "expanded from"
@@ -122,6 +124,10 @@ class NotPlannable(ManipcliError):
         loc: path of that value below the step's verb; empty if no single value is the cause.
         reason: for code that decides what to try next.
         parts: bodies and links (`robot/<link>`) that are in the way.
+        remedy: searches for a change with which it could be planned; as a hint. Slow, so only called for the refusal
+            that is reported.
+        candidates: of the whole task, if it has no plan.
+        motions: that were planned before the refused one, for pictures (`plan.motion.Motion`).
     """
 
     exit_code = ExitCode.FAILED
@@ -137,6 +143,9 @@ class NotPlannable(ManipcliError):
         loc: Loc = (),
         reason: RefusalReason | None = None,
         parts: frozenset[str] = frozenset(),
+        remedy: Callable[[], str] | None = None,
+        candidates: tuple[RefusedCandidates, ...] = (),
+        motions: tuple[object, ...] = (),
     ) -> None:
         self.cause = cause
         self.step = step
@@ -145,10 +154,20 @@ class NotPlannable(ManipcliError):
         self.loc = loc
         self.reason = reason
         self.parts = parts
+        self.remedy = remedy
+        self.candidates = candidates
+        self.motions = motions
         super().__init__(f"step '{step}': {cause}" if step is not None else cause)
 
     def but(
-        self, *, cause: str | None = None, hint: str | None = None, step: str | None = None, place: Place | None = None
+        self,
+        *,
+        cause: str | None = None,
+        hint: str | None = None,
+        step: str | None = None,
+        place: Place | None = None,
+        candidates: tuple[RefusedCandidates, ...] | None = None,
+        motions: tuple[object, ...] | None = None,
     ) -> NotPlannable:
         """The same refusal with these attributes, where they are given."""
         return NotPlannable(
@@ -159,6 +178,9 @@ class NotPlannable(ManipcliError):
             loc=self.loc,
             reason=self.reason,
             parts=self.parts,
+            remedy=self.remedy,
+            candidates=self.candidates if candidates is None else candidates,
+            motions=self.motions if motions is None else motions,
         )
 
     @property

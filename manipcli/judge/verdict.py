@@ -7,6 +7,7 @@ from typing import Literal
 
 from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Diagnostic
+from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.saturations import Saturations
 
@@ -108,6 +109,7 @@ class Verdict:
         errors: why the recording cannot be judged: no run, an interrupted run, or an incomplete log.
         drawn: the sample of the task's `vary:`; None: the task as written.
         saturations: saturation of joints and actuators.
+        candidates: the refused candidates of a task without a plan.
     """
 
     task: str
@@ -121,6 +123,7 @@ class Verdict:
     text: str = ""
     drawn: Drawn | None = None
     saturations: Saturations = field(default_factory=Saturations)
+    candidates: tuple[RefusedCandidates, ...] = ()
 
     @property
     def ended_between(self) -> bool:

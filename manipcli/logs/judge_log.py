@@ -24,7 +24,7 @@ def judge_log(path: Path, *, being_written: bool = False, activity: Callable[[st
     Raises:
         InvalidInput: the file is not a log of manipcli, is damaged, or lacks attachments.
     """
-    recording = open_recording(path, being_written=being_written)
+    recording = open_recording(path, being_written=being_written, contact_points=False)
     return judge_recording(replace(recording, spans=_Watched(recording.spans, activity)), path)
 
 

@@ -23,7 +23,8 @@ REASONS: Final = 3
 """Number of reasons that a refusal lists."""
 OTHER: Final = math.radians(40.0)
 """[rad] Grasps that differ by less count as the same: where one of them fails, the other is likely to fail."""
-_NUMBER: Final = re.compile(r"(?<![\w.])-?\d+(\.\d+)?")  # not digits in a name
+NUMBER: Final = re.compile(r"(?<![\w.])-?\d+(\.\d+)?")
+"""A number in a cause, but no digits in a name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +75,17 @@ class Chosen:
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """A refused candidate, and the reason."""
+    """A candidate that was not taken.
+
+    Attributes:
+        name: of the candidate; "" for the only way.
+        refusal: the reason; of a later step, if the candidate has a plan.
+        plan: its plan, or None.
+    """
 
     name: str
     refusal: NotPlannable
+    plan: StepPlan | None = None
 
 
 class Attempts:
@@ -141,7 +149,7 @@ def refusal_of(dropped: Iterable[Dropped], what: str) -> NotPlannable:
     """
     reasons: dict[str, list[NotPlannable]] = {}
     for each in dropped:
-        reasons.setdefault(_NUMBER.sub("#", each.refusal.cause), []).append(each.refusal)
+        reasons.setdefault(NUMBER.sub("#", each.refusal.cause), []).append(each.refusal)
     if not reasons:
         return NotPlannable(f"{what}: there is no candidate")
     commonest = sorted(reasons.values(), key=lambda refusals: -len(refusals))
@@ -150,12 +158,12 @@ def refusal_of(dropped: Iterable[Dropped], what: str) -> NotPlannable:
         return first_
     parts = frozenset(part for refusals in commonest for refusal in refusals for part in refusal.parts)
     if tried == 1:
-        return NotPlannable(f"{what}: {first_.cause}", hint=first_.hint, parts=parts)
+        return NotPlannable(f"{what}: {first_.cause}", hint=first_.hint, parts=parts, remedy=first_.remedy)
     shown = "; ".join(f"{refusals[0].cause} ({len(refusals)} of {tried})" for refusals in commonest[:REASONS])
     more = len(commonest) - REASONS
     others = f"; and {number_of(more, 'other reason')}" if more > 0 else ""
     cause = f"{what}, all {tried} candidates failed: {shown}{others}"
-    return NotPlannable(cause, hint=first_.hint, parts=parts)
+    return NotPlannable(cause, hint=first_.hint, parts=parts, remedy=first_.remedy)
 
 
 def alike(R_A: Array, R_B: Array) -> bool:

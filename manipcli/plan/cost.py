@@ -68,7 +68,7 @@ def step_cost(planner: Planner, plan: StepPlan) -> StepCost:
         if not positions:
             continue
         limit = min(limit, _to_limit(planner, positions))
-        singular = min(singular, *(planner.solver.manipulability(q) for q in positions))
+        singular = min(singular, *(planner.solver.least_singular_value(q) for q in positions))
         if motion.label in FREE:
             near = min(near, _clearance(planner, motion, positions))
     margin = grasp_margin(planner, plan)

@@ -15,11 +15,11 @@ from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.model.edge_check import SLACK
 from manipcli.plan.constrained_motion import smooth_motion
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.motion import Grip, PlanningState
+from manipcli.plan.motion import Grip, Motion, PlanningState
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path_search import PathSearch
 from manipcli.plan.path_smoothing import rounded
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import InTheWay, Planner
 from manipcli.plan.sweep import blocked, first_hit, swept
 from manipcli.plan.trajectory import JointTrajectory
 
@@ -85,20 +85,31 @@ def refusing(
         hit = query.check_trajectory(range(len(q)), start, share, start + share[:, None] * (q - start))
         if hit is None or planner.searching() is not None:
             return None
-        return f"{planner.in_the_way(hit)}, on the path there"
+        text, parts = planner.in_the_way(hit)
+        return InTheWay(f"{text}, on the path there", parts)
 
     return refuse
 
 
 @contextmanager
-def labelled(label: str, verb: str) -> Iterator[None]:
-    """Prefixes refusals with the label of their motion, unless it is the whole step of this `verb`."""
+def labelled(label: str, verb: str, before: Sequence[Motion] = ()) -> Iterator[None]:
+    """Prefixes refusals with the label of their motion, unless it is the step itself; adds the motions `before` it."""
     try:
-        yield
+        with tried(*before):
+            yield
     except NotPlannable as refusal:
         if label == verb:
             raise
         raise refusal.but(cause=f"{label}: {refusal.cause}") from refusal
+
+
+@contextmanager
+def tried(*motions: Motion) -> Iterator[None]:
+    """Adds to refusals the motions that were planned, for pictures."""
+    try:
+        yield
+    except NotPlannable as refusal:
+        raise (refusal if refusal.motions else refusal.but(motions=motions)) from refusal.__cause__
 
 
 def around(

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -29,6 +30,7 @@ from manipcli.core.geometry import Array, Transform, cross, frozen, matrix_from_
 from manipcli.core.text import number_of
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
+from manipcli.plan.base_move import base_advice
 
 Open = Literal["nothing", "spin", "rotation"]
 """The part of the tool's orientation that a goal leaves open: nothing, the rotation about its z axis, or all of it."""
@@ -150,7 +152,8 @@ class InverseKinematics:
             X_WT: the goal.
             seed: (n) all moving joints.
             rng: draws the restarts.
-            refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count.
+            refuse: (n) -> why these positions are rejected (a collision), or None. Rejected solutions do not count. Its
+                `parts`, if it has any, are those in the way.
 
         Raises:
             NotPlannable: no attempt converges; names the least error, the distance to the goal and the joints at their
@@ -165,12 +168,8 @@ class InverseKinematics:
             refusal = None if refuse is None else refuse(best.q)
             if refusal is None:
                 return best.q
-        lower = np.where(np.isfinite(self._lower), self._lower, seed[self._columns] - _UNLIMITED)
-        upper = np.where(np.isfinite(self._upper), self._upper, seed[self._columns] + _UNLIMITED)
         found: list[Solution] = []
-        for _ in range(self._tries):
-            start = seed.copy()
-            start[self._columns] = rng.uniform(lower, upper)
+        for start in self.random_configurations(seed, rng, self._tries):
             attempt = self.track(X_WT, start)
             if attempt.converged:
                 attempt = self._unwound(attempt, seed)
@@ -193,6 +192,7 @@ class InverseKinematics:
                 f"the arm reaches ({place}) m only where {refusal}",
                 hint=f"move the goal away from the obstacle{rotate}",
                 reason="touches",
+                parts=getattr(refusal, "parts", frozenset()),
             )
         hint = f"move the goal nearer{rotate}"
         kind: RefusalReason | None = None
@@ -206,11 +206,28 @@ class InverseKinematics:
         if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
             hint += f"; an arm of {few} reaches few orientations: leave it open with `move: {{point: ...}}`"
+        nearest = ", ".join(f"{value:.3f}" for value in self.forward(best.q).p)
         raise NotPlannable(
-            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
+            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}, "
+            f"with the tool at ({nearest}) m",
             hint=hint,
             reason=kind,
+            remedy=None if distance > _FAR else partial(base_advice, self, X_WT, seed),
         )
+
+    def random_configurations(self, seed: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
+        """`count` copies of `seed` (n), each with the solver's joints uniform inside their limits, drawn as needed."""
+        lower = np.where(np.isfinite(self._lower), self._lower, seed[self._columns] - _UNLIMITED)
+        upper = np.where(np.isfinite(self._upper), self._upper, seed[self._columns] + _UNLIMITED)
+        for _ in range(count):
+            start = np.array(seed)
+            start[self._columns] = rng.uniform(lower, upper)
+            yield start
+
+    @property
+    def base(self) -> Transform:
+        """X_WB."""
+        return self._kinematics.robot.X_WB
 
     def track(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
         """One attempt from `seed` (n), without restarts, for the next point of a path."""
@@ -239,14 +256,14 @@ class InverseKinematics:
         """Unit of the position of the solver's joint with this index."""
         return "rad" if self._turning[joint] else "m"
 
-    def manipulability(self, q: npt.ArrayLike) -> float:
-        """The smallest singular value of the tool's Jacobian over the solver's joints at `q` (n)."""
-        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
-        return float(np.linalg.svd(J, compute_uv=False)[-1])
-
     def singularity(self, q: npt.ArrayLike) -> str:
         """The smallest singular value of the tool's Jacobian at `q` (n), as text."""
-        return f"smallest singular value {self.manipulability(q):.3f}"
+        return f"smallest singular value {self.least_singular_value(q):.3f}"
+
+    def least_singular_value(self, q: npt.ArrayLike) -> float:
+        """Of the tool's Jacobian over the solver's joints at `q` (n); metres and radians weighed alike."""
+        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
+        return float(np.linalg.svd(J, compute_uv=False)[-1])
 
     def _solution(self, X_WT: Transform, q: Array) -> Solution:
         X_WC = self.forward(q)

@@ -18,7 +18,7 @@ from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_an
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
-from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing
+from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
 from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
@@ -314,7 +314,7 @@ class MotionBuilder:
         self._now = spilled(self._planner, self._now, into)
 
     def _labelled(self, label: str) -> AbstractContextManager[None]:
-        return labelled(label, self._verb)
+        return labelled(label, self._verb, self._motions)
 
     def _solved(
         self,
@@ -366,7 +366,8 @@ class MotionBuilder:
     ) -> None:
         """Accept a motion if it is free of collisions."""
         query, move = self._query(allowed), self._verb == "move"
-        refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
+        with tried(*self._motions, Motion(label, trajectory, None, 0.0, begins=self._now)):
+            refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         self._accept(label, trajectory, grip, allowed=allowed)
 
     def _accept(

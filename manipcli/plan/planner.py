@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
 from copy import copy
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,6 +50,16 @@ OF_TWO_LINKS = (
 """The hint for two links of the robot that collide."""
 ROBOT = "robot/"
 _QUERIES = 8  # kept; the candidates of a step share a few
+
+
+class InTheWay(NamedTuple):
+    """A hit as text, and the two parts."""
+
+    text: str
+    parts: frozenset[str]
+
+    def __str__(self) -> str:
+        return self.text
 
 
 class Planner:
@@ -359,9 +370,10 @@ class Planner:
         bodies = [name for name in (hit.a, hit.b) if not name.startswith(ROBOT)]
         return next((body for body in bodies if pair in map(frozenset, self.may_touch(state, [body]))), "")
 
-    def in_the_way(self, hit: CollisionHit) -> str:
+    def in_the_way(self, hit: CollisionHit) -> InTheWay:
         """A hit as text; with the clearance where the two do not overlap."""
-        return str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {self._clearance_text(hit)}"
+        text = str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {self._clearance_text(hit)}"
+        return InTheWay(text, frozenset((hit.a, hit.b)))
 
     def _clearance_text(self, hit: CollisionHit) -> str:
         return f"{1000.0 * self.keeps(hit.a, hit.b):.3g} mm"

@@ -15,7 +15,7 @@ from typing import Final
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.plan.candidates import Attempts, Candidates, Chosen
+from manipcli.plan.candidates import Attempts, Candidates, Chosen, Dropped
 from manipcli.plan.motion import PlanningState, StepPlan
 
 MOST: Final = 7
@@ -23,6 +23,8 @@ MOST: Final = 7
 
 Opens = Callable[[int, PlanningState], Candidates]
 """The candidates of step k from a state; raises NotPlannable."""
+Explain = Callable[[NotPlannable, Sequence[tuple[int, Dropped]]], NotPlannable]
+"""The refusal of a task, and all refused candidates with the index of their step, to the refusal that is reported."""
 
 
 @dataclass(slots=True)
@@ -35,6 +37,7 @@ class Node:
         chosen: the one that is taken; None before the first.
         taken: number of plans so far.
         conflicts: earlier steps on which the failures of later steps depend, too.
+        left: candidates with a plan, after which a later step has none.
     """
 
     start: PlanningState
@@ -42,14 +45,22 @@ class Node:
     chosen: Chosen | None = None
     taken: int = 0
     conflicts: set[int] = field(default_factory=set)
+    left: list[Dropped] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """The plan of one step. `grasps`: excluded tool orientations R_WT (3, 3), after which a later step has no plan."""
+    """The plan of one step.
+
+    Attributes:
+        chosen: its candidate.
+        grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
+        dropped: the refused candidates, and those after which a later step has no plan.
+    """
 
     chosen: Chosen
     grasps: tuple[Array, ...]
+    dropped: tuple[Dropped, ...] = ()
 
 
 def search_task(
@@ -60,6 +71,7 @@ def search_task(
     on_step: Callable[[int, bool], None] = lambda *_: None,
     optimise: int = 0,
     cost: Callable[[StepPlan], float] = lambda plan: plan.duration,
+    explain: Explain = lambda refusal, _: refusal,
 ) -> tuple[Solved, ...]:
     """The first plan of all `count` steps, or the cheapest of it and `optimise` further ones.
 
@@ -70,14 +82,19 @@ def search_task(
         on_step: called before a step is planned, with its index and whether it takes another candidate.
         optimise: number of further candidates to compare.
         cost: of the plan of a step.
+        explain: adds to the refusal what all refused candidates tell.
 
     Raises:
         NotPlannable: there is none; the refusal of the latest step that was reached.
     """
-    nodes = _search(opens, count, start, on_step)
+    nodes = _search(opens, count, start, on_step, explain)
     if optimise:
         nodes = _cheapest(opens, nodes, on_step, optimise, cost)
-    return tuple(Solved(node.chosen, tuple(node.attempts.excluded)) for node in nodes if node.chosen is not None)
+    return tuple(
+        Solved(node.chosen, tuple(node.attempts.excluded), (*node.attempts.dropped, *node.left))
+        for node in nodes
+        if node.chosen is not None
+    )
 
 
 def _search(
@@ -85,10 +102,12 @@ def _search(
     count: int,
     start: PlanningState,
     on_step: Callable[[int, bool], None],
+    explain: Explain = lambda refusal, _: refusal,
     prefer: Sequence[int] = (),
 ) -> list[Node]:
     """The first plan of all `count` steps; raises NotPlannable. `prefer`: index of the first candidate, by step."""
     done: list[Node] = []
+    opened: list[tuple[int, Attempts]] = []
     latest = -1, NotPlannable("there is no step")
     grasps: dict[int, int] = {}
     resumed: Node | None = None
@@ -99,6 +118,7 @@ def _search(
         try:
             if node is None:
                 node = Node(state, Attempts(opens(k, state), prefer=prefer[k] if prefer else 0))
+                opened.append((k, node.attempts))
             node.chosen = node.attempts.take()
         except NotPlannable as refusal:
             if refusal.loc:
@@ -108,9 +128,10 @@ def _search(
                 latest = k, refusal
                 grasps = {j: 0 for j in conflicts if done[j].attempts.decides == "grasp"}
             grasps |= {j: done[j].taken for j in grasps if j < len(done)}
-            resumed = _back(done, conflicts)
+            resumed = _back(done, conflicts, refusal)
             if resumed is None:
-                raise _counted(latest[1], max(grasps.values(), default=0)) from refusal
+                refused = tuple((j, one) for j, attempts in opened for one in attempts.dropped)
+                raise explain(_counted(latest[1], max(grasps.values(), default=0)), refused) from refusal
         else:
             node.taken += 1
             done.append(node)
@@ -159,7 +180,7 @@ def _cheapest(
 
         try:
             same = [each.chosen.index for each in nodes[after:] if each.chosen is not None]
-            tail = [other, *_search(later, len(nodes) - after, chosen.plan.end, on_later, same)]
+            tail = [other, *_search(later, len(nodes) - after, chosen.plan.end, on_later, prefer=same)]
         except NotPlannable:
             continue
         costs = [total([each]) for each in tail]
@@ -197,7 +218,7 @@ def _set_down(node: Node) -> frozenset[str]:
     return frozenset() if carried is None or _end(node).carried is not None else frozenset({carried.body})
 
 
-def _back(done: list[Node], conflicts: set[int]) -> Node | None:
+def _back(done: list[Node], conflicts: set[int], refusal: NotPlannable) -> Node | None:
     """The latest step among `conflicts` with plans left, which is taken from `done` with all later ones; None if there
     is none."""
     while conflicts:
@@ -208,6 +229,8 @@ def _back(done: list[Node], conflicts: set[int]) -> Node | None:
         conflicts |= node.conflicts
         if node.taken < MOST:
             node.conflicts = set(conflicts)
+            if node.chosen is not None:
+                node.left.append(Dropped(node.chosen.candidate.name, refusal, node.chosen.plan))
             if node.chosen is not None and node.chosen.candidate.grasp is not None:
                 node.attempts.excluded.append(node.chosen.candidate.grasp)
             return node

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -51,6 +52,11 @@ def kind_of(path: Path) -> Kind:
 
 def render(chart: Chart, kind: Kind) -> bytes:
     """The bytes of the figure file of a chart."""
+    return drawn(lambda: _figure(chart), kind)
+
+
+def drawn(figure: Callable[[], Figure], kind: Kind) -> bytes:
+    """The bytes of the file of a figure that is made in the common style."""
     import matplotlib
 
     stream = BytesIO()
@@ -80,7 +86,7 @@ def render(chart: Chart, kind: Kind) -> bytes:
         }
     )
     with style:
-        _figure(chart).savefig(stream, format=kind, dpi=DPI, metadata=metadata[kind])
+        figure().savefig(stream, format=kind, dpi=DPI, metadata=metadata[kind])
     return stream.getvalue()
 
 

@@ -83,8 +83,8 @@ def player_html(playback: Playback, *, ghosts: Sequence[Ghost] = (), whole_page:
     )
 
 
-def player_page(playback: Playback) -> str:
-    """A whole page: task, verdict, notes and player."""
+def player_page(playback: Playback, *, ghosts: Sequence[Ghost] = ()) -> str:
+    """A whole page: task, verdict, notes and player; `ghosts` are drawn over the run."""
     verdict = playback.verdict
     name = html.escape(playback.name)
     lines = []
@@ -102,7 +102,7 @@ def player_page(playback: Playback) -> str:
         f'<title>{name}</title><link rel="icon" href="data:,">\n'
         f"<style>\n{_read('whole_page.css')}"
         f"</style></head><body>\n<header><h1>{name}</h1>{''.join(lines)}</header>\n"
-        f"{player_html(playback, whole_page=True)}</body></html>\n"
+        f"{player_html(playback, ghosts=ghosts, whole_page=True)}</body></html>\n"
     )
 
 

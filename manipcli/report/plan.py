@@ -1,4 +1,4 @@
-"""A plan as text, JSON or CSV: one row per motion with its nearest limit, or one row per trajectory point."""
+"""A plan as JSON or CSV: an object per motion with its limits and margins, or a row per trajectory point."""
 
 from __future__ import annotations
 
@@ -10,12 +10,26 @@ from typing import Protocol, TextIO
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.core.text import number_of
 from manipcli.model.collision import CollisionHit
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Dropped
+from manipcli.plan.motion_margins import MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.report.json import Json, dumps
-from manipcli.report.table import table
+from manipcli.plan.why_not import stage_of
+from manipcli.report.json import Json, dumps, picked, plain
+
+
+class PlannedStep(Protocol):
+    """The shown fields of a step."""
+
+    @property
+    def id(self) -> str: ...
+    @property
+    def verb(self) -> str: ...
+    @property
+    def candidate(self) -> str: ...
+    @property
+    def dropped(self) -> Sequence[Dropped]: ...
 
 
 class PlannedMotion(Protocol):
@@ -64,60 +78,42 @@ def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
     return max(used, key=lambda use: use.fraction, default=None)
 
 
-def render_text(
-    task: str,
-    motions: Sequence[PlannedMotion],
-    robot: RobotModel,
-    clearances: Sequence[CollisionHit | None],
-) -> str:
-    """A table with one row per motion; the step's name is shown at its first motion only.
+class PlannedTask(Protocol):
+    """The shown parts of a plan."""
 
-    Args:
-        task: its name.
-        motions: of the plan.
-        robot: of the task.
-        clearances: the least clearance of each motion.
-    """
-    rows = []
-    previous = None
-    for motion, near in zip(motions, clearances, strict=True):
-        most = limiting(motion.trajectory, robot) if motion.trajectory is not None else None
-        rows.append(
-            (
-                motion.step_id if motion.step_id != previous else "",
-                motion.verb if motion.step_id != previous else "",
-                motion.label,
-                f"{motion.duration:.3f} s",
-                f"{most.quantity} of {most.joint}" if most is not None else "-",
-                f"{100.0 * most.fraction:.1f} %" if most is not None else "-",
-                f"{1000.0 * near.distance:.1f} mm" if near is not None else "-",
-                f"{near.a} and {near.b} at {near.time:.2f} s" if near is not None else "-",
-            )
-        )
-        previous = motion.step_id
-    headers = ("step", "verb", "motion", "duration", "nearest limit", "used", "clearance", "between")
-    total = sum(motion.duration for motion in motions)
-    summary = f"✓ {task} planned: {number_of(len(motions), 'motion')}, {total:.2f} s"
-    return f"{table(headers, rows, right=('duration', 'used', 'clearance'))}\n\n{summary}"
+    @property
+    def steps(self) -> Sequence[PlannedStep]: ...
+    @property
+    def motions(self) -> Sequence[PlannedMotion]: ...
+    def clearances(self) -> Sequence[CollisionHit | None]: ...
+    def margins(self) -> Sequence[MotionMargins]: ...
 
 
-def render_json(
-    task: str,
-    motions: Sequence[PlannedMotion],
-    robot: RobotModel,
-    clearances: Sequence[CollisionHit | None],
-) -> str:
-    """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m; see
-    `render_text`."""
+def render_json(task: str, plan: PlannedTask, robot: RobotModel) -> str:
+    """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m."""
+    motions = zip(plan.motions, plan.clearances(), plan.margins(), strict=True)
     return dumps(
         {
             "task": task,
             "verdict": "passed",
-            "duration": round(sum(motion.duration for motion in motions), 9),
-            "motions": [_motion(motion, robot, near) for motion, near in zip(motions, clearances, strict=True)],
+            "duration": round(sum(motion.duration for motion in plan.motions), 9),
+            "motions": [_motion(motion, robot, near, margins) for motion, near, margins in motions],
+            "steps": [_step(step) for step in plan.steps],
             "errors": [],
         }
     )
+
+
+def _step(step: PlannedStep) -> Json:
+    return {
+        "id": step.id,
+        "verb": step.verb,
+        "candidate": step.candidate or None,
+        "dropped": [
+            {"name": one.name or None, "stage": stage_of(one.refusal.cause), "cause": one.refusal.cause}
+            for one in step.dropped
+        ],
+    }
 
 
 def write_csv(motions: Sequence[PlannedMotion], stream: TextIO) -> None:
@@ -148,7 +144,7 @@ def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> li
     return [f"{value:.9g}" for value in values[:, trajectory.names.index(joint)]]
 
 
-def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None) -> Json:
+def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None, margins: MotionMargins) -> Json:
     trajectory = motion.trajectory
     most = limiting(trajectory, robot) if trajectory is not None else None
     return {
@@ -160,6 +156,9 @@ def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None)
         "limited_by": None
         if most is None
         else {"joint": most.joint, "quantity": most.quantity, "used": round(most.fraction, 6)},
+        "bound_by": None if margins.binding is None else picked(margins.binding, "joint quantity share"),
+        "margins": plain(margins.margins),
+        "manipulability": None if margins.manipulability is None else picked(margins.manipulability, "least time"),
         "clearance": None
         if near is None
         else {"between": [near.a, near.b], "distance": round(near.distance, 6), "time": round(near.time, 6)},

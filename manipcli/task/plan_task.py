@@ -14,32 +14,44 @@ from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
-from manipcli.plan.candidates import Candidates, first
+from manipcli.plan.candidates import Candidates, Dropped, first
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.clearance import least_clearance
 from manipcli.plan.cost import step_cost
 from manipcli.plan.hand import SPEED, closing_speed
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.motion import Motion, PlanningState, StepPlan
+from manipcli.plan.motion_margins import MotionMargins, motion_margins
 from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.why_not import explained
 from manipcli.spec.task import StepSpec
 from manipcli.task.task import Task
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """A step (`place`: file:line:column) and its plan. `grasps`: excluded tool orientations R_WT (3, 3), after which a
-    later step has no plan."""
+    """A step and its plan.
+
+    Attributes:
+        id, verb: of the step.
+        plan: of its candidate.
+        place: file:line:column.
+        grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
+        candidate: name of the candidate; "" for the only way.
+        dropped: the candidates that were tried before it.
+    """
 
     id: str
     verb: str
     plan: StepPlan
     place: str
     grasps: tuple[Array, ...] = ()
+    candidate: str = ""
+    dropped: tuple[Dropped, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,15 +84,22 @@ class Plan:
             for motion in step.plan.motions
         )
 
+    def spans(self) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:
+        """Each motion with the states before and after it."""
+        found: list[tuple[Motion, PlanningState, PlanningState]] = []
+        before = self.start
+        for step in self.steps:
+            found += spans(step.plan.motions, before, step.plan.end)
+            before = step.plan.end
+        return tuple(found)
+
     def clearances(self) -> tuple[CollisionHit | None, ...]:
         """The least clearance of each of `motions`: parts, distance and time; None where nothing moves."""
-        found = []
-        for step in self.steps:
-            motions = step.plan.motions
-            begins = [motion.begins for motion in motions[1:]]
-            ends = [state or step.plan.end for state in (*begins, step.plan.end)]
-            found += [least_clearance(self.planner, motion, end) for motion, end in zip(motions, ends, strict=True)]
-        return tuple(found)
+        return tuple(least_clearance(self.planner, motion, end) for motion, _, end in self.spans())
+
+    def margins(self) -> tuple[MotionMargins, ...]:
+        """What binds each of `motions`, its margins and its manipulability."""
+        return tuple(motion_margins(self.planner, *span) for span in self.spans())
 
     @property
     def outline(self) -> PlanOutline:
@@ -111,6 +130,16 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
 
 
+def spans(
+    motions: Sequence[Motion], start: PlanningState, end: PlanningState
+) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:
+    """Motions from `start` to `end`, each with the states before and after it; nothing moves where none is known."""
+    begins: list[PlanningState] = []
+    for motion in motions:
+        begins.append(motion.begins or (begins[-1] if begins else start))
+    return tuple(zip(motions, begins, (*begins[1:], end), strict=True))
+
+
 def refused(task: Task, refusal: NotPlannable) -> Verdict:
     """The verdict on a task that did not run because a step cannot be planned."""
     reason = "a step cannot be planned"
@@ -139,6 +168,7 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
         errors=refusal.findings,
         text=f"{reason}: {refusal}",
         drawn=task.drawn,
+        candidates=refusal.candidates,
     )
 
 
@@ -193,18 +223,25 @@ def _steps(
     def on_step(k: int, again: bool) -> None:
         on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
 
+    def explain(refusal: NotPlannable, refused: Sequence[tuple[int, Dropped]]) -> NotPlannable:
+        return explained(refusal, [(str(steps[k].id), one) for k, one in refused])
+
     solved = search_task(
         opens,
         len(steps),
         start,
         on_step=on_step,
+        explain=explain,
         optimise=task.spec.plan.optimise,
         cost=lambda plan: step_cost(planner, plan).total,
     )
     return tuple(
-        PlannedStep(str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps)
+        PlannedStep(
+            str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps,
+            one.chosen.candidate.name, one.dropped,
+        )
         for k, (step, one) in enumerate(zip(steps, solved, strict=True))
-    )
+    )  # fmt: skip
 
 
 def _planner(task: Task) -> Planner:

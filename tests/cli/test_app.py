@@ -29,6 +29,7 @@ from manipcli.description.elements import Joint, JointLimits
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.robot import RobotModel
+from manipcli.plan.motion_margins import Binding, Margin, MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
@@ -297,10 +298,13 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=(_motion(),), clearances=lambda: (NEAR,))
+    margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
+    pipeline.plan_task = lambda _: SimpleNamespace(
+        motions=(_motion(),), steps=(), clearances=lambda: (NEAR,), margins=lambda: (margins,)
+    )
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
-    assert "velocity of j1" in (out := capsys.readouterr().out)
+    assert "j1 velocity, 60 % of the time" in (out := capsys.readouterr().out)
     assert "75.0 %" in out and "12.3 mm" in out and "cup and robot/palm at 1.50 s" in out
     rows = csv.read_text().splitlines()
     assert rows[0] == "step,motion,time,j1_position,j1_velocity,j1_acceleration"

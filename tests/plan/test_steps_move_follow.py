@@ -281,9 +281,9 @@ def test_what_is_too_near_is_told_with_the_clearance_that_is_kept(bench: Make) -
     planner = bench().planner
     too_near, overlap = CollisionHit("cup", "robot/palm", 0.0039), CollisionHit("floor", "robot/base", -0.005)
     told = "cup and robot/palm have a clearance of 3.9 mm, the clearance is 4 mm"
-    assert planner.in_the_way(too_near) == told
-    assert planner.in_the_way(overlap) == "floor and robot/base overlap by 5.0 mm"
-    assert planner.in_the_way(CollisionHit("desk", "robot/palm", -1e-5)) == "desk and robot/palm touch"
+    assert str(planner.in_the_way(too_near)) == told
+    assert str(planner.in_the_way(overlap)) == "floor and robot/base overlap by 5.0 mm"
+    assert str(planner.in_the_way(CollisionHit("desk", "robot/palm", -1e-5))) == "desk and robot/palm touch"
     just = planner.refusal(bench().now, CollisionHit("desk", "robot/palm", -1e-5), "is", "before it moves")
     assert just.cause == "'desk' and 'robot/palm' overlap by less than 0.1 mm before it moves"
     refusal = planner.refusal(bench().now, overlap, "is", "before it moves")

@@ -57,6 +57,8 @@ def test_the_bytes_are_those_of_rosbags(count: int) -> None:
         data = encoder.encode(ns, order)
         assert data == _by_rosbags(order, ns, points=True)
         assert read_contacts(CdrReader(data), points=True) == order
+        without = tuple(contact._replace(points=()) for contact in order)
+        assert read_contacts(CdrReader(data), points=True, skip=True) == without
 
 
 def test_messages_without_points_are_read() -> None:

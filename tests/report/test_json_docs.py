@@ -13,6 +13,7 @@ import pytest
 
 from manipcli.cli.app import main
 from manipcli.core.errors import Diagnostic, Loc, Place
+from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.judge.agreement import compare
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.measured_run import MeasuredRun, Variant
@@ -32,6 +33,7 @@ NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1, relative=-0.5)
 WRONG = Diagnostic("TASK201", "unknown key", Place("a.yaml", 3, 5))
 VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
+    candidates=(RefusedCandidates("pick_1", "reach", 2, "reach: too far", ("yaw 15",)),),
     drawn=Drawn(3, (("scene.cup.mass", 0.25),)), saturations=Saturations({"joint_1": 3}, {"motor_1": 2}),
 )  # fmt: skip
 RUN = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
@@ -41,7 +43,8 @@ CASE = CaseReport(
 OBJECTS = {
     "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
-    "findings", "disagreements", "numbers", "motions", "motions.limited_by", "motions.clearance", "pairs",
+    "findings", "disagreements", "numbers", "motions", "motions.limited_by", "motions.clearance", "motions.bound_by",
+    "motions.margins", "motions.manipulability", "candidates", "pairs",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators", "limits"}

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import ExitCode, NotPlannable
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, NotPlannable
+
+if TYPE_CHECKING:
+    from manipcli.pipeline import Plan
+
+Export = Literal["jointtrajectory"]
 
 
 def plan(
@@ -18,6 +23,22 @@ def plan(
     *,
     csv: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write all points of all trajectories to FILE.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw each joint's motion with its limits: .svg, .png or .pdf."),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE", help="Write a page that plays the planned motion to FILE."),
+    ] = None,
+    export: Annotated[
+        Export | None,
+        typer.Option("--export", help="Write each step as a ROS message in YAML, for the arm's joints."),
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--to", metavar="FOLDER", help="With --export: folder of the files [default: TASK_trajectories]."),
     ] = None,
     seed: Seed = None,
     sample: Sample = None,
@@ -28,12 +49,19 @@ def plan(
 ) -> ExitCode:
     """Plan a task and show its motions.
 
-    Shows the duration of each motion, the joint that limits it, and its least clearance; simulates nothing.
+    Shows what binds each motion, its margins, its clearance and the dropped candidates; simulates nothing. Without a
+    plan, shows the refused candidates by stage.
     """
     from manipcli import pipeline
-    from manipcli.report.plan import render_json, render_text, write_csv
 
-    check_outputs(("--csv", csv), reads=(task,))
+    if folder is not None and export is None:
+        raise InvalidInput([Diagnostic("USE084", "--to has no effect without --export")])
+    check_outputs(("--csv", csv), ("--picture", picture), ("--html", html), reads=(task,))
+    kind = None
+    if picture is not None:
+        from manipcli.replay.figure import kind_of
+
+        kind = kind_of(picture)
     loaded = pipeline.load_task(
         task,
         overrides=tuple(overrides or ()),
@@ -46,17 +74,67 @@ def plan(
         planned = pipeline.plan_task(loaded)
     except NotPlannable as refusal:
         if format_ != "json":
+            if sum(group.count for group in refusal.candidates) > 1:
+                from manipcli.report.plan_text import render_refused
+
+                console.result(render_refused(refusal.candidates))
             raise
         from manipcli.report.json import render_verdict
 
         console.result(render_verdict(pipeline.refused(loaded, refusal)))
         return refusal.exit_code
-    motions = planned.motions
+    name = loaded.spec.task
     if csv is not None:
         from manipcli.core.whole_file import whole_file
+        from manipcli.report.plan import write_csv
 
         with whole_file(csv) as partial, partial.open("w", encoding="utf-8", newline="") as stream:
-            write_csv(motions, stream)
-    render = render_json if format_ == "json" else render_text
-    console.result(render(loaded.spec.task, motions, loaded.robot, planned.clearances()))
+            write_csv(planned.motions, stream)
+    if picture is not None and kind is not None:
+        from manipcli.core.whole_file import write_whole
+        from manipcli.replay.plan_figure import plan_figure
+
+        write_whole(picture, plan_figure(planned, name, kind))
+    if html is not None:
+        _write_page(planned, name, html)
+    if export is not None:
+        _export(planned, folder or Path(f"{task.stem}_trajectories"))
+    if format_ == "json":
+        from manipcli.report.plan import render_json
+
+        console.result(render_json(name, planned, loaded.robot))
+    else:
+        from manipcli.report.plan_text import render_text
+
+        console.result(render_text(name, planned))
     return ExitCode.PASSED
+
+
+def _write_page(planned: Plan, name: str, path: Path) -> None:
+    from manipcli.core.whole_file import write_whole
+    from manipcli.replay.planned_playback import planned_ghosts, planned_playback
+    from manipcli.replay.player import player_page
+
+    playback = planned_playback(planned, name)
+    ghosts, more = planned_ghosts(planned, playback)
+    if more:
+        console.talk(f"note: {more} more dropped candidates are not drawn")
+    write_whole(path, player_page(playback, ghosts=ghosts).encode())
+
+
+def _export(planned: Plan, folder: Path) -> None:
+    """One file for each step that moves the arm, numbered in the order of the task."""
+    from manipcli.core.whole_file import write_whole
+    from manipcli.report.joint_trajectory_export import message, step_trajectory
+
+    folder.mkdir(parents=True, exist_ok=True)
+    columns = {name: k for k, name in enumerate(planned.planner.robot.joint_names)}
+    spans = iter(planned.spans())
+    for k, step in enumerate(planned.steps, start=1):
+        trajectory = step_trajectory([next(spans) for _ in step.plan.motions], columns)
+        if trajectory is not None:
+            path = folder / f"{k:02d}_{step.id}.yaml"
+            write_whole(
+                path, message(trajectory, f"{step.verb} '{step.id}'; the hand's motion is not included").encode()
+            )
+            console.talk(f"written: {path}")

@@ -34,8 +34,9 @@ def have_points(definition: str) -> bool:
     raise ValueError(f"its {CONTACTS} have fields that this manipcli does not know")
 
 
-def read_contacts(reader: CdrReader, *, points: bool) -> tuple[Contact, ...]:
-    """All contacts of a message; `points`: they have contact points."""
+def read_contacts(reader: CdrReader, *, points: bool, skip: bool = False) -> tuple[Contact, ...]:
+    """All contacts of a message; `points`: they have contact points; `skip`: leave these out."""
+    read = _skipped if skip else _points
     reader.header()
     return tuple(
         Contact(
@@ -43,7 +44,7 @@ def read_contacts(reader: CdrReader, *, points: bool) -> tuple[Contact, ...]:
             b=reader.text(),
             force=reader.f64(),
             distance=reader.f64(),
-            points=_points(reader) if points else (),
+            points=read(reader) if points else (),
         )
         for _ in range(reader.count(_SMALLEST))
     )
@@ -57,3 +58,10 @@ def _points(reader: CdrReader) -> tuple[ContactPoint, ...]:
         ContactPoint((x, y, z), (nx, ny, nz), force, (fx, fy, fz))
         for x, y, z, nx, ny, nz, force, fx, fy, fz in _POINT.iter_unpack(reader.take(count * _POINT.size, 8))
     )
+
+
+def _skipped(reader: CdrReader) -> tuple[ContactPoint, ...]:
+    count = reader.count(_POINT.size)
+    if count:
+        reader.skip(count * _POINT.size, 8)
+    return ()

@@ -32,18 +32,19 @@ MAX_ATTACHED = 1 << 30
 """Largest size of all attachments together [byte]."""
 
 
-def open_recording(path: Path, *, being_written: bool = False) -> Recording:
+def open_recording(path: Path, *, being_written: bool = False, contact_points: bool = True) -> Recording:
     """Open a recording whose spans are read from the file on demand, with memory independent of its length.
 
     Args:
         path: an `.mcap` file, or the `.mcap.partial` file of a killed run.
         being_written: the run has just flushed this partial file, so its missing end is not a loss.
+        contact_points: read the points of contacts, which verdicts do not need.
 
     Raises:
         BadRecording: not a recording of manipcli, of a later format, damaged, or too large; also while
             iterating over the spans. A file without its end is read up to there, with the reason in `lost`.
     """
-    reader = _Reader(path)
+    reader = _Reader(path, contact_points=contact_points)
     scan = Scan(path, being_written=being_written)
     for record, indexes in scan.pieces():
         if record.opcode == CHUNK:
@@ -61,8 +62,9 @@ def read_recording(path: Path, *, being_written: bool = False) -> Recording:
 class _Reader:
     """State while reading the records of a file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, contact_points: bool) -> None:
         self._path = path
+        self._skip_points = not contact_points
         self._named = 0
         self._attached = 0
         self._schemas: dict[int, str] = {}
@@ -211,6 +213,7 @@ class _Reader:
                 chunks=tuple(self._chunks),
                 cut=lost is not None,
                 points=self._points,
+                skip_points=self._skip_points,
             ),
             events=tuple(self._events),
             metadata=self._metadata,

@@ -44,6 +44,7 @@ class FileSpans:
         chunks: offsets of its chunks.
         cut: whether parts of the file are missing, so that messages of some ticks can be missing.
         points: whether contacts have contact points.
+        skip_points: leave these out.
     """
 
     path: Path
@@ -52,6 +53,7 @@ class FileSpans:
     chunks: tuple[int, ...]
     cut: bool
     points: bool
+    skip_points: bool = False
 
     def __iter__(self) -> Iterator[Span]:
         """
@@ -68,7 +70,7 @@ class FileSpans:
         yield _with_velocities(before, span, None)
 
     def _without_velocities(self) -> Iterator[Span]:
-        reader = _SpanReader(self.contents, self.channels, gaps=self.cut, points=self.points)
+        reader = _SpanReader(self.contents, self.channels, gaps=self.cut, points=self.points, skip=self.skip_points)
         empty = True
         with readable(self.path), self.path.open("rb") as file:
             for start in self.chunks:
@@ -102,10 +104,12 @@ class _Apart(Exception):
 class _SpanReader:
     """Collects the messages of successive chunks into complete ticks.
 
-    `gaps`: ticks can be missing; `points`: contacts have contact points.
+    `gaps`: ticks can be missing; `points`: contacts have contact points, and `skip` leaves these out.
     """
 
-    def __init__(self, contents: Contents, channels: Mapping[int, str], *, gaps: bool, points: bool) -> None:
+    def __init__(
+        self, contents: Contents, channels: Mapping[int, str], *, gaps: bool, points: bool, skip: bool
+    ) -> None:
         n, m = len(contents.joints), len(contents.bodies)
         self._channels = channels
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
@@ -129,7 +133,7 @@ class _SpanReader:
         self._strided = len(set(strides.values())) > 1
         self._contacts: list[ContactSnapshot] = []
         self._gaps = gaps
-        self._points = points
+        self._points, self._skip = points, skip
         self._last = -1
         self._number: int | None = None
 
@@ -155,7 +159,7 @@ class _SpanReader:
             elif topic == topics.CONTACTS:
                 self._follow(sequences(data, found))
                 self._contacts += [
-                    ContactSnapshot(ns / 1e9, read_contacts(reader, points=self._points))
+                    ContactSnapshot(ns / 1e9, read_contacts(reader, points=self._points, skip=self._skip))
                     for ns, reader in singly(data, found)
                 ]
 

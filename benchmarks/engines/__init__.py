@@ -1,0 +1,1 @@
+"""What differs between the engines with physics: measures both and writes docs/engines.md."""

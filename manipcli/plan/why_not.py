@@ -1,0 +1,70 @@
+"""Why a task has no plan: its refused candidates by stage, and the one change that would free most of them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.refused_candidates import RefusedCandidates
+from manipcli.core.text import number_of
+from manipcli.plan.candidates import NUMBER, Dropped
+
+START: Final = "start"
+"""The stage of a refusal before any motion."""
+NAMED: Final = 5
+"""Names of candidates that a group lists."""
+_LABEL: Final = re.compile(r"([a-z_]+): ")
+_DURING: Final = re.compile(r" s of '([a-z_]+)'")
+
+Refused = Sequence[tuple[str, Dropped]]
+"""Id of the step and candidate, in the order of their refusal."""
+
+
+def stage_of(cause: str) -> str:
+    """The motion that a cause names: `approach: ...`, or `... at t = 0.3 s of 'approach'`."""
+    label = _LABEL.match(cause)
+    during = label or _DURING.search(cause)
+    return during[1] if during is not None else START
+
+
+def by_stage(refused: Refused) -> tuple[RefusedCandidates, ...]:
+    """The refused candidates by step, stage and reason, the commonest first."""
+    groups: dict[tuple[str, str, str], list[Dropped]] = {}
+    for step, one in refused:
+        cause = one.refusal.cause
+        groups.setdefault((step, stage_of(cause), NUMBER.sub("#", cause)), []).append(one)
+    found = [
+        RefusedCandidates(step, stage, len(of), of[0].refusal.cause, tuple(one.name for one in of if one.name)[:NAMED])
+        for (step, stage, _), of in groups.items()
+    ]
+    return tuple(sorted(found, key=lambda group: -group.count))
+
+
+def explained(refusal: NotPlannable, refused: Refused) -> NotPlannable:
+    """The refusal of a task with its refused candidates, and with the change that would free most of them.
+
+    A pose out of reach is told how far the base would have to move; that is searched here, once.
+    """
+    hints = [] if refusal.hint is None else [refusal.hint]
+    if len(refused) > 1 and (change := change_for_most(refused)):
+        hints.append(change)
+    remedy = None if refusal.remedy is None else refusal.remedy()
+    if remedy is not None:
+        hints.append(remedy)
+    found = refusal.but(hint="; ".join(hints) or None, candidates=by_stage(refused), motions=())
+    found.remedy = None  # done, and it holds the solver
+    return found
+
+
+def change_for_most(refused: Refused) -> str:
+    """The body to move that is in the way of most candidates; "" if none is in the way of at least half of them."""
+    bodies = Counter(part for _, one in refused for part in sorted(one.refusal.parts) if not part.startswith("robot/"))
+    if not bodies:
+        return ""
+    body, count = bodies.most_common(1)[0]
+    if 2 * count < len(refused):
+        return ""
+    return f"move '{body}': it is in the way of {count} of {number_of(len(refused), 'candidate')}"

@@ -1,0 +1,120 @@
+"""A plan as a playback: robot and scene as predicted, and dropped candidates as ghosts, before any simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Transform
+from manipcli.plan.candidates import Dropped
+from manipcli.plan.motion import Motion
+from manipcli.plan.planned_states import PlannedStates, planned_states
+from manipcli.replay.ghost import Ghost, ghost_of
+from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
+from manipcli.task.plan_task import Plan, PlannedStep, spans
+
+MOST_GHOSTS: Final = 8
+"""Ghosts of a page; it has eight colours, and more hide the motion."""
+NOTE: Final = "planned, not simulated: bodies are where the planner predicts them"
+
+
+def planned_playback(plan: Plan, name: str, *, rate: float = RATE) -> Playback:
+    """The plan sampled at `rate` [Hz]; torques are shown as efforts."""
+    states, steps, clock = [], [], 0.0
+    before = plan.start
+    for step in plan.steps:
+        begins, phases = clock, []
+        for motion, start, end in spans(step.plan.motions, before, step.plan.end):
+            states.append((clock, planned_states(plan.planner, motion, end, begins=start, period=1.0 / rate)))
+            phases.append(Phase(motion.label, clock, clock + motion.duration))
+            clock += motion.duration
+        before = step.plan.end
+        steps.append(PlaybackStep(step.id, step.verb, step.id, begins, clock, "done", phases=tuple(phases)))
+    return _playback(plan, name, states, tuple(steps))
+
+
+def planned_ghosts(plan: Plan, shown: Playback) -> tuple[tuple[Ghost, ...], int]:
+    """Ghosts of the dropped candidates, as far as each was planned, in the time of their steps; and how many more
+    there are."""
+    found: list[Ghost] = []
+    tried = [
+        (step, at, one, motions)
+        for step, at in zip(plan.steps, shown.steps, strict=True)
+        for one in step.dropped
+        if (motions := _motions(one))
+    ]
+    for step, at, one, motions in tried[:MOST_GHOSTS]:
+        found.append(ghost_of(_name(step, one), _run(plan, motions, one, at.start), shown))
+    return tuple(found), len(tried) - len(found)
+
+
+def _name(step: PlannedStep, one: Dropped) -> str:
+    return f"{step.id}: {one.name}" if one.name else f"{step.id}: dropped candidate"
+
+
+def _motions(one: Dropped) -> tuple[Motion, ...]:
+    if one.plan is not None:
+        return one.plan.motions
+    motions = [motion for motion in one.refusal.motions if isinstance(motion, Motion)]
+    return tuple(
+        replace(motion, duration=max(motion.duration, motion.trajectory.duration)) if motion.trajectory else motion
+        for motion in motions
+    )
+
+
+def _run(plan: Plan, motions: Sequence[Motion], one: Dropped, clock: float) -> Playback:
+    start = next((motion.begins for motion in motions if motion.begins is not None), plan.start)
+    last = motions[-1]
+    end = one.plan.end if one.plan is not None else last.begins or start
+    if one.plan is None and last.trajectory is not None:
+        position = np.array(end.position)
+        position[list(plan.planner.robot.indices(last.trajectory.names))] = last.trajectory.positions[-1]
+        end = end.moved(position)
+    states = []
+    for motion, before, after in spans(motions, start, end):
+        states.append((clock, planned_states(plan.planner, motion, after, begins=before)))
+        clock += motion.duration
+    return _playback(plan, one.name, states, ())
+
+
+def _playback(
+    plan: Plan, name: str, states: Sequence[tuple[float, PlannedStates]], steps: tuple[PlaybackStep, ...]
+) -> Playback:
+    times = np.concatenate([clock + each.times for clock, each in states])
+    # The last state of a motion is the first of the next.
+    kept = np.append(np.diff(times) > 1e-9, True)
+    position, velocity, torque = (
+        np.concatenate([getattr(each, of) for _, each in states])[kept] for of in ("position", "velocity", "torque")
+    )
+    bodies = [row for _, each in states for row in each.bodies]
+    rows = [row for row, keep in zip(bodies, kept, strict=True) if keep]
+    count = len(plan.start.bodies)
+
+    def stacked(of: str, size: int) -> np.ndarray:
+        values = [[_part(X, of) for X in row] for row in rows]
+        return np.array(values, dtype=np.float64).reshape(len(rows), count, size)
+
+    return Playback(
+        name=name,
+        robot=plan.planner.robot,
+        scene=plan.planner.scene,
+        joint_names=tuple(plan.planner.robot.joint_names),
+        times=times[kept],
+        position=position,
+        velocity=velocity,
+        effort=torque,
+        reference=np.full_like(position, np.nan),
+        body_position=stacked("p", 3),
+        body_quat_xyzw=stacked("quat_xyzw", 4),
+        contacts=((),) * len(rows),
+        contact_times=((),) * len(rows),
+        steps=steps,
+        notes=(NOTE,),
+    )
+
+
+def _part(X: Transform, of: str) -> np.ndarray:
+    return np.asarray(getattr(X, of))

@@ -1,0 +1,129 @@
+"""A planned step as a trajectory_msgs/JointTrajectory in YAML, which a `follow` step reads back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.plan.motion import Motion, PlanningState
+from manipcli.plan.trajectory import JointTrajectory
+
+TOLERANCE: Final = 1e-6
+"""[rad or m] Deviation in position of the written splines."""
+JERK: Final = 0.001
+"""Deviation of the change of acceleration from point to point, as a share of the largest: `follow` verifies jerks."""
+Span = tuple[Motion, PlanningState, PlanningState]
+"""A motion with the states before and after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    times: list[float]
+    position: list[Array]
+    velocity: list[Array]
+    acceleration: list[Array]
+
+    def add(self, time: float, q: Array, v: Array, a: Array) -> None:
+        """A point at the time of the one before it is the same point."""
+        if self.times and time - self.times[-1] < 1e-9:
+            return
+        self.times.append(time)
+        self.position.append(q)
+        self.velocity.append(v)
+        self.acceleration.append(a)
+
+
+def step_trajectory(spans: Sequence[Span], columns: dict[str, int]) -> JointTrajectory | None:
+    """The trajectories of all motions of a step as one, at rest while only the hand moves; None if the arm rests.
+
+    Args:
+        spans: motions of the step.
+        columns: of each joint in `PlanningState.position`.
+    """
+    moved = {name for motion, _, _ in spans if motion.trajectory is not None for name in motion.trajectory.names}
+    names = tuple(name for name in columns if name in moved)
+    if not names:
+        return None
+    chosen, still = [columns[name] for name in names], np.zeros(len(names))
+    rows, begins = _Rows([], [], [], []), 0.0
+    for motion, before, _ in spans:
+        here = before.position[chosen]
+        rows.add(begins, here, still, still)
+        if motion.trajectory is not None:
+            _add(rows, begins, motion.trajectory, names, here)
+            here = rows.position[-1]
+        begins += motion.duration
+        rows.add(begins, here, still, still)
+    return thinned(
+        JointTrajectory.of_arrays(
+            names, np.array(rows.times), np.array(rows.position), np.array(rows.velocity), np.array(rows.acceleration)
+        )
+    )
+
+
+def thinned(trajectory: JointTrajectory) -> JointTrajectory:
+    """Fewer points of a trajectory with accelerations, whose quintic splines differ from it by at most `TOLERANCE`.
+
+    Intervals are halved as long as they differ.
+    """
+    times, positions, velocities, accelerations = (
+        trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations
+    )  # fmt: skip
+    assert velocities is not None and accelerations is not None
+    last = len(times) - 1
+    kept = np.array([0, last])
+    steps = np.diff(accelerations, axis=0)
+    steepest = max(float(np.max(np.abs(steps))), 1e-9)
+    while True:
+        shorter = JointTrajectory.of_arrays(
+            trajectory.names, times[kept], positions[kept], velocities[kept], accelerations[kept]
+        )
+        p, _, a = shorter.sample(times)
+        off = np.max(np.abs(p - positions), axis=1)[1:] > TOLERANCE
+        off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > JERK * steepest
+        wrong = np.unique(np.searchsorted(kept, np.flatnonzero(off), side="right") - 1)
+        middles = (kept[wrong] + kept[wrong + 1]) // 2
+        more = np.setdiff1d(middles, kept)
+        if not len(more):
+            return shorter
+        kept = np.union1d(kept, more)
+
+
+def _add(rows: _Rows, begins: float, trajectory: JointTrajectory, names: Sequence[str], here: Array) -> None:
+    at = [names.index(name) for name in trajectory.names]
+    still = np.zeros(len(trajectory.names))
+    for k, time in enumerate(trajectory.times.tolist()):
+        q, v, a = np.array(here), np.zeros(len(names)), np.zeros(len(names))
+        q[at] = trajectory.positions[k]
+        v[at] = still if trajectory.velocities is None else trajectory.velocities[k]
+        a[at] = still if trajectory.accelerations is None else trajectory.accelerations[k]
+        rows.add(begins + time, q, v, a)
+
+
+def message(trajectory: JointTrajectory, comment: str) -> str:
+    """The message in YAML; numbers read back bit for bit, times to the nanosecond."""
+    lines = [f"# {comment}", "header: {frame_id: ''}", f"joint_names: [{', '.join(trajectory.names)}]", "points:"]
+    velocities, accelerations = trajectory.velocities, trajectory.accelerations
+    assert velocities is not None and accelerations is not None  # `step_trajectory` gives both
+    for k, time in enumerate(trajectory.times.tolist()):
+        sec, nanosec = divmod(round(time * 1e9), 1_000_000_000)
+        lines.append(
+            f"- {{positions: {_list(trajectory.positions[k])}, velocities: {_list(velocities[k])}, "
+            f"accelerations: {_list(accelerations[k])}, "
+            f"time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _list(values: Array) -> str:
+    return f"[{', '.join(_number(float(value)) for value in values)}]"
+
+
+def _number(value: float) -> str:
+    """With a point: YAML 1.1 reads `1e-05` as a string."""
+    text = repr(value)
+    return text if "." in text else text.replace("e", ".0e")
