@@ -257,7 +257,7 @@ class Planner:
             for body, X_WO in zip(self.scene.movable, state.bodies, strict=True)
             if body.name != container
         }
-        found = {name for name, X_SP in places.items() if _within(interior, X_SP)}
+        found = {name for name, X_SP in places.items() if interior.contains(X_SP.p)}
         above = {name for name, X in places.items() if name not in found and self._heaped(interior, name, X)}
         while on := {name for name in above if self._touches(state, name, {container, *found})}:
             found |= on
@@ -269,7 +269,7 @@ class Planner:
         depth = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
         high = float(X_SP.p[2]) - depth / 2.0
         flat = Transform.of(xyz=(X_SP.p[0], X_SP.p[1], 0.0))
-        return 0.0 <= high <= float(np.max(self.scene.body(name).size)) and _within(interior, flat)
+        return 0.0 <= high <= float(np.max(self.scene.body(name).size)) and interior.contains(flat.p)
 
     def _touches(self, state: PlanningState, name: str, others: Set[str]) -> bool:
         """Whether a movable body touches one of the others."""
@@ -400,12 +400,3 @@ class Planner:
 def _rounded(X: Transform) -> Transform:
     """The pose without the rounding of the products that gave it, so that queries with the same contents are shared."""
     return Transform(R=frozen(np.round(X.R, 12)), p=frozen(np.round(X.p, 12)))
-
-
-def _within(interior: Interior, X_SP: Transform) -> bool:
-    """Whether the origin of P lies in the interior S."""
-    x, y, z = X_SP.p
-    shape = interior.shape
-    if isinstance(shape, Cylinder):
-        return bool(np.hypot(x, y) < shape.radius and abs(z) < shape.length / 2)
-    return bool((np.abs(X_SP.p) < np.array(shape.size) / 2).all())

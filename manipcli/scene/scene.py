@@ -6,6 +6,7 @@ tray or cylinder, z up.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +20,13 @@ class Interior:
 
     X_OS: Transform
     shape: Box | Cylinder
+
+    def contains(self, point: Array) -> bool:
+        """Whether a point (3,) [m] in S is inside."""
+        x, y, z = (float(v) for v in point)
+        if isinstance(self.shape, Cylinder):
+            return math.hypot(x, y) < self.shape.radius and abs(z) < self.shape.length / 2
+        return all(abs(v) < size / 2 for v, size in zip((x, y, z), self.shape.size, strict=True))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,6 @@ from typing import Final, NamedTuple
 from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body, Scene
-from manipcli.shapes.primitives import Cylinder
 
 FEW: Final = 100
 USUAL: Final = 200
@@ -73,8 +72,4 @@ def _is_inside(body: Body, container: Body) -> bool:
     if container.interior is None or container is body:
         return False
     X_SW = (container.X_WO @ container.interior.X_OS).inverse()
-    x, y, z = (float(v) for v in X_SW.R @ (body.X_WO.p + body.X_WO.R @ body.centre) + X_SW.p)
-    shape = container.interior.shape
-    if isinstance(shape, Cylinder):
-        return x * x + y * y < shape.radius**2 and abs(z) < shape.length / 2.0
-    return all(abs(v) < size / 2.0 for v, size in zip((x, y, z), shape.size, strict=True))
+    return container.interior.contains(X_SW.apply(body.X_WO.apply(body.centre)))
