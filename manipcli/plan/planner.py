@@ -115,7 +115,7 @@ class Planner:
         """A view that searches paths where a free motion is obstructed; None if no motion was, or none is searched."""
         if not (self._obstructed and self._paths.samples):
             return None
-        view = copy(self)
+        view = self._view()
         view._search = PathSearch.of(self._paths, self.rng)
         return view
 
@@ -153,22 +153,21 @@ class Planner:
 
     def allowing(self, pairs: Pairs) -> Planner:
         """A view for one attempt at a step, in which these pairs may touch; it shares everything else."""
-        with suppress(NotPlannable):
-            _ = self.solver  # made once, for both
-        other = copy(self)
+        other = self._view()
         other._allowed = self._allowed | pairs
         other._obstructed, other._search = False, None
         return other
 
     def keeping(self, keep: tuple[KeepSpec, ...]) -> Planner:
         """The same planner for a step with these constraints; it shares everything else."""
-        if not keep:
-            return self
-        with suppress(NotPlannable):
-            _ = self.solver  # made once, for both
-        other = copy(self)
+        other = self._view()
         other.keep = keep
         return other
+
+    def _view(self) -> Planner:
+        with suppress(NotPlannable):
+            _ = self.solver  # made once, for both
+        return copy(self)
 
     def keeps(self, a: str, b: str) -> float:
         """The clearance [m] that two parts keep."""
