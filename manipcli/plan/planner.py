@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
 from copy import copy
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -302,10 +303,8 @@ class Planner:
         if key not in self._queries:
             if len(self._queries) == _QUERIES:
                 del self._queries[next(iter(self._queries))]
-            self._queries[key] = self.checker.at(
-                state.bodies, carried=carried, contents=contents, ignore=allowed, margin=self.clearance,
-                margins=self.clearances,
-            )  # fmt: skip
+            at = partial(self.checker.at, margin=self.clearance, margins=self.clearances)
+            self._queries[key] = at(state.bodies, carried=carried, contents=contents, ignore=allowed)
         return self._queries[key]
 
     def free_start(self, state: PlanningState, allowed: Pairs = NOTHING) -> None:
