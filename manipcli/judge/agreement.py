@@ -61,6 +61,13 @@ class Agreement:
         return not self.disagreements
 
     @property
+    def judged(self) -> bool:
+        """Whether any run did a step or has an evaluated expectation; otherwise there is nothing to compare."""
+        verdicts = [run.verdict for run in self.runs]
+        done = any(step.outcome == "done" for verdict in verdicts for step in verdict.steps)
+        return done or any(each.outcome != "not_evaluated" for verdict in verdicts for each in verdict.expectations)
+
+    @property
     def engines(self) -> tuple[MeasuredRun, ...]:
         """The runs at the step of the task, one per engine."""
         return tuple(run for run in self.runs if not run.variant.half_step)

@@ -101,7 +101,7 @@ def not_there(
         yield task.source.finding(ABSENT, ("start",), message, hint=f"poses: {', '.join(poses)}")
     if spec.simulation.engine not in ENGINES.names:
         message = f"unknown engine '{spec.simulation.engine}'"
-        hint = f"engines: {', '.join(ENGINES.names)}"
+        hint = did_you_mean(spec.simulation.engine, ENGINES.names, kind="engines")
         yield task.source.finding(ABSENT, ("simulation", "engine"), message, hint=hint)
     names = tuple(labels(spec.judged))
     for name in () if kept else spec.agree.margins:

@@ -14,6 +14,9 @@ from manipcli.core.errors import InvalidInput, Loc, Place
 from manipcli.judge.agreement import Agreement, compare
 from manipcli.judge.measured_run import GraspNumbers, MeasuredRun, Variant
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, StepWord, Verdict, VerdictWord
+from manipcli.report.agreement.agreement_text import numbers_table, render_text
+from manipcli.report.agreement.compared_runs import ComparedRuns
+from manipcli.report.run_report import RunReport, Timing
 from manipcli.spec.agree import AgreeSpec
 
 STEPS = (
@@ -211,3 +214,21 @@ def test_the_order_of_the_engines_does_not_matter(margins: list[float], share: f
     pairs = [abs(a - b) for a in margins for b in margins]
     limit = math.inf if share is None else max(share * max(map(abs, margins)), 1e-3)
     assert found == [len(signs) == 1 and max(pairs) <= limit] * 3
+
+
+def test_runs_in_which_nothing_was_done_are_not_compared() -> None:
+    steps = tuple(replace(step, outcome="not_run", started=None, ended=None) for step in STEPS)
+    unmet = tuple(replace(each, outcome="not_evaluated", margin=None, at=None) for each in (INSIDE, UPRIGHT))
+    nothing = replace(VERDICT, verdict="failed", steps=steps, expectations=unmet, text="'cup' moved 31 mm")
+    agreement = compare([run("a", nothing), run("b", nothing)])
+    assert not agreement.judged
+    assert compare([run("a", nothing), run("b")]).judged
+    text = render_text(ComparedRuns(agreement, (RunReport(nothing, Timing()), RunReport(nothing, Timing()))))
+    assert text.count("'cup' moved 31 mm") == 1
+    assert text.endswith("a and b are not compared: no step was done in any run")
+
+
+def test_a_number_without_a_limit_has_no_mark() -> None:
+    lines = numbers_table(compare([run("a"), run("b")])).splitlines()
+    assert [line for line in lines if "slip" in line and line.startswith("✓")] == []
+    assert all(line.startswith("✓") for line in lines if "inside" in line)

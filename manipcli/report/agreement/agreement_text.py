@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from manipcli.judge.agreement import Agreement
 from manipcli.judge.compared_numbers import Kind, Row
 from manipcli.report.agreement.compared_runs import ComparedRuns
-from manipcli.report.agreement.disagreement import allowed_of, describe, difference_of, short_summary, shown
+from manipcli.report.agreement.disagreement import (
+    allowed_of,
+    describe,
+    difference_of,
+    short_summary,
+    shown,
+    summary,
+)
 from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
@@ -26,6 +33,10 @@ TITLES: dict[Kind, str] = {
 def render_text(compared: ComparedRuns) -> str:
     """All runs of a task: disagreements, numbers side by side, runs, result."""
     agreement = compared.agreement
+    if agreement.agrees and not agreement.judged:
+        reasons = dict.fromkeys(run.verdict.text for run in agreement.runs)
+        runs = runs_table(agreement, compared.reports)
+        return "\n".join([runs, "", *(f"{FAIL} {reason}" for reason in reasons), f"{FAIL} {summary(agreement)}"])
     parts = [f"{FAIL} {describe(found)}" for found in agreement.disagreements]
     parts += [""] if parts else []
     parts += [numbers_table(agreement), "", runs_table(agreement, compared.reports), ""]
@@ -42,16 +53,21 @@ def numbers_table(agreement: Agreement) -> str:
     several = len(agreement.engines) > 1
     rows = [
         (
-            PASS if agrees(agreement, row) else FAIL,
-            TITLES[row.kind],
+            (PASS if limited(row) else "") if agrees(agreement, row) else FAIL,
             row.name or "task",
+            TITLES[row.kind],
             *cells(row),
             *((difference_of(row), allowed_of(row)) if several else ()),
         )
         for row in agreement.rows
     ]
     last = ("difference", "allowed") if several else ()
-    return table(("", "number", "of", *names, *last), rows, right=(*names, *last))
+    return table(("", "of", "number", *names, *last), rows, right=(*names, *last))
+
+
+def limited(row: Row) -> bool:
+    """Whether anything is required of a number: an allowed difference, or the outcome of its expectation or step."""
+    return row.allowed is not None or row.kind in ("margin", "step_duration")
 
 
 def agrees(agreement: Agreement, row: Row) -> bool:

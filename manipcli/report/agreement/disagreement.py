@@ -97,6 +97,8 @@ def summary(agreement: Agreement) -> str:
         first, more = agreement.disagreements[0], len(agreement.disagreements) - 1
         return message(first) + (f" (and {more} more)" if more else "")
     names = [run.name for run in agreement.runs]
+    if not agreement.judged:
+        return f"{', '.join(names[:-1])} and {names[-1]} are not compared: no step was done in any run"
     return f"{', '.join(names[:-1])} and {names[-1]} agree: all {agreement.runs[0].verdict.verdict}"
 
 

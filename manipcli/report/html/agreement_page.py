@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
+from manipcli.judge.agreement import Agreement
+from manipcli.judge.compared_numbers import Row
 from manipcli.replay.ghost import Ghost
 from manipcli.replay.playback import Playback
 from manipcli.replay.player import POLICY, player_html
-from manipcli.report.agreement.agreement_text import TITLES, agrees, cells
+from manipcli.report.agreement.agreement_text import TITLES, agrees, cells, limited
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.agreement.disagreement import allowed_of, difference_of, message, summary
 from manipcli.report.html.markup import Markup, document, element, joined, link
@@ -96,13 +98,19 @@ def _replay(shown: tuple[str, Playback] | None, ghosts: Sequence[Ghost]) -> Mark
     return element("section", heading("replay", "Replay", about), joined(player))
 
 
+def _mark(agreement: Agreement, row: Row) -> Markup | str:
+    """Whether the runs agree in a number; nothing for a number without a limit."""
+    good = agrees(agreement, row)
+    return mark(good, "agrees" if good else "differs") if limited(row) or not good else ""
+
+
 def _numbers(compared: ComparedRuns) -> Markup:
     agreement = compared.agreement
     names = [run.name for run in agreement.runs]
     last = ("difference", "allowed") if len(agreement.engines) > 1 else ()
     rows = [
         (
-            mark(good := agrees(agreement, row), "agrees" if good else "differs"),
+            _mark(agreement, row),
             element("b", row.name or "task"),
             TITLES[row.kind],
             *cells(row),
