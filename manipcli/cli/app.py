@@ -161,9 +161,12 @@ def _is_interrupt(error: BaseException) -> bool:
 
 def _fail(error: BaseException, *, format_: str) -> ExitCode:
     """Prints an error: as text on stderr; or as one JSON object, or SARIF, on stdout."""
-    from manipcli.report import json, text
-
     code, findings = _classify(error)
+    try:
+        from manipcli.report import json, text
+    except ImportError:  # an interrupt in the import of a library, which then cannot be imported any more
+        console.talk("\n".join(finding.message for finding in findings))
+        return code
     if os.environ.get("MANIPCLI_DEBUG"):
         console.talk("".join(traceback.format_exception(error)).rstrip())
     try:

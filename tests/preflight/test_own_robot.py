@@ -109,7 +109,7 @@ def test_a_tool_that_cannot_point_so_is_told_apart_from_an_object_out_of_reach(t
         assert miss in error.message
         assert error.hint is not None
         assert "the tool's +z must point to the object" in error.hint
-        assert error.hint.endswith(f"or set `approach: {{from: {other}}}`")
+        assert f"or set `approach: {{from: {other}}}`" in error.hint
     task = write(tmp_path, pick.format("top"))
     (tmp_path / "scara.yaml").write_text(ROBOT.replace("-0.06]", "-0.06], rpy: [180 deg, 0, 0]"))
     assert errors(task) == []
