@@ -12,6 +12,7 @@ from manipcli.core.geometry import Transform
 from manipcli.model.collision import Carried, CollisionHit
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
+from manipcli.scene import drop_test
 from manipcli.scene.drop_test import FORMED, drop_height
 from manipcli.scene.scene import Body
 from manipcli.shapes.primitives import Cylinder
@@ -20,6 +21,8 @@ UPRIGHT: Final = float(np.cos(np.radians(5.0)))
 """Cosine of the tilt: a body that is more upright than this can be placed on."""
 ROOM: Final = 0.01
 """[m] Distance in a region that a placed object keeps from all bodies but its support."""
+LEVEL: Final = 1e-6
+"""[m] A body may reach this far above the bottom of the object and still count as below it."""
 SPOTS: Final = 16
 """Number of places in a region that are tried."""
 
@@ -81,13 +84,24 @@ def _halton(k: int, base: int) -> float:
 
 
 def crowded(planner: Planner, state: PlanningState, name: str, X_WG: Transform, onto: str) -> CollisionHit | None:
-    """The nearest body within `ROOM` of an object at `X_WG`, other than its support; None without any."""
+    """The nearest body within `ROOM` of an object at `X_WG`, other than its support; None without any.
+
+    What lies wholly below the object does not crowd it: the desk under a tray with a thin floor.
+    """
     root = planner.robot.root
     carried = Carried(body=name, link=root, X_LO=planner.robot.X_WB.inverse() @ X_WG)
     there = planner.checker.at(
         state.bodies, carried=carried, margin=ROOM, only=name, absent=planner.contents(state, name)
     )
-    near = [hit for hit in there.every(state.position) if not {hit.a, hit.b} & {onto} and _is_body(hit)]
+    bottom = drop_test.bottom(planner.scene.body(name), X_WG) + LEVEL
+
+    def beside(hit: CollisionHit) -> bool:
+        other = hit.a if hit.b == name else hit.b
+        return drop_test.top(planner.scene.body(other), planner.body_pose(state, other)) > bottom
+
+    near = [
+        hit for hit in there.every(state.position) if not {hit.a, hit.b} & {onto} and _is_body(hit) and beside(hit)
+    ]
     return min(near, key=lambda hit: hit.distance, default=None)
 
 

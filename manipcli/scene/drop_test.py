@@ -27,7 +27,7 @@ def drop_height(falling: Body | BodyShape, X_WF: Transform, under: Body | BodySh
     """
     pairs = [(a, b, coal_shape(a.shape), coal_shape(b.shape)) for a in falling.geometries for b in under.geometries]
     still = [X_WU @ b.X_LS for _, b, _, _ in pairs]
-    fallen, step, deepest = 0.0, 0.0, _top(falling, X_WF) - _bottom(under, X_WU)
+    fallen, step, deepest = 0.0, 0.0, top(falling, X_WF) - bottom(under, X_WU)
     while fallen < deepest:
         X_WN = Transform.of(xyz=(0.0, 0.0, -fallen)) @ X_WF
         apart = min(
@@ -44,10 +44,11 @@ def drop_height(falling: Body | BodyShape, X_WF: Transform, under: Body | BodySh
     return None
 
 
-def _top(body: Body | BodyShape, X_WO: Transform) -> float:
+def top(body: Body | BodyShape, X_WO: Transform) -> float:
     """Height [m] of the highest corner of the bounding box."""
     return float(X_WO.apply(body.centre)[2] + np.abs(X_WO.R[2]) @ body.size / 2.0)
 
 
-def _bottom(body: Body | BodyShape, X_WO: Transform) -> float:
+def bottom(body: Body | BodyShape, X_WO: Transform) -> float:
+    """Height [m] of the lowest corner of the bounding box."""
     return float(X_WO.apply(body.centre)[2] - np.abs(X_WO.R[2]) @ body.size / 2.0)

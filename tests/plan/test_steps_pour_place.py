@@ -234,6 +234,14 @@ def test_a_place_in_a_region_keeps_away_from_what_stands_there(bench: Make) -> N
     assert "post" in refusal.parts
 
 
+def test_a_region_in_a_tray_is_not_crowded_by_the_table_under_its_thin_floor(bench: Make) -> None:
+    """The table is 5 mm below the block, nearer than the 10 mm beside it, but no wall of the tray is."""
+    tray = "  tray: {tray: {size: [0.3, 0.3, 0.02], wall: 5 mm}, rests_on: table, at: [0.5, 0.2], fixed: true}\n"
+    panda = held_block(bench, TABLE + tray)
+    panda.do("place", {**REGION, "onto": "tray"})
+    np.testing.assert_allclose(panda.body("block").p, [0.5, 0.2, 0.2 + 0.005 + 0.025], atol=1e-4)
+
+
 def test_a_region_needs_a_support_and_no_other_place(bench: Make) -> None:
     arm = bench("panda")
     box = {"box": {"centre": [0.5, 0.2], "size": [0.1, 0.1]}}
