@@ -13,6 +13,7 @@ from manipcli.core.geometry import Array
 from manipcli.model.collision import CollisionHit
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Dropped
+from manipcli.plan.grasp_margin import GraspMargin
 from manipcli.plan.motion_margins import MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import stage_of
@@ -87,6 +88,7 @@ class PlannedTask(Protocol):
     def motions(self) -> Sequence[PlannedMotion]: ...
     def clearances(self) -> Sequence[CollisionHit | None]: ...
     def margins(self) -> Sequence[MotionMargins]: ...
+    def grasps(self) -> Sequence[tuple[str, GraspMargin]]: ...
 
 
 def render_json(task: str, plan: PlannedTask, robot: RobotModel) -> str:
@@ -99,6 +101,10 @@ def render_json(task: str, plan: PlannedTask, robot: RobotModel) -> str:
             "duration": round(sum(motion.duration for motion in plan.motions), 9),
             "motions": [_motion(motion, robot, near, margins) for motion, near, margins in motions],
             "steps": [_step(step) for step in plan.steps],
+            "grasps": [
+                {"step": step, **picked(margin, "body force friction weight ratio acceleration contacts")}
+                for step, margin in plan.grasps()
+            ],
             "errors": [],
         }
     )

@@ -15,6 +15,7 @@ def render_text(task: str, plan: PlannedTask) -> str:
     """Tables with one row per motion (the step's name only at its first), per margin, and per step with candidates."""
     margins = plan.margins()
     parts = [_motions(plan, margins), _margins(plan, margins)]
+    parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
     if candidates := _candidates(plan):
         parts.append(candidates)
     total = sum(motion.duration for motion in plan.motions)

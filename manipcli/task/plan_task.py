@@ -18,6 +18,7 @@ from manipcli.plan.candidates import Candidates, Dropped, first
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.clearance import least_clearance
 from manipcli.plan.cost import step_cost
+from manipcli.plan.grasp_margin import GraspMargin, grasp_margin
 from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_margins import MotionMargins, motion_margins
@@ -96,6 +97,11 @@ class Plan:
     def clearances(self) -> tuple[CollisionHit | None, ...]:
         """The least clearance of each of `motions`: parts, distance and time; None where nothing moves."""
         return tuple(least_clearance(self.planner, motion, end) for motion, _, end in self.spans())
+
+    def grasps(self) -> tuple[tuple[str, GraspMargin], ...]:
+        """Id of each step that ends with an object in the closed hand, and the margin of its grasp."""
+        found = ((step.id, grasp_margin(self.planner, step.plan)) for step in self.steps)
+        return tuple((id_, margin) for id_, margin in found if margin is not None)
 
     def margins(self) -> tuple[MotionMargins, ...]:
         """What binds each of `motions`, its margins and its manipulability."""

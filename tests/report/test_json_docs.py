@@ -44,7 +44,7 @@ OBJECTS = {
     "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
     "findings", "disagreements", "numbers", "motions", "motions.limited_by", "motions.clearance", "motions.bound_by",
-    "motions.margins", "motions.manipulability", "candidates", "pairs",
+    "motions.margins", "motions.manipulability", "candidates", "pairs", "grasps",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators", "limits"}
@@ -115,5 +115,5 @@ def test_keys_of_the_self_collision_matrix(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_keys_of_what_is_planned(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", str(DOCS.parents[1] / "examples" / "04_own_robot" / "task.yaml"), "--format", "json"]) == 0
+    assert main(["plan", str(DOCS.parents[1] / "examples" / "02_pick_a_block" / "task.yaml"), "--format", "json"]) == 0
     assert set(_documented(list(_rows())[4])) == set(_written(json.loads(capsys.readouterr().out)))
