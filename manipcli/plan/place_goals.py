@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
@@ -23,8 +24,8 @@ ROOM: Final = 0.01
 """[m] Distance in a region that a placed object keeps from all bodies but its support."""
 LEVEL: Final = 1e-6
 """[m] A body may reach this far above the bottom of the object and still count as below it."""
-SPOTS: Final = 16
-"""Number of places in a region that are tried."""
+SPOTS: Final = 128
+"""Number of places in a region that are examined."""
 
 
 def standing(
@@ -64,13 +65,10 @@ def standing(
 
 
 def spots(centre: tuple[float, float], size: tuple[float, float]) -> Iterator[tuple[float, float]]:
-    """Places in a rectangle, its centre first, the others spread evenly (Halton, Numerische Mathematik 2, 1960)."""
-    yield centre
-    for k in range(1, SPOTS):
-        yield (
-            centre[0] + size[0] * (_halton(k, 2) - 0.5),
-            centre[1] + size[1] * (_halton(k, 3) - 0.5),
-        )
+    """Places in a rectangle, the nearest to its centre first; spread evenly (Halton, Numerische Mathematik 2, 1960)."""
+    shares = [(0.0, 0.0), *((_halton(k, 2) - 0.5, _halton(k, 3) - 0.5) for k in range(1, SPOTS))]
+    places = [(centre[0] + size[0] * x, centre[1] + size[1] * y) for x, y in shares]
+    yield from dict.fromkeys(sorted(places, key=lambda at: math.dist(at, centre)))
 
 
 def _halton(k: int, base: int) -> float:

@@ -20,6 +20,8 @@ _FEWEST: Final = 12  # points on an arc
 _FINE: Final = 100  # points on a rounded corner, before they are spaced evenly
 _CONTROLS: Final = 1.0, 0.5, 0.1  # of the distance from the corner; of those tried, the quickest motions
 _BINOMIAL: Final = 1, 5, 10, 10, 5, 1
+DISTINCT: Final = 1e-3
+"""[m] Least distance of two points of an arc: nearer ones do not define its plane."""
 _FLAT: Final = 1e-6  # m: three points nearer to a line than this have no arc
 
 
@@ -31,9 +33,13 @@ def arc(X_WA: Transform, via: Array, X_WB: Transform) -> tuple[Transform, ...]:
     """
     a, b, c = X_WA.p, via, X_WB.p
     u, w = b - a, c - a
+    for names, apart in ((("the start", "`via`"), u), (("the start", "the end"), w), (("`via`", "the end"), c - b)):
+        if float(np.linalg.norm(apart)) < DISTINCT:
+            message = f"{names[0]} and {names[1]} of the arc are less than {1000 * DISTINCT:g} mm apart"
+            raise NotPlannable(message, hint="an arc needs three different points; a whole circle is two arcs")
     normal = np.cross(u, w)
     square = float(normal @ normal)
-    if square < (_FLAT * float(np.linalg.norm(w))) ** 2 or min(np.linalg.norm(each) for each in (u, w, c - b)) < _FLAT:
+    if square < (_FLAT * float(np.linalg.norm(w))) ** 2:
         raise NotPlannable(
             "the start, `via` and the end of the arc are on a line",
             hint="move `via` off the line, or use `path: linear`",

@@ -238,7 +238,7 @@ class StepSpec(KeyedSpec):
     keep: Keeps = Field(
         (),
         description="Constraints on the step's motions, one mapping or a list: `keep: {upright: 10 deg, tool_speed: "
-        "0.25}`. A path that keeps them is searched; the motion is checked at every control tick.",
+        "0.25}`. A path that keeps them is searched; checked at every tick of the plan, not of the run.",
     )
     allow: tuple[PartPair, ...] = Field(
         (),

@@ -229,8 +229,8 @@ def test_a_place_in_a_region_keeps_away_from_what_stands_there(bench: Make) -> N
     assert not np.allclose(lifted.position, crowd.now.position)
     small = {**REGION, "region": {"box": {"centre": [0.5, 0.2], "size": ["2 cm", "2 cm"]}}}
     refusal = held_block(bench, TABLE + post).refused("place", small)
-    assert "all 16 candidates failed" in refusal.cause and "is within 10 mm of 'post' (16 of 16)" in refusal.cause
-    assert refusal.hint == "make `region` larger"
+    assert "all 128 candidates failed" in refusal.cause and "is within 10 mm of 'post' (128 of 128)" in refusal.cause
+    assert refusal.hint == "make `region` larger, or move 'post'"
     assert "post" in refusal.parts
 
 

@@ -76,3 +76,11 @@ def test_impossible_corners_are_refused(vias: list[tuple[tuple[float, ...], floa
 def test_an_arc_needs_three_points_off_a_line() -> None:
     with pytest.raises(NotPlannable, match="on a line"):
         arc(START, 0.5 * (START.p + END.p), END)
+
+
+def test_an_arc_through_two_equal_points_has_no_plane() -> None:
+    beside = Transform.of(xyz=START.p + np.array([0.0, 0.0, 5e-4]))
+    with pytest.raises(NotPlannable, match="the start and the end of the arc are less than 1 mm apart"):
+        arc(START, np.array([0.6, 0.1, 0.2]), beside)
+    with pytest.raises(NotPlannable, match="the start and `via` of the arc"):
+        arc(START, START.p, END)

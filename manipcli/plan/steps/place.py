@@ -43,6 +43,8 @@ TILTS = tuple(np.radians([0.0, 2.0, 4.0]))
 """Candidate tilts [rad] of the object when it is released."""
 ROUND = ("cup", "cylinder", "sphere")
 """Bodies that are as wide along their diagonal as along their axes."""
+PLACES = 16
+"""Number of places in a region, with room for the object, to which motions are planned."""
 WAYS = 9
 """Number of ways to set the object down that are tried at each place in a region."""
 POINTING = 0.5
@@ -114,6 +116,7 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     region = spec.region.box
 
     def in_region() -> Iterator[Candidate]:
+        free = 0
         for at in spots(region.centre, region.size):
             where = f"at [{at[0]:.3f}, {at[1]:.3f}] m"
             try:
@@ -121,6 +124,9 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
             except NotPlannable as refusal:
                 yield Candidate(partial(_refused, refusal), name=where)
                 continue
+            free += 1
+            if free > PLACES:
+                return
             for name, plan in itertools.islice(_ways(spec, planner, state, X_WG), WAYS):
                 yield Candidate(plan, name=f"{where}, {name}")
 
@@ -139,10 +145,8 @@ def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[flo
     if hit is None:
         return X_WG
     other = hit.a if hit.b == spec.object else hit.b
-    where = f"[{at[0]:.3f}, {at[1]:.3f}] m"
-    raise NotPlannable(
-        f"{where} is within {1000 * ROOM:.0f} mm of '{other}'", hint="make `region` larger", parts=frozenset((other,))
-    )
+    cause = f"a place in the region is within {1000 * ROOM:.0f} mm of '{other}'"
+    raise NotPlannable(cause, hint=f"make `region` larger, or move '{other}'", parts=frozenset((other,)))
 
 
 def _refused(refusal: NotPlannable) -> StepPlan:
@@ -202,7 +206,8 @@ def _ways(
 
     near = planner.distance(MotionBuilder(planner, state).let_go(spec.posture), spec.object) < CLEARANCE
     withdrawals = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
-    tilts = TILTS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
+    upright = any(keep.upright is not None or keep.slosh is not None for keep in planner.keep)
+    tilts = TILTS if not upright and X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
     ways = itertools.product(tilts, (True,) if near else (False, True), *withdrawals)
     for way in ways:
         yield _name(*way), partial(attempt, *way)
