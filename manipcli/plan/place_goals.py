@@ -99,9 +99,7 @@ def crowded(planner: Planner, state: PlanningState, name: str, X_WG: Transform, 
         other = hit.a if hit.b == name else hit.b
         return drop_test.top(planner.scene.body(other), planner.body_pose(state, other)) > bottom
 
-    near = [
-        hit for hit in there.every(state.position) if not {hit.a, hit.b} & {onto} and _is_body(hit) and beside(hit)
-    ]
+    near = [hit for hit in there.every(state.position) if not {hit.a, hit.b} & {onto} and _is_body(hit) and beside(hit)]
     return min(near, key=lambda hit: hit.distance, default=None)
 
 
