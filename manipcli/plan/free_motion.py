@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -15,7 +16,9 @@ from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.model.edge_check import SLACK
 from manipcli.plan.constrained_motion import smooth_motion
 from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.keep import margins
 from manipcli.plan.motion import Grip, Motion, PlanningState
+from manipcli.plan.motion_constraints import applying, keeps_of
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path_search import PathSearch
 from manipcli.plan.path_smoothing import rounded
@@ -135,8 +138,12 @@ def around(
     # and spline are a little off the path: with three quarters of the clearance at the checked ones.
     nearer = query.nearer(_KEPT)
     slack = (_KEPT + SLACK - 1.0) * query.least_margin
+    end = np.array(state.position)
+    end[planner.robot.indices(limits.names)] = goals[0]
+    keeps = tuple(kept for kept in applying(keeps_of(planner, state, label), end) if kept.margin is not None)
+    margin = partial(margins, keeps) if keeps else None
     for _ in range(_ROUNDS):
-        path = search.path(planner.robot, state, query, limits.names, goals, grip)
+        path = search.path(planner.robot, state, query, limits.names, goals, grip, margin)
         for share in _FINER:
             points = rounded(path, share * search.spec.deviation)
             try:

@@ -13,14 +13,13 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.plan.kept_problem import ROUNDING
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planner import Planner
 from manipcli.plan.timing_bound import TimingBound
 from manipcli.spec.keep import KeepSpec
 
-ROUNDING = 1e-6
-"""Margins [m or rad] above the negative of this are kept."""
 POURING = frozenset({"tilt", "tilt back"})
 """Labels of the motions that tilt a container."""
 NEAR = frozenset({"approach", "lower", "withdraw"})

@@ -1,14 +1,12 @@
 """Joint paths that keep the constraints of a step: the straight one, the tool's straight line, or a searched one.
 
-The search is that of `path_planners.rrt_connect`, in which every new configuration is projected onto the constraints:
-Newton steps on the least margin m(q), dq = (target - m) grad m / |grad m|^2, with the gradient by differences. Edges
-are examined at small steps, with a part of the constraint in reserve for the smooth curve through the waypoints.
-Source: Berenson, Srinivasa, Ferguson and Kuffner, "Manipulation planning on constraint manifolds" (ICRA 2009).
+The search is that of `path_planners.rrt_connect`, in which every new configuration is projected onto the constraints,
+see `kept_problem`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
 
@@ -19,7 +17,8 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import position_limits
 from manipcli.plan.free_space import FreeSpace
-from manipcli.plan.keep import ROUNDING, Kept, margins, refuse_unkept
+from manipcli.plan.keep import Kept, margins, refuse_unkept
+from manipcli.plan.kept_problem import LONGEST, ROUNDING, STEP, between, kept_problem
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path import linear_path
 from manipcli.plan.path_planner import PathFailure, PathProblem
@@ -27,12 +26,7 @@ from manipcli.plan.path_planners.rrt_connect import RrtConnect, RrtConnectSpec
 from manipcli.plan.path_shortening import shortened
 from manipcli.plan.planner import Planner
 
-_STEP: Final = 0.02  # rad or m of the joint that moves most, between examined configurations
 _SPACING: Final = 0.1  # rad or m, between the waypoints of the smooth curve
-_RESERVE: Final = 0.004  # rad or m of margin along edges: for the curve between waypoints
-_DIFFERENCE: Final = 1e-6
-_NEWTON: Final = 20
-_LONGEST: Final = 0.3  # rad or m: step of the trees; longer edges leave the constraint
 _SAMPLES: Final = 4000
 _SHORTCUTS: Final = 100
 _SAME: Final = 1e-3  # rad or m
@@ -117,19 +111,6 @@ def _searched(
         whole[:, columns] = q
         return margins(keeps, whole)
 
-    # The ends may use the reserve.
-    reserve = min(_RESERVE, 0.5 * float(margin(np.stack((start[columns], end[columns]))).min()))
-    reserve = max(reserve, 0.0)
-
-    def project(q: Array) -> Array | None:
-        return projected(margin, q, reserve)
-
-    def edge(a: Array, b: Array) -> bool:
-        return bool(margin(_between(a, b, _STEP)).min() >= reserve - ROUNDING) and space.edge(a, b)
-
-    def valid(q: Array) -> bool:
-        return bool(margin(q[None])[0] >= reserve - ROUNDING) and space.valid(q)
-
     lower, upper = position_limits(robot.joint(name) for name in names)
     ends = np.stack((start[columns], end[columns]))
     problem = PathProblem(
@@ -137,45 +118,23 @@ def _searched(
         goals=ends[1:],
         lower=np.where(np.isfinite(lower), np.minimum(lower, ends.min(axis=0)), ends.min(axis=0) - np.pi),
         upper=np.where(np.isfinite(upper), np.maximum(upper, ends.max(axis=0)), ends.max(axis=0) + np.pi),
-        valid=valid,
-        edge=edge,
-        project=project,
+        valid=space.valid,
+        edge=space.edge,
     )
+    problem = kept_problem(problem, margin)
     rng = planner.rng.spawn(1)[0]
-    found = RrtConnect(RrtConnectSpec(samples=_SAMPLES, range=_LONGEST)).plan(problem, rng)
+    found = RrtConnect(RrtConnectSpec(samples=_SAMPLES, range=LONGEST)).plan(problem, rng)
     if isinstance(found, PathFailure):
         words = ", ".join(f"`{kept.name}`" for kept in keeps)
         hint = "make the constraint wider, or `move` to a pose in between"
         raise NotPlannable(f"no path keeps {words}: {found.why}", hint=hint, reason="constraint")
     short = shortened(found, problem, rng, attempts=_SHORTCUTS)
-    return np.vstack([short[:1], *(_between(a, b, _SPACING)[1:] for a, b in pairwise(short))])
-
-
-def projected(margin: Callable[[Array], Array], q: Array, least: float) -> Array | None:
-    """The configuration near `q` (m) whose margin is at least `least`; None if Newton's method finds none."""
-    q = np.array(q)
-    for _ in range(_NEWTON):
-        around = np.vstack((q, q + _DIFFERENCE * np.eye(len(q))))
-        values = margin(around)
-        if values[0] >= least:
-            return q
-        slope = (values[1:] - values[0]) / _DIFFERENCE
-        square = float(slope @ slope)
-        if square < 1e-12:
-            return None
-        q = q + (1.05 * (least - values[0]) + ROUNDING) / square * slope
-    return None
+    return np.vstack([short[:1], *(between(a, b, _SPACING)[1:] for a, b in pairwise(short))])
 
 
 def _least(keeps: tuple[Kept, ...], start: Array, columns: list[int], path: Array) -> float:
     """The least margin along a polyline (k, m)."""
-    points = np.vstack([_between(a, b, _STEP) for a, b in pairwise(path)])
+    points = np.vstack([between(a, b, STEP) for a, b in pairwise(path)])
     whole = np.tile(start, (len(points), 1))
     whole[:, columns] = points
     return float(margins(keeps, whole).min())
-
-
-def _between(a: Array, b: Array, step: float) -> Array:
-    """(k, m) from a to b, both included, in steps of at most `step` of the joint that moves most."""
-    count = max(1, int(np.ceil(float(np.max(np.abs(b - a))) / step)))
-    return np.asarray(a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a))

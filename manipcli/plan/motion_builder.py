@@ -144,13 +144,13 @@ class MotionBuilder:
     def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
         """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
 
-        What holds contents is only moved on the line, which keeps it upright.
+        What has contents stays upright there, too, see `motion_constraints`.
         """
         planner, carried = self._planner, self._now.carried
         try:
             self.straight(label, X_WT, speed=speed)
         except NotPlannable as refusal:
-            if carried is None or planner.contents(self._now, carried.body) or planner.searching() is None:
+            if carried is None or planner.searching() is None:
                 raise
             try:
                 self.reach(label, X_WT, speed=speed)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.plan.keep import ROUNDING, Kept, margins
+from manipcli.plan.keep import Kept, margins
 from manipcli.plan.keeps import KEEPS
 from manipcli.plan.keeps.upright import derived
+from manipcli.plan.kept_problem import ROUNDING
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planner import Planner

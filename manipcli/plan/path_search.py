@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import position_limits, with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.free_space import FreeSpace
+from manipcli.plan.kept_problem import LONGEST, Margin, kept_problem
 from manipcli.plan.motion import Grip, PlanningState
 from manipcli.plan.path_planner import PathFailure, PathProblem
 from manipcli.plan.path_planners import PATH_PLANNERS
+from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_shortening import shortened
 from manipcli.spec.planner import PlannerSpec
 
@@ -48,9 +51,10 @@ class PathSearch:
         names: Sequence[str],
         goals: Array,
         grip: Grip | None,
+        margin: Margin | None = None,
     ) -> Array:
         """A short free path (k, m) of the joints `names` from `state` to one of the `goals` (j, m), also while the
-        hand moves as in `grip`.
+        hand moves as in `grip`. It keeps constraints whose `margin` at positions (i, n) of all joints is not negative.
 
         Raises:
             NotPlannable: there is none; names the narrowest place that was found.
@@ -71,9 +75,13 @@ class PathSearch:
             valid=space.valid,
             edge=space.edge,
         )
+        if margin is not None:
+            problem = kept_problem(problem, partial(_at, margin, state.position, columns))
         samples = max(1, -(-self.left // STEP))
         member = PATH_PLANNERS[self.spec.type]
         settings = member.spec.model_validate({**self.spec.model_dump(), "samples": samples})
+        if margin is not None and isinstance(settings, RrtConnectSpec):
+            settings = settings.model_copy(update={"range": min(settings.range or LONGEST, LONGEST)})
         found = member.make(settings).plan(problem, self.rng)
         if isinstance(found, PathFailure):
             self.left -= max(1, found.samples)
@@ -98,6 +106,13 @@ class PathSearch:
         away = f"move '{bodies[0]}' away, or " if bodies else ""
         hint = f"{away}first `move` to a pose nearer to the goal, or raise `planner: {{samples: ...}}`"
         return NotPlannable("; ".join(texts), hint=hint, reason="in_the_way")
+
+
+def _at(margin: Margin, start: Array, columns: list[int], q: Array) -> Array:
+    """The margin with the joints of `columns` at `q` (k, m), the others as in `start` (n)."""
+    whole = np.tile(start, (len(q), 1))
+    whole[:, columns] = q
+    return margin(whole)
 
 
 def _hands(robot: RobotModel, position: Array, grip: Grip | None) -> list[Array]:

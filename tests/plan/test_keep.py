@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Array
-from manipcli.plan import kept_path
+from manipcli.core.geometry import Array, Transform
+from manipcli.plan import kept_path, kept_problem
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.steps import STEPS
 from manipcli.spec.keep import KeepSpec
 
@@ -150,6 +151,36 @@ def test_contents_stay_in_the_cup_unless_the_move_is_to_tilt_it(held: Bench) -> 
     assert tilt(cups(held, planned(held, over))) == pytest.approx(60.0, abs=0.1)
 
 
+POST = """
+  desk: {box: {size: [0.6, 1.2, 0.4]}, pose: {xyz: [0.85, 0, 0.2]}, fixed: true}
+  cup: {cup: {radius: 36 mm, height: 110 mm, wall: 4 mm}, mass: 150 g, rests_on: desk, at: [0.68, -0.3]}
+  ball: {sphere: {radius: 14 mm}, mass: 10 g, inside: cup}
+  post: {box: {size: [6 cm, 6 cm, 40 cm]}, rests_on: desk, at: [0.75, 0], fixed: true}
+"""
+
+
+def test_a_cup_with_contents_is_carried_upright_around_an_obstacle(bench: Callable[..., Bench]) -> None:
+    """Nothing is stated: 20 deg. Neither the tool's line nor the straight joint path is free."""
+    told = bench(scene=POST)
+    told.do("pick", PICK)
+    told.do("lift", {"object": "cup", "by": 0.1})
+    assert told.planner.contents(told.now, "cup") == ("ball",)
+    told.planner.searching()  # as the straight candidates do
+    searching = told.planner.searching_paths()
+    assert searching is not None
+    builder = MotionBuilder(searching, told.now)
+    builder.carry("carry", Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now), speed=0.5)
+    (carry,) = builder.plan().motions
+    assert carry.label == "carry" and carry.trajectory is not None
+    q = np.tile(told.now.position, (len(carry.trajectory.positions), 1))
+    q[:, told.robot.indices(carry.trajectory.names)] = carry.trajectory.positions
+    X_TO = np.linalg.inv(told.tool(told.now.position)) @ told.body("cup").matrix
+    X_WO = np.array([told.tool(row) @ X_TO for row in q[::10]])
+    assert tilt(X_WO) <= 20.0
+    beside = np.abs(X_WO[:, 1, 3]).argmin()
+    assert np.hypot(X_WO[beside, 0, 3] - 0.75, X_WO[beside, 1, 3]) > 0.036 + 0.03 or X_WO[beside, 2, 3] > 0.8
+
+
 def test_an_empty_hand_has_nothing_to_keep_upright(bench: Callable[..., Bench]) -> None:
     told = bench()
     spec = {"to": {"joint_1": -0.5, "joint_6": 0.9}}
@@ -163,12 +194,12 @@ def test_projection_ends_on_the_constraint() -> None:
     def margin(q: Array) -> Array:
         return np.asarray(1.0 - np.linalg.norm(q, axis=1))
 
-    found = kept_path.projected(margin, np.array([3.0, 4.0]), 0.1)
+    found = kept_problem.projected(margin, np.array([3.0, 4.0]), 0.1)
     assert found is not None
     assert 0.1 <= margin(found[None])[0] <= 0.4
     assert found[1] / found[0] == pytest.approx(4.0 / 3.0)
     inside = np.array([0.1, 0.2])
-    np.testing.assert_array_equal(kept_path.projected(margin, inside, 0.1), inside)
+    np.testing.assert_array_equal(kept_problem.projected(margin, inside, 0.1), inside)
 
 
 def test_states_are_not_changed(held: Bench) -> None:
