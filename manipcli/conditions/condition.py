@@ -76,12 +76,14 @@ class CheckContext:
         robot, scene: of the task.
         steps: the ids of its steps; None: unknown.
         in_order: True if `steps` is complete and in order; else it holds every possible id, unordered.
+        self_collision: whether links of the robot collide with each other in the simulation.
     """
 
     robot: RobotModel
     scene: Scene
     steps: tuple[str, ...] | None = None
     in_order: bool = True
+    self_collision: bool = True
 
 
 @dataclass(frozen=True, slots=True)

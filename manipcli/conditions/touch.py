@@ -41,11 +41,10 @@ def impossible_pair(context: CheckContext, pair: tuple[str, str], loc: Loc) -> t
     unknown = tuple(p for k, name in enumerate(pair) for p in unknown_part(context, name, (*loc, k)))
     if unknown:
         return unknown
-    if all(name.partition("/")[0] == ROBOT for name in pair):
-        message = "two parts of the robot never touch: the simulation has no self-collision"
-        return (Problem(loc, message, "remove the pair: the planner avoids self-collision"),)
-    if pair[0] == pair[1]:
+    if pair[0] == pair[1] != ROBOT:
         return (Problem(loc, f"'{pair[0]}' cannot touch itself"),)
+    if all(name.partition("/")[0] == ROBOT for name in pair):
+        return _apart(context, pair, loc)
     fixed = {body.name for body in context.scene.bodies if body.fixed}
     fixed |= {f"{ROBOT}/{link}" for link in still_links(context.robot)}
     if fixed.issuperset(pair):
@@ -53,3 +52,17 @@ def impossible_pair(context: CheckContext, pair: tuple[str, str], loc: Loc) -> t
             Problem(loc, f"'{pair[0]}' and '{pair[1]}' are both fixed: the engine reports no contact between them"),
         )
     return ()
+
+
+def _apart(context: CheckContext, pair: tuple[str, str], loc: Loc) -> tuple[Problem, ...]:
+    """A problem if no links of two parts of the robot collide in the simulation."""
+    from manipcli.model.self_collision import checked_pairs
+
+    if not context.self_collision:
+        message = "two links of the robot never touch: the task has `simulation: {self_collision: false}`"
+        return (Problem(loc, message, "remove the pair, or `self_collision: false`"),)
+    links = [Contact(f"{ROBOT}/{a}", f"{ROBOT}/{b}", 0.0, 0.0) for a, b in checked_pairs(context.robot)]
+    if any(between(pair, contact) for contact in links):
+        return ()
+    message = f"'{pair[0]}' and '{pair[1]}' never touch in the simulation: they have no pair of links that is checked"
+    return (Problem(loc, message, "`manipcli check ROBOT.yaml --collisions` shows all pairs, and which are checked"),)

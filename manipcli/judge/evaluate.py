@@ -11,6 +11,7 @@ from manipcli.conditions.robustness import NotEvaluated
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
+from manipcli.judge.self_contacts import SelfContact, SelfContacts
 from manipcli.judge.state_windows import Order, WindowsOfSpans, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.robot import RobotModel
@@ -21,10 +22,12 @@ from manipcli.spec.condition import ExpectationSpec
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """The outcome of each expectation, and the time [s] of the last recorded state."""
+    """The outcome of each expectation, the time [s] of the last recorded state, and the contacts of the robot with
+    itself."""
 
     outcomes: tuple[ExpectationOutcome, ...]
     end: float
+    self_contacts: tuple[SelfContact, ...]
 
 
 def examine(
@@ -48,7 +51,9 @@ def examine(
     stateless = [all(seam[leaf.name].stateless for leaf in leaves(expectation.condition)) for expectation in expect]
     last: StateWindow | None = None
     end = 0.0
+    self_contacts = SelfContacts()
     for span in recording.spans:
+        self_contacts.add(span.contacts)
         if span.states.time.size == 0:
             continue
         end = float(span.states.time[-1])
@@ -74,9 +79,9 @@ def examine(
     names = labels(expect)
     if successive is None:
         missing = order if isinstance(order, NotEvaluated) else NotEvaluated("no tick was recorded")
-        return Examined(tuple(outcome(name, missing) for name in names), end)
+        return Examined(tuple(outcome(name, missing) for name in names), end, self_contacts.found())
     found = (outcome(name, expected.found(end)) for name, expected in zip(names, asked, strict=True))
-    return Examined(tuple(found), end)
+    return Examined(tuple(found), end, self_contacts.found())
 
 
 def _period(times: Array, control: float) -> float:

@@ -65,6 +65,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         text=text,
         drawn=_drawn(recording),
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
+        self_contacts=examined.self_contacts,
     )
 
 

@@ -10,6 +10,7 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.saturations import Saturations
+from manipcli.judge.self_contacts import SelfContact
 
 VerdictWord = Literal["passed", "failed", "error"]
 ExpectationWord = Literal["passed", "failed", "not_evaluated"]
@@ -109,6 +110,7 @@ class Verdict:
         errors: why the recording cannot be judged: no run, an interrupted run, or an incomplete log.
         drawn: the sample of the task's `vary:`; None: the task as written.
         saturations: saturation of joints and actuators.
+        self_contacts: the pairs of links of the robot that pressed on each other.
         candidates: the refused candidates of a task without a plan.
     """
 
@@ -123,6 +125,7 @@ class Verdict:
     text: str = ""
     drawn: Drawn | None = None
     saturations: Saturations = field(default_factory=Saturations)
+    self_contacts: tuple[SelfContact, ...] = ()
     candidates: tuple[RefusedCandidates, ...] = ()
 
     @property

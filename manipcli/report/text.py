@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, one_line
+from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import quantity
 from manipcli.report.run_report import RunReport
@@ -83,6 +84,8 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
     lines.append(f"{mark} {verdict.task} {verdict.verdict}: {verdict.text or _summary(verdict)}")
     if cut := str(verdict.saturations):
         lines.append(cut)
+    if touching := self_contact_line(verdict.self_contacts):
+        lines.append(f"warning: {touching}")
     lines.append(f"{speed}; engine {verdict.engine}, seed {verdict.seed}")
     if verdict.drawn is not None:
         lines.append(str(verdict.drawn))

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from manipcli.model.self_collision import checked_pairs, overlapping
 from manipcli.simulate.engine import EngineSettings
+from manipcli.simulate.engines import ENGINES
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 
 def engine_settings(task: Task, plan: Plan) -> EngineSettings:
-    """Steps, start and the engine's own settings, from the task and its plan."""
-    simulation = task.spec.simulation
+    """Steps, start, the engine's own settings and the links that collide, from the task and its plan.
+
+    Links that overlap at the start cannot be kept apart; a preflight check warns of them.
+    """
+    simulation, start = task.spec.simulation, plan.start.position
     substeps = round(simulation.control_period / simulation.step)
-    return EngineSettings(simulation.step, substeps, plan.start.position, simulation.own)
+    return EngineSettings(simulation.step, substeps, start, simulation.own, _colliding(task, plan))
+
+
+def _colliding(task: Task, plan: Plan) -> tuple[tuple[str, str], ...]:
+    robot, simulation = task.true.robot, task.spec.simulation
+    if not simulation.self_collision or ENGINES[simulation.engine].physics == "none":
+        return ()
+    pairs = checked_pairs(robot)
+    deep = overlapping(robot, pairs, plan.start.position)
+    return tuple(pair for pair in pairs if pair not in deep)

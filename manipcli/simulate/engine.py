@@ -28,12 +28,14 @@ class EngineSettings:
         substeps: physics steps per control tick.
         start: (n) joint positions.
         own: the engine's own settings, of its `spec`; None: its defaults.
+        self_collision: pairs of links that collide with each other, by name; other pairs pass through each other.
     """
 
     step: float
     substeps: int
     start: Array
     own: Model | None = None
+    self_collision: tuple[tuple[str, str], ...] = ()
 
 
 class Refusal(NamedTuple):

@@ -24,6 +24,7 @@ from manipcli.control.roles import is_hand, reads_sensors
 from manipcli.control.saturation import EFFORT, MotorLimits
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
+from manipcli.model.grasp import LINK
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
@@ -209,6 +210,8 @@ class Session:
             return
         forces = [0.0] * len(self._contact_force)
         for a, b, force, _, _ in self._touching:
+            if a.startswith(LINK) and b.startswith(LINK):
+                continue  # a hand that presses on its own robot holds nothing
             joint_a, joint_b = self._joint_of_part.get(a), self._joint_of_part.get(b)
             if joint_a is None:
                 if joint_b is not None:

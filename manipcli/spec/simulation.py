@@ -27,6 +27,11 @@ class SimulationSpec(Model):
     settle: Annotated[
         Time, Field(ge=0, le=60, description="Time simulated before the start, 0 to 60 s. Default 0.5 s.")
     ] = 0.5
+    self_collision: bool = Field(
+        True,
+        description="Whether links of the robot collide with each other in engines with physics: the pairs that planning "
+        "checks, and those within a hand. Default true.",
+    )
 
     @property
     def own(self) -> Model | None:

@@ -86,7 +86,7 @@ def not_there(
     spec, kept = task.spec, task.source.kept
     known = tuple(step.id for step in spec.steps if step.id is not None)
     ids = intended_ids(task.source, STEPS.names) if kept else known
-    context = CheckContext(robot, scene, ids, in_order=not kept)
+    context = CheckContext(robot, scene, ids, in_order=not kept, self_collision=spec.simulation.self_collision)
     of_steps = [*_of_steps(spec, context, claims)]
     for number, loc, p in (*of_steps, *_of_expectations(spec, context)):
         yield task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)

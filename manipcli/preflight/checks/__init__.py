@@ -12,6 +12,7 @@ from manipcli.preflight.checks import (
     inert_actuators,
     insufficient_effort,
     light_objects,
+    overlapping_start,
     position_grips,
     rotation_slip,
     velocity_gains,
@@ -34,5 +35,6 @@ PREFLIGHT_CHECKS: Seam[Check] = Seam(
         error_dynamics.CHECK,
         insufficient_effort.CHECK,
         inert_actuators.CHECK,
+        overlapping_start.CHECK,
     ),
 )

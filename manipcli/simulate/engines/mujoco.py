@@ -62,9 +62,7 @@ class MujocoEngine:
         mujoco = library()
         with stdout_to_stderr():
             try:
-                built = build(
-                    mujoco, robot, scene, step=settings.step, contact_time=own.contact_time, impratio=own.impratio
-                )
+                built = build(mujoco, robot, scene, settings, contact_time=own.contact_time, impratio=own.impratio)
                 data = mujoco.MjData(built.model)
             except (ValueError, mujoco.FatalError) as error:
                 raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error

@@ -5,7 +5,9 @@ The elements get numbered names: names of users may be empty, equal or contain a
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from types import ModuleType
 from typing import Any, Final, NamedTuple
 
@@ -17,13 +19,14 @@ from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.normalised_urdf import inside_triangle
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body, Scene
+from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.mujoco_friction import friction_pairs, towards_robot
 from manipcli.simulate.engines.mujoco_shapes import Shapes, wxyz
 
 HARD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Impedance of motors, mimic joints and joint limits: the largest that MuJoCo supports."""
 ROBOT, SCENE = 1, 2
-"""Bits of collision masks: bodies collide with bodies and the robot; links do not collide with each other."""
+"""Bits of collision masks: bodies collide with bodies and the robot; links with other links only by `_collide_only`."""
 UNBOUNDED: Final = 1e9
 """[rad or m] Represents a missing limit on one side."""
 MIN_INERTIA: Final = 1e-12
@@ -66,14 +69,20 @@ class Built:
 
 
 def build(
-    mujoco: ModuleType, robot: RobotModel, scene: Scene, *, step: float, contact_time: float, impratio: float
+    mujoco: ModuleType,
+    robot: RobotModel,
+    scene: Scene,
+    settings: EngineSettings,
+    *,
+    contact_time: float,
+    impratio: float,
 ) -> Built:
     """Build the world.
 
     Args:
         mujoco: the library.
         robot, scene: what it contains.
-        step: [s] of the physics.
+        settings: step of the physics, and the links that collide with each other.
         contact_time: [s] time constant of contacts.
         impratio: stiffness ratio of friction to normal contact.
 
@@ -82,11 +91,13 @@ def build(
         ValueError: MuJoCo refuses the model.
     """
     spec = mujoco.MjSpec()
-    _options(mujoco, spec, scene, step, impratio)
+    _options(mujoco, spec, scene, settings.step, impratio)
     shapes = Shapes(mujoco, spec)
-    law = contact_law(step, contact_time)
+    law = contact_law(settings.step, contact_time)
     solver = {"solref": [law.time, 1.0], "solimp": [0.0, 0.99, law.depth, 0.5, 2.0]}
     bodies = _add_robot(mujoco, spec, robot, shapes, solver)
+    if settings.self_collision:
+        _collide_only(spec, robot, bodies, settings.self_collision)
     geoms: dict[str, list[str]] = {}
     for k, body in enumerate(scene.bodies):
         geoms[body.name] = []
@@ -183,6 +194,19 @@ def _add_robot(
             coupling.data[:] = 0.0  # coefficients of a polynomial
             coupling.data[:2] = joint.mimic.offset, joint.mimic.multiplier
     return bodies
+
+
+def _collide_only(spec: Any, robot: RobotModel, bodies: Mapping[str, Any], pairs: Collection[tuple[str, str]]) -> None:
+    """Let only these pairs of links collide; `bodies`: `MjsBody` by link."""
+    colliding = {frozenset(pair) for pair in pairs}
+    shaped = [name for name in bodies if robot.link(name).collisions]
+    for a, b in combinations(shaped, 2):
+        if frozenset((a, b)) not in colliding:
+            spec.add_exclude(bodyname1=bodies[a].name, bodyname2=bodies[b].name)
+    for name in frozenset().union(*colliding):
+        for geom in bodies[name].geoms:
+            geom.conaffinity = ROBOT | SCENE
+            geom.friction[0] = robot.friction**2  # MuJoCo takes the larger of two equal priorities
 
 
 def _link_inertia(inertial: Inertial | None) -> dict[str, Any]:

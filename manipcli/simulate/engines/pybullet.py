@@ -31,7 +31,7 @@ from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
 from manipcli.simulate.engines.pybullet_solver import iterations
-from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
+from manipcli.simulate.engines.pybullet_world import add_body, centre, collide_only, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 from manipcli.spec.base import Model
@@ -80,7 +80,7 @@ class PybulletEngine:
         )
         with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
             self._bodies = [add_body(p, client, body, Path(folder)) for body in scene.bodies]
-            self._load_robot(robot, scene, Path(folder))
+            self._load_robot(robot, scene, settings, Path(folder))
         self._movable = [
             (k, *centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
@@ -93,7 +93,7 @@ class PybulletEngine:
         self._points: tuple[BulletPoint, ...] | None = None
         self._substeps = settings.substeps
 
-    def _load_robot(self, robot: RobotModel, scene: Scene, folder: Path) -> None:
+    def _load_robot(self, robot: RobotModel, scene: Scene, settings: EngineSettings, folder: Path) -> None:
         p, client = self._p, self._client
         file = folder / "robot.urdf"
         file.write_text(engine_urdf(robot, folder), encoding="utf-8")
@@ -102,7 +102,9 @@ class PybulletEngine:
             basePosition=list(robot.X_WB.p),
             baseOrientation=list(robot.X_WB.quat_xyzw),
             useFixedBase=True,
-            flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_IGNORE_VISUAL_SHAPES,
+            flags=p.URDF_USE_INERTIA_FROM_FILE
+            | p.URDF_IGNORE_VISUAL_SHAPES
+            | (p.URDF_USE_SELF_COLLISION if settings.self_collision else 0),
             physicsClientId=client,
         )
         count = p.getNumJoints(self._robot, physicsClientId=client)
@@ -128,6 +130,8 @@ class PybulletEngine:
                 *((self._robot, link) for link, name in link_names.items() if name in still_links(robot)),
             ],
         ).merged
+        if settings.self_collision:
+            collide_only(p, client, self._robot, link_names, settings.self_collision)
         unlike = list(differences(p, client, self._robot, robot, link_names))
         if unlike:
             self.close()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 from types import ModuleType
 from typing import Final, cast
@@ -123,6 +124,19 @@ def centre(body: Body) -> tuple[Vector | None, tuple[float, ...] | None]:
     x, y, z = (float(v) for v in body.X_OI.p)
     turned = None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
     return (x, y, z) if x or y or z else None, turned
+
+
+def collide_only(
+    p: ModuleType, client: int, body: int, links: Mapping[int, str], pairs: Collection[tuple[str, str]]
+) -> None:
+    """Let only these pairs of links of `body` collide, of a body loaded with `URDF_USE_SELF_COLLISION`.
+
+    `links`: their names by Bullet's indices.
+    """
+    colliding = {frozenset(pair) for pair in pairs}
+    for (a, first), (b, second) in combinations(links.items(), 2):
+        if frozenset((first, second)) not in colliding:
+            p.setCollisionFilterPair(body, body, a, b, 0, physicsClientId=client)
 
 
 def couple_mimics(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int]) -> None:
