@@ -29,8 +29,8 @@ class SimulationSpec(Model):
     ] = 0.5
     self_collision: bool = Field(
         True,
-        description="Whether links of the robot collide with each other in engines with physics: the pairs that planning "
-        "checks, and those within a hand. Default true.",
+        description="Whether links of the robot collide with each other, in engines with physics: the pairs that "
+        "planning checks, and those within a hand. Default true.",
     )
 
     @property

@@ -19,6 +19,7 @@ from manipcli.description.elements import Joint, JointLimits, JointType, Link
 from manipcli.model.robot import Group, RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.build_scene import build_scene
+from manipcli.shapes.primitives import Geometry, Sphere
 from manipcli.spec.task import BodySpec, TaskSpec
 
 PERIOD, T = 0.01, 101
@@ -422,9 +423,9 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
 @pytest.mark.parametrize(
     ("pair", "told"),
     [
-        (["robot", "robot"], "two parts of the robot never touch"),
-        (["robot/finger", "robot"], "two parts of the robot never touch"),
-        (["robot/finger", "robot/thumb"], "two parts of the robot never touch"),
+        (["robot", "robot"], "'robot' and 'robot' never touch in the simulation"),  # no link has a shape
+        (["robot/finger", "robot"], "'robot/finger' and 'robot' never touch in the simulation"),
+        (["robot/finger", "robot/finger"], "'robot/finger' cannot touch itself"),
         (["cube", "cube"], "'cube' cannot touch itself"),
         (["desk", "shelf"], "'desk' and 'shelf' are both fixed"),
         (["desk", f"robot/{ROBOT.root}"], f"'desk' and 'robot/{ROBOT.root}' are both fixed"),
@@ -441,6 +442,32 @@ def test_parts_that_never_touch_are_refused(name: str, pair: list[str], told: st
     (problem,) = condition.check(condition.spec.model_validate(written), context)
     assert problem.loc == loc
     assert problem.message.startswith(told)
+
+
+def test_links_of_the_robot_that_are_checked_can_be_named() -> None:
+    # `finger` and `thumb` each have a joint on `one`: two joints between them, one to `one`.
+    ball = (Geometry(Transform.of(xyz=(0.0, 0.0, 0.3)), Sphere(0.01)),)
+    apart = (Geometry(Transform.identity(), Sphere(0.01)),)
+    shapes = {"one": ball, "finger": ball, "thumb": apart}
+    robot = replace(ROBOT, links=tuple(replace(link, collisions=shapes.get(link.name, ())) for link in ROBOT.links))
+    context, off = CheckContext(robot, SCENE), CheckContext(robot, SCENE, self_collision=False)
+    condition: Condition[Any] = CONDITIONS["no_collision"]
+
+    def problems(pair: list[str], context: CheckContext) -> list[str]:
+        return [found.message for found in condition.check(condition.spec.model_validate(pair), context)]
+
+    for pair in (["robot", "robot"], ["robot/thumb", "robot"], ["robot/thumb", "robot/finger"]):
+        assert problems(pair, context) == []
+        (message,) = problems(pair, off)
+        assert message.startswith("two links of the robot never touch")
+    for pair in (["robot/one", "robot/finger"], ["robot/base", "robot"]):
+        (message,) = problems(pair, context)
+        assert message.endswith("they have no pair of links that is checked")
+    pressed = touching((0.0, [("robot/finger", "robot/thumb", 3.0)]))
+    for written in (["robot", "robot"], ["robot/thumb", "robot/finger"]):
+        assert condition.open(condition.spec.model_validate(written), WORLD)(pressed).margins.min() == -3.0
+    for written in (["robot", "cube"], ["robot/thumb", "cube"]):
+        assert condition.open(condition.spec.model_validate(written), WORLD)(pressed).margins.min() == 0.0
 
 
 @pytest.mark.parametrize("written", [["robot"], [], ["robot", "desk", "cube"], [["robot", "desk"]], ["robot", 3]])

@@ -234,6 +234,7 @@ def test_a_joint_feels_what_touches_the_links_that_it_moves_last(
         Contact("block", "robot/far", 1.0, 0.0),
         Contact("block", "robot/near", 0.5, 0.0),
         Contact("robot/carriage", "robot/pad", 9.0, 0.0),
+        Contact("robot/base", "robot/pad", 9.0, 0.0),
         Contact("block", "robot/base", 4.0, 0.0),
         Contact("block", "floor", 7.0, 0.0),
     )

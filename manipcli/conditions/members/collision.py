@@ -25,7 +25,9 @@ class PairsSpec(Model):
     """Pairs of parts; a single pair needs no list."""
 
     pairs: tuple[Pair, ...] = Field(
-        min_length=1, description="Pairs of parts, each a body, `robot` (any of its links) or `robot/LINK`."
+        min_length=1,
+        description="Pairs of parts, each a body, `robot` (any of its links) or `robot/LINK`; `[robot, robot]`: two of "
+        "its links.",
     )
 
     @model_validator(mode="before")
