@@ -122,20 +122,25 @@ def sampled_matrix(robot: RobotModel, *, samples: int = SAMPLES, seed: int = 0) 
 def checked_pairs(robot: RobotModel) -> tuple[tuple[str, str], ...]:
     """The pairs of links that planning checks, by name, without sampling: what an engine has to keep apart, too.
 
-    Planning also leaves out the pairs within a hand, whose fingers may meet. Takes some milliseconds, 30 for links with
-    detailed meshes.
+    Planning also leaves out the pairs within a hand, whose fingers may meet.
     """
-    links = _Links(Kinematics(robot), *_ranges(robot))
+    links = _links(robot)
     tested, lasting = _tested(robot, links)
     return tuple(pair for pair in tested if pair not in lasting)
 
 
 def overlapping(robot: RobotModel, pairs: Sequence[tuple[str, str]], q: Array) -> Mapping[tuple[str, str], float]:
     """Those of the pairs that overlap by more than `TOUCHING` at `q` (n), with the depth [m]."""
-    links = _Links(Kinematics(robot), *_ranges(robot), only={name for pair in pairs for name in pair})
+    links = _links(robot)
     touching = [pair for pair, hit in zip(pairs, links.tester(pairs)(q), strict=True) if hit]
     depths = {pair: -links.distance(*pair, q) for pair in touching}
     return {pair: depth for pair, depth in depths.items() if depth > TOUCHING}
+
+
+@lru_cache(maxsize=2)
+def _links(robot: RobotModel) -> _Links:
+    """The links, kept: with detailed meshes, they take 30 ms to build."""
+    return _Links(Kinematics(robot), *_ranges(robot))
 
 
 def _tested(robot: RobotModel, links: _Links) -> tuple[list[tuple[str, str]], set[tuple[str, str]]]:
