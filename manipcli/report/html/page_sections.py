@@ -5,6 +5,7 @@ from __future__ import annotations
 from manipcli.core.text import number_of
 from manipcli.judge.drawn import value_text
 from manipcli.judge.measures.facts import RunFacts
+from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import StepOutcome
 from manipcli.replay.playback import Phase
 from manipcli.report.display_quantity import quantity
@@ -50,11 +51,13 @@ def head(page: RunPage) -> Markup:
     figures = (element("div", element("dt", name), element("dd", value)) for name, value in entries)
     if page.facts is None and not page.log:
         entries.append(("simulated", "not run: the task was refused"))
+    touching = self_contact_line(verdict.self_contacts)
     lost = element("p", f"The log is incomplete: {page.lost}", class_="warn") if page.lost is not None else None
     return element(
         "header",
         element("div", element("h1", verdict.task), word, class_="title"),
         element("p", verdict.text, class_="subtitle") if good or not page.causes else None,
+        element("p", f"Warning: {touching}", class_="warn") if touching else None,
         element("p", verdict.drawn.described()) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),
