@@ -126,20 +126,7 @@ def test_only_the_named_pairs_collide(member: EngineMember, opens: Opens) -> Non
     assert stops[()] == stops[BC] > 1.2
 
 
-@pytest.mark.parametrize(
-    "member",
-    [
-        pytest.param(
-            member,
-            marks=pytest.mark.xfail(
-                member.name == "pybullet", strict=True, reason="Bullet's links keep the friction of Bullet's default"
-            ),
-        )
-        for member in ENGINES
-        if member.physics == "full"
-    ],
-    ids=lambda member: member.name,
-)
+@with_physics
 def test_links_have_the_product_of_their_frictions(member: EngineMember, opens: Opens) -> None:
     # `press` presses `slab` from above with 20 N, while 15 N push `slab` along x: a = (15 - 0.7^2 20) / 1 kg.
     above = joint("press", "prismatic", (0.0, 0.0, 0.0999), (0.0, 0.0, 1.0))

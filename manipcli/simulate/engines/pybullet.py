@@ -114,14 +114,9 @@ class PybulletEngine:
         self._model, self._numbers = robot, by_name
         link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
         for link in link_names:
-            p.changeDynamics(
-                self._robot,
-                link,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                lateralFriction=robot.friction,
-                physicsClientId=client,
-            )
+            # Two calls: with a damping, Bullet drops all other values of a link.
+            p.changeDynamics(self._robot, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+            p.changeDynamics(self._robot, link, lateralFriction=robot.friction, physicsClientId=client)
         self._merge = ContactMerger(
             {(k, -1): body.name for body, k in zip(scene.bodies, self._bodies, strict=True)}
             | {(self._robot, link): f"robot/{name}" for link, name in link_names.items()},
