@@ -179,14 +179,17 @@ def _ineffective(agreement: Agreement) -> Iterator[Diagnostic]:
         limits.append((("agree", "margin"), "margin" in kinds, "a margin"))
     if agree.duration is not None:
         limits.append((("agree", "duration"), "duration" in kinds, "a duration"))
-    for kind, what in (("slip", "a slip in the hand"), ("grasp_force", "a grasp"), ("contact_force", "a contact")):
+    of_kinds: tuple[tuple[Kind, str], ...] = (
+        ("slip", "a slip in the hand"), ("grasp_force", "a grasp"), ("contact_force", "a contact"),
+    )  # fmt: skip
+    for kind, what in of_kinds:
         key = LIMITS[kind]
         if getattr(agree, key) is not None:
             limits.append((("agree", key), kind in kinds, what))
     for loc, used, what in limits:
         if not used:
             message = f"{dotted(loc)} has no effect: fewer than two engines have {what}"
-            yield Diagnostic("TASK247", message, places.get(loc), severity="warning")
+            yield Diagnostic("TASK248", message, places.get(loc), severity="warning")
 
 
 def _place(run: MeasuredRun, row: Row) -> Place | None:

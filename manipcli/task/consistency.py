@@ -12,7 +12,6 @@ from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
-from manipcli.core.text import did_you_mean
 from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
@@ -100,10 +99,6 @@ def not_there(
     if spec.start is not None and spec.start not in poses:
         message = f"robot '{robot.name}' has no pose '{spec.start}'"
         yield task.source.finding(ABSENT, ("start",), message, hint=f"poses: {', '.join(poses)}")
-    if spec.simulation.engine not in ENGINES.names:
-        message = f"unknown engine '{spec.simulation.engine}'"
-        hint = did_you_mean(spec.simulation.engine, ENGINES.names, kind="engines")
-        yield task.source.finding(ABSENT, ("simulation", "engine"), message, hint=hint)
     if not kept:
         yield from unusable_limits(task)
 

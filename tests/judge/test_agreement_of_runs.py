@@ -144,7 +144,7 @@ def test_a_limit_of_what_no_two_engines_have_is_warned_about() -> None:
     ]
     unmet = replace(VERDICT, expectations=(replace(INSIDE, outcome="not_evaluated", margin=None), UPRIGHT))
     (finding,) = compare([run("a", unmet, agree=every), run("b", unmet)]).warnings
-    assert (finding.code, finding.severity, finding.place) == ("TASK247", "warning", Place("pour.yaml", 6, 5))
+    assert (finding.code, finding.severity, finding.place) == ("TASK248", "warning", Place("pour.yaml", 6, 5))
     assert finding.message == "agree.margins.inside has no effect: fewer than two engines have a margin of 'inside'"
     assert compare([replace(run("a", agree=every), **bare), run("a", half_step=True)]).warnings == ()
 
