@@ -17,6 +17,7 @@ from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, no_hand
 from manipcli.plan.part_pairs import pair_problems
+from manipcli.plan.path_planners.ompl_algorithm import algorithm_problems
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.move import MoveSpec
 from manipcli.plan.unknown_names import UnknownPosture
@@ -99,6 +100,8 @@ def not_there(
     if spec.start is not None and spec.start not in poses:
         message = f"robot '{robot.name}' has no pose '{spec.start}'"
         yield task.source.finding(ABSENT, ("start",), message, hint=f"poses: {', '.join(poses)}")
+    for p in algorithm_problems(spec.planner):
+        yield task.source.finding(ABSENT, ("planner", *p.loc), p.message, hint=p.hint)
     if not kept:
         yield from unusable_limits(task)
 
