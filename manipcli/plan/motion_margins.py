@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,8 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.plan.motion import Motion, PlanningState
+from manipcli.plan.motion_constraints import keeps_of
+from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planned_states import PlannedStates, planned_states
 from manipcli.plan.planner import Planner
 from manipcli.plan.trajectory import JointTrajectory
@@ -26,7 +28,8 @@ class Margin:
     """The joint that comes nearest to one kind of limit.
 
     Attributes:
-        joint, quantity: `position`, `velocity`, `acceleration`, `jerk` or `torque`.
+        joint, quantity: `position`, `velocity`, `acceleration`, `jerk` or `torque`; for a constraint on the timing, its
+            key under `keep`, of the `tool` or the `contents`.
         used: share of the limit; of a position, share of the half range around its middle.
         left: distance to the limit, in the unit of the quantity.
         time: in the motion [s].
@@ -70,14 +73,17 @@ def motion_margins(planner: Planner, motion: Motion, begins: PlanningState, end:
     if motion.trajectory is None or motion.duration <= 0.0:
         return MotionMargins()
     states = planned_states(planner, motion, end, begins=begins, period=PERIOD)
-    used = list(_used(planner.robot, motion.trajectory, states))
+    stated = list(_of_keeps(planner, motion, begins, states))
+    used = [*stated, *_used(planner.robot, motion.trajectory, states)]
     margins: dict[str, Margin] = {}
     for quantity, joint, times, fraction, limit in used:
         k = int(np.argmax(fraction))
         margin = Margin(joint, quantity, float(fraction[k]), float((1.0 - fraction[k]) * limit), float(times[k]))
         if quantity not in margins or margin.used > margins[quantity].used:
             margins[quantity] = margin
-    return MotionMargins(_binding(used, margins), tuple(margins.values()), _manipulability(planner, states))
+    return MotionMargins(
+        _binding(used, margins, {one[0] for one in stated}), tuple(margins.values()), _manipulability(planner, states)
+    )
 
 
 Used = tuple[str, str, Array, Array, float]
@@ -104,10 +110,26 @@ def _used(robot: RobotModel, trajectory: JointTrajectory, states: PlannedStates)
                 yield quantity, name, at, np.abs(values[:, k]) / limit, float(limit)
 
 
-def _binding(used: list[Used], margins: dict[str, Margin]) -> Binding | None:
-    """Each state counts for the limit that is used most there, if it binds."""
-    timed = [one for one in used if one[0] in ("velocity", "acceleration", "jerk", "torque")]
+def _of_keeps(planner: Planner, motion: Motion, begins: PlanningState, states: PlannedStates) -> Iterator[Used]:
+    """Bounds on the timing that the step states."""
+    trajectory = motion.trajectory
+    if trajectory is None or trajectory.accelerations is None:
+        return
+    columns = planner.robot.indices(trajectory.names)
+    q, v, a = (each[:, columns] for each in (states.position, states.velocity, states.acceleration))
+    dynamics = PathDynamics(planner, begins, trajectory.names)
+    for kept in keeps_of(planner, begins, motion.label):
+        if kept.bound is not None:
+            bound = kept.bound(dynamics)
+            yield bound.name, bound.subject, states.times, bound.used(q, v, a), bound.limit
+
+
+def _binding(used: list[Used], margins: dict[str, Margin], stated: Collection[str]) -> Binding | None:
+    """Each state counts for the limit that is used most there, if it binds; `stated`: the quantities under `keep`."""
+    timed = [one for one in used if one[0] != "position"]
     scaled = max((margins[q].used for q in ("velocity", "acceleration") if q in margins), default=1.0)
+    if any(margins[quantity].used >= BINDS for quantity in stated):
+        scaled = 1.0  # it, and no `velocity_scaling`, may be what keeps the joints slow
     if not timed or scaled <= 0.0:
         return None
     count = max(len(one[3]) for one in timed)

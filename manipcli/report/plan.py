@@ -87,19 +87,20 @@ class PlannedTask(Protocol):
     @property
     def motions(self) -> Sequence[PlannedMotion]: ...
     def clearances(self) -> Sequence[CollisionHit | None]: ...
+    def path_kinds(self) -> Sequence[str]: ...
     def margins(self) -> Sequence[MotionMargins]: ...
     def grasps(self) -> Sequence[tuple[str, GraspMargin]]: ...
 
 
 def render_json(task: str, plan: PlannedTask, robot: RobotModel) -> str:
     """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m."""
-    motions = zip(plan.motions, plan.clearances(), plan.margins(), strict=True)
+    motions = zip(plan.motions, plan.path_kinds(), plan.clearances(), plan.margins(), strict=True)
     return dumps(
         {
             "task": task,
             "verdict": "passed",
             "duration": round(sum(motion.duration for motion in plan.motions), 9),
-            "motions": [_motion(motion, robot, near, margins) for motion, near, margins in motions],
+            "motions": [_motion(motion, kind, robot, near, margins) for motion, kind, near, margins in motions],
             "steps": [_step(step) for step in plan.steps],
             "grasps": [
                 {"step": step, **picked(margin, "body force friction weight ratio acceleration contacts")}
@@ -150,7 +151,9 @@ def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> li
     return [f"{value:.9g}" for value in values[:, trajectory.names.index(joint)]]
 
 
-def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None, margins: MotionMargins) -> Json:
+def _motion(
+    motion: PlannedMotion, kind: str, robot: RobotModel, near: CollisionHit | None, margins: MotionMargins
+) -> Json:
     trajectory = motion.trajectory
     most = limiting(trajectory, robot) if trajectory is not None else None
     return {
@@ -158,6 +161,7 @@ def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None,
         "verb": motion.verb,
         "motion": motion.label,
         "duration": round(motion.duration, 9),
+        "path": kind or None,
         "joints": list(trajectory.names) if trajectory is not None else [],
         "limited_by": None
         if most is None
