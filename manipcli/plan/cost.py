@@ -67,8 +67,9 @@ def step_cost(planner: Planner, plan: StepPlan) -> StepCost:
         positions = _sampled(planner, motion)
         if not positions:
             continue
-        limit = min(limit, _to_limit(planner, positions))
-        singular = min(singular, *(planner.solver.least_singular_value(q) for q in positions))
+        limit = min(limit, _to_limit(planner, motion, positions))
+        if planner.robot.tool is not None:
+            singular = min(singular, *(planner.solver.least_singular_value(q) for q in positions))
         if motion.label in FREE:
             near = min(near, _clearance(planner, motion, positions))
     margin = grasp_margin(planner, plan)
@@ -102,11 +103,12 @@ def _clearance(planner: Planner, motion: Motion, positions: list[Array]) -> floa
     return ROOM if found is None else found[1].distance
 
 
-def _to_limit(planner: Planner, positions: list[Array]) -> float:
-    """Least distance of a joint of the arm from its limits, as a share of its range; inf without limits."""
-    solver = planner.solver
-    lower, upper = position_limits(planner.robot.joint(name) for name in solver.joints)
+def _to_limit(planner: Planner, motion: Motion, positions: list[Array]) -> float:
+    """Least distance of a joint that moves from its limits, as a share of its range; inf without limits."""
+    assert motion.trajectory is not None  # of a motion with positions
+    names = motion.trajectory.names
+    lower, upper = position_limits(planner.robot.joint(name) for name in names)
     width = upper - lower
-    arm = np.array(positions)[:, list(solver.columns)]
+    arm = np.array(positions)[:, planner.robot.indices(names)]
     share = np.minimum(arm - lower, upper - arm)[:, np.isfinite(width)] / width[np.isfinite(width)]
     return max(0.0, float(share.min())) if share.size else np.inf

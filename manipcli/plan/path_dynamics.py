@@ -23,6 +23,9 @@ class PathDynamics:
         self._rest = np.array(state.position)
         self._robot = planner.robot
         self._loaded = _loaded(planner, state)
+        joints = [planner.robot.joint(name) for name in names]
+        self._coulomb = np.array([joint.friction for joint in joints])
+        self._damping = np.array([joint.damping for joint in joints])
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
         """(k, n) M a + C v + g of these joints, with the rotors' inertia and what is held, at (k, n) each [N m or N].
@@ -32,6 +35,10 @@ class PathDynamics:
         inverse, columns = self._loaded.inverse_dynamics, self.columns
         whole = zip(self._whole(q), *(self._padded(each) for each in (v, a)), strict=True)
         return np.array([inverse(*instant)[columns] for instant in whole]).reshape(q.shape)
+
+    def efforts(self, q: Array, v: Array, a: Array) -> Array:
+        """(k, n) the torques with the friction of the joints: what their motors need [N m or N]."""
+        return np.asarray(self.torques(q, v, a) + self._coulomb * np.sign(v) + self._damping * v)
 
     def points(self, q: Array, v: Array, a: Array, link: str, X_LT: Transform) -> tuple[Array, Array, Array]:
         """(quaternion (k, 4), velocity (k, 3) [m/s], acceleration (k, 3) [m/s2]) of a frame T in a link."""

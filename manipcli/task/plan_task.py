@@ -29,6 +29,7 @@ from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import explained
+from manipcli.spec.keep import KeepSpec
 from manipcli.spec.task import StepSpec
 from manipcli.task.task import Task
 
@@ -44,6 +45,7 @@ class PlannedStep:
         grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
         candidate: name of the candidate; "" for the only way.
         dropped: the candidates that were tried before it.
+        keep: its constraints.
     """
 
     id: str
@@ -53,6 +55,7 @@ class PlannedStep:
     grasps: tuple[Array, ...] = ()
     candidate: str = ""
     dropped: tuple[Dropped, ...] = ()
+    keep: tuple[KeepSpec, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +108,11 @@ class Plan:
 
     def margins(self) -> tuple[MotionMargins, ...]:
         """What binds each of `motions`, its margins and its manipulability."""
-        return tuple(motion_margins(self.planner, *span) for span in self.spans())
+        keeps = [step.keep for step in self.steps for _ in step.plan.motions]
+        return tuple(
+            motion_margins(self.planner.keeping(keep), motion, before)
+            for keep, (motion, before, _) in zip(keeps, self.spans(), strict=True)
+        )
 
     @property
     def outline(self) -> PlanOutline:
@@ -244,7 +251,7 @@ def _steps(
     return tuple(
         PlannedStep(
             str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps,
-            one.chosen.candidate.name, one.dropped,
+            one.chosen.candidate.name, one.dropped, step.keep,
         )
         for k, (step, one) in enumerate(zip(steps, solved, strict=True))
     )  # fmt: skip
