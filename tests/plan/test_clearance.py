@@ -177,3 +177,14 @@ def test_what_is_poured_may_touch_where_it_is_poured(bench: Make) -> None:
     arm.do("lift", {"object": "cup"})
     arm.do("pour", {"object": "cup", "into": "bowl", "tilt": "125 deg"})
     assert arm.planner.contents(arm.now, "bowl") == ("egg", "hat")
+
+
+def test_pairs_that_a_step_allows_have_no_clearance(tmp_path: Path) -> None:
+    """Also not where they are the nearest: then the next pair counts."""
+    move = "move: {to: {joint_1: 20 deg}}"
+    (near,) = plan_task(load_task(task(tmp_path, "", move), allow_outside=True)).clearances()
+    assert near is not None
+    pair = f"[{near.a}, {near.b}]"
+    (next_,) = plan_task(load_task(task(tmp_path, "", f"{move}\n    allow: [{pair}]"), allow_outside=True)).clearances()
+    assert next_ is not None
+    assert (next_.a, next_.b) != (near.a, near.b) and next_.distance >= near.distance
