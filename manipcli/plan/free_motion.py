@@ -16,7 +16,7 @@ from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.model.edge_check import SLACK
 from manipcli.plan.constrained_motion import smooth_motion
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.keep import margins
+from manipcli.plan.keep import margins, reserving
 from manipcli.plan.motion import Grip, Motion, PlanningState
 from manipcli.plan.motion_constraints import applying, keeps_of
 from manipcli.plan.motion_limits import MotionLimits
@@ -140,7 +140,8 @@ def around(
     slack = (_KEPT + SLACK - 1.0) * query.least_margin
     end = np.array(state.position)
     end[planner.robot.indices(limits.names)] = goals[0]
-    keeps = tuple(kept for kept in applying(keeps_of(planner, state, label), end) if kept.margin is not None)
+    keeps = reserving(applying(keeps_of(planner, state, label), end), state.position, end)
+    keeps = tuple(kept for kept in keeps if kept.margin is not None)
     margin = partial(margins, keeps) if keeps else None
     for _ in range(_ROUNDS):
         path = search.path(planner.robot, state, query, limits.names, goals, grip, margin)

@@ -76,6 +76,7 @@ class Motion:
         switch: of controllers, before anything else; None for no switch.
         begins: the state in which it begins, for reports; None where nothing moves.
         allowed: pairs of parts that may touch in it, besides the hand and what it holds.
+        searched: the path planner whose path around obstacles it follows; "" for a path that was not searched.
     """
 
     label: str
@@ -87,6 +88,7 @@ class Motion:
     switch: Switch | None = None
     begins: PlanningState | None = None
     allowed: frozenset[Pair] = frozenset()
+    searched: str = ""
 
 
 @dataclass(frozen=True, slots=True)

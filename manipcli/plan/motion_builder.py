@@ -203,11 +203,8 @@ class MotionBuilder:
         """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         X_WT = self._planner.tool_pose(self._now)
         count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
-        poses = [
-            Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
-            for k in range(count + 1)
-        ]
-        self.along(label, poses, speed=speed)
+        turns = (matrix_from_axis_angle(axis, k / count * angle) for k in range(count + 1))
+        self.along(label, [Transform.of(xyz=X_WT.p, R=R @ X_WT.R) for R in turns], speed=speed)
 
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
@@ -354,6 +351,8 @@ class MotionBuilder:
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
         free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
         self._accept(label, free, grip)
+        if free is not straight and (search := self._planner.searching()) is not None:
+            self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)
 
     def _timed(
         self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"

@@ -29,7 +29,8 @@ class Margin:
     """The joint that comes nearest to one kind of limit.
 
     Attributes:
-        joint, quantity: `position`, `velocity`, `acceleration`, `jerk` or `torque`.
+        joint, quantity: `position`, `velocity`, `acceleration`, `jerk` or `torque`; for a constraint on the timing, its
+            key under `keep`, of the `tool` or the `contents`.
         used: share of the limit; of a position, share of the half range around its middle.
         left: distance to the limit, in the unit of the quantity.
         time: in the motion [s].
@@ -44,10 +45,7 @@ class Margin:
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """The limit that binds for the largest `share` of the time of a motion.
-
-    `joint` is "" where `quantity` is a constraint of the step: `tool_speed`, `tool_acceleration` or `slosh`.
-    """
+    """The limit that binds for the largest `share` of the time of a motion."""
 
     joint: str
     quantity: str
@@ -78,18 +76,20 @@ def motion_margins(planner: Planner, motion: Motion, begins: PlanningState) -> M
         return MotionMargins()
     dynamics = PathDynamics(planner, begins, trajectory.names)
     q, v, a = trajectory.positions, trajectory.velocities, trajectory.accelerations
-    torque, kept = None, []
+    torque, stated = None, []
     if v is not None and a is not None:
         torque = dynamics.efforts(q, v, a)
-        keeps = [(kept.name, kept.bound) for kept in keeps_of(planner, begins, motion.label)]
-        kept = [(name, bound(dynamics).values(q, v, a).max(axis=1)) for name, bound in keeps if bound is not None]
-    used = tuple(limits_used(planner.robot, trajectory, torque))
+        kept = keeps_of(planner, begins, motion.label)
+        bounds = [each.bound(dynamics) for each in kept if each.bound is not None]
+        stated = [Used(bound.name, bound.subject, bound.used(q, v, a), bound.limit) for bound in bounds]
+    used = (*stated, *limits_used(planner.robot, trajectory, torque))
     margins = nearest_limits(used, trajectory.times)
-    return MotionMargins(_binding(used, margins, kept), margins, _manipulability(planner, trajectory, begins))
+    slowed = any(float(each.share.max()) >= BINDS for each in stated)
+    return MotionMargins(_binding(used, margins, slowed), margins, _manipulability(planner, trajectory, begins))
 
 
 class Used(NamedTuple):
-    """The used share of the `limit` of one joint at k points; jerk has k - 1."""
+    """The used share of the `limit` of one joint, or of what is under `keep`, at k points; jerk has k - 1."""
 
     quantity: str
     joint: str
@@ -130,26 +130,23 @@ def nearest_limits(used: tuple[Used, ...], times: Array) -> tuple[Margin, ...]:
     return tuple(found.values())
 
 
-def _binding(used: tuple[Used, ...], margins: tuple[Margin, ...], kept: list[tuple[str, Array]]) -> Binding | None:
-    """Each point counts for the limit that is used most there, if it binds; `kept`: constraints, as shares (k)."""
-    # `velocity_scaling` scales velocities and accelerations alike.
-    scaled = max((one.used for one in margins if one.quantity in ("velocity", "acceleration")), default=1.0)
-    rows = [("", name, share) for name, share in kept]
-    for each in used:
-        if each.quantity != "position" and scaled > 0.0:
-            share = each.share / (scaled if each.quantity in ("velocity", "acceleration") else 1.0)
-            rows.append((each.joint, each.quantity, share))
-    if not rows:
+def _binding(used: tuple[Used, ...], margins: tuple[Margin, ...], slowed: bool) -> Binding | None:
+    """Each point counts for the limit that is used most there, if it binds; `slowed`: a constraint does."""
+    # `velocity_scaling` scales velocities and accelerations alike. A constraint may be what keeps the joints slow, too.
+    most = max((one.used for one in margins if one.quantity in ("velocity", "acceleration")), default=1.0)
+    scaled = 1.0 if slowed else most
+    timed = [each for each in used if each.quantity != "position"]
+    if not timed or scaled <= 0.0:
         return None
-    shares = np.zeros((len(rows), max(len(share) for _, _, share in rows)))
-    for k, (_, _, share) in enumerate(rows):
-        shares[k, : len(share)] = share
+    shares = np.zeros((len(timed), max(len(each.share) for each in timed)))
+    for k, each in enumerate(timed):
+        shares[k, : len(each.share)] = each.share / (scaled if each.quantity in ("velocity", "acceleration") else 1.0)
     binds = shares.max(axis=0) >= BINDS
     if not binds.any():
         return None
-    counts = np.bincount(np.argmax(shares, axis=0)[binds], minlength=len(rows))
-    joint, quantity, _ = rows[int(np.argmax(counts))]
-    return Binding(joint, quantity, float(counts.max()) / shares.shape[1])
+    counts = np.bincount(np.argmax(shares, axis=0)[binds], minlength=len(timed))
+    best = timed[int(np.argmax(counts))]
+    return Binding(best.joint, best.quantity, float(counts.max()) / shares.shape[1])
 
 
 def _manipulability(planner: Planner, trajectory: JointTrajectory, begins: PlanningState) -> Manipulability | None:

@@ -20,7 +20,7 @@ from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics,
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
-_OTHERWISE = "start the line from another arm configuration (after a `pick`: another `yaw` of its `approach`)"
+_OTHERWISE = "start {} from another arm configuration (after a `pick`: another `yaw` of its `approach`)"
 
 
 def joint_path(waypoints: npt.ArrayLike) -> Array:
@@ -62,16 +62,19 @@ def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) ->
     Raises:
         NotPlannable: see `follow_poses`.
     """
-    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT))
+    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT), shape="straight line")
 
 
-def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform]) -> Array:
+def follow_poses(
+    solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform], *, shape: str = "tool's path"
+) -> Array:
     """Joint positions that move the tool through `poses`; the first is the tool pose at `q` (n).
 
     Args:
         solver: of the joints that move.
         q: (n) positions of all moving joints of the robot at the start.
         poses: `X_WT`, near neighbours (see `interpolate`).
+        shape: what the path is, for refusals.
 
     Returns:
         One waypoint per pose, of the solver's joints.
@@ -82,6 +85,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
     q = np.array(q, dtype=np.float64)
     columns = list(solver.columns)
     waypoints = [q[columns]]
+    otherwise = _OTHERWISE.format("the line" if shape == "straight line" else "it")
     walked = turned = 0.0
     for before, X_WT in pairwise(poses):
         walked += float(np.linalg.norm(X_WT.p - before.p))
@@ -91,8 +95,8 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
         where = f"after {walked * 1000.0:.0f} mm{rotated}"
         if not found.converged:
             raise NotPlannable(
-                f"the straight line is unreachable {where}: {found.explain()}",
-                hint=f"{_OTHERWISE}, make it shorter, or use `path: free`",
+                f"the {shape} is unreachable {where}: {found.explain()}",
+                hint=f"{otherwise}, make it shorter, or use `path: free`",
                 reason="line",
             )
         jump = np.abs(found.q[columns] - q[columns])
@@ -101,7 +105,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
             raise NotPlannable(
                 f"joint '{solver.joints[worst]}' would jump by {jump[worst]:.2f} {solver.unit(worst)} {where}, from "
                 f"one point to the next (near singular: {solver.singularity(q)})",
-                hint=f"{_OTHERWISE}, or use `path: free`",
+                hint=f"{otherwise}, or use `path: free`",
                 reason="line",
             )
         q = found.q

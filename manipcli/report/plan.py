@@ -8,7 +8,7 @@ from typing import TextIO
 
 from manipcli.core.geometry import Array
 from manipcli.model.collision import CollisionHit
-from manipcli.plan.motion_margins import Binding, MotionMargins
+from manipcli.plan.motion_margins import MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import stage_of
 from manipcli.report.json import Json, dumps, picked, plain
@@ -17,13 +17,13 @@ from manipcli.task.plan_task import Plan, PlannedMotion, PlannedStep
 
 def render_json(task: str, plan: Plan) -> str:
     """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m."""
-    motions = zip(plan.motions, plan.clearances(), plan.margins(), strict=True)
+    motions = zip(plan.motions, plan.path_kinds(), plan.clearances(), plan.margins(), strict=True)
     return dumps(
         {
             "task": task,
             "verdict": "passed",
             "duration": round(sum(motion.duration for motion in plan.motions), 9),
-            "motions": [_motion(motion, near, margins) for motion, near, margins in motions],
+            "motions": [_motion(motion, kind, near, margins) for motion, kind, near, margins in motions],
             "steps": [_step(step) for step in plan.steps],
             "grasps": [
                 {"step": step, **picked(margin, "body force friction weight ratio acceleration contacts")}
@@ -74,7 +74,7 @@ def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> li
     return [f"{value:.9g}" for value in values[:, trajectory.names.index(joint)]]
 
 
-def _motion(motion: PlannedMotion, near: CollisionHit | None, margins: MotionMargins) -> Json:
+def _motion(motion: PlannedMotion, kind: str, near: CollisionHit | None, margins: MotionMargins) -> Json:
     trajectory = motion.trajectory
     timed = [margin for margin in margins.margins if margin.quantity in ("velocity", "acceleration", "jerk")]
     most = max(timed, key=lambda margin: margin.used, default=None)
@@ -83,18 +83,15 @@ def _motion(motion: PlannedMotion, near: CollisionHit | None, margins: MotionMar
         "verb": motion.verb,
         "motion": motion.label,
         "duration": round(motion.duration, 9),
+        "path": kind or None,
         "joints": list(trajectory.names) if trajectory is not None else [],
         "limited_by": None
         if most is None
         else {"joint": most.joint, "quantity": most.quantity, "used": round(most.used, 6)},
-        "bound_by": None if margins.binding is None else _binding(margins.binding),
+        "bound_by": None if margins.binding is None else picked(margins.binding, "joint quantity share"),
         "margins": plain(margins.margins),
         "manipulability": None if margins.manipulability is None else picked(margins.manipulability, "least time"),
         "clearance": None
         if near is None
         else {"between": [near.a, near.b], "distance": round(near.distance, 6), "time": round(near.time, 6)},
     }
-
-
-def _binding(binding: Binding) -> Json:
-    return {"joint": binding.joint or None, **picked(binding, "quantity share")}

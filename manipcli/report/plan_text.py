@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
-from manipcli.plan.motion_margins import MotionMargins
+from manipcli.plan.motion_margins import Binding, MotionMargins
 from manipcli.plan.why_not import by_stage
 from manipcli.report.table import table
 from manipcli.task.plan_task import Plan
@@ -34,23 +34,29 @@ def render_refused(candidates: Sequence[RefusedCandidates]) -> str:
 def _motions(plan: Plan, found: Sequence[MotionMargins]) -> str:
     rows = []
     previous = None
-    for motion, near, margins in zip(plan.motions, plan.clearances(), found, strict=True):
+    for motion, kind, near, margins in zip(plan.motions, plan.path_kinds(), plan.clearances(), found, strict=True):
         bound, dexterity = margins.binding, margins.manipulability
         rows.append(
             (
                 motion.step_id if motion.step_id != previous else "",
                 motion.verb if motion.step_id != previous else "",
                 motion.label,
+                kind or "-",
                 f"{motion.duration:.3f} s",
-                f"{bound.joint} {bound.quantity}, {100.0 * bound.share:.0f} % of the time".lstrip() if bound else "-",
+                f"{_bound(bound)}, {100.0 * bound.share:.0f} % of the time" if bound else "-",
                 f"{1000.0 * near.distance:.1f} mm" if near is not None else "-",
                 f"{near.a} and {near.b} at {near.time:.2f} s" if near is not None else "-",
                 f"{dexterity.least:.3f} at {dexterity.time:.2f} s" if dexterity else "-",
             )
         )
         previous = motion.step_id
-    headers = ("step", "verb", "motion", "duration", "bound by", "clearance", "between", "manipulability")
+    headers = ("step", "verb", "motion", "path", "duration", "bound by", "clearance", "between", "manipulability")
     return table(headers, rows, right=("duration", "clearance"))
+
+
+def _bound(bound: Binding) -> str:
+    """`joint_4 acceleration`, or `tool_speed`."""
+    return bound.quantity if bound.quantity.startswith(bound.joint) else f"{bound.joint} {bound.quantity}"
 
 
 def _margins(plan: Plan, found: Sequence[MotionMargins]) -> str:

@@ -154,15 +154,22 @@ class Executor:
         self._cancel()
         for _ in range(self._ticks(REST)):
             self._session.tick()
+        while self._moving and not self._session.manager.faults:  # a stop with a low limit takes longer
+            self._session.tick()
 
     def _come_to_rest(self) -> None:
         """Cancel active goals, and tick until all references rest, or a controller fails."""
         self._cancel()
         self._tick()
         faults = self._session.manager.faults
-        while not faults and any(controller.output.velocity.any() for controller in self._serving):
+        while not faults and self._moving:
             self._tick()
             faults = self._session.manager.faults
+
+    @property
+    def _moving(self) -> bool:
+        """Whether a reference of the last motion moves."""
+        return any(controller.output.velocity.any() for controller in self._serving)
 
     def _ticks(self, duration: float) -> int:
         """The number of ticks in `duration` [s]."""

@@ -24,6 +24,7 @@ from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_margins import MotionMargins, motion_margins
 from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
+from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
@@ -45,7 +46,7 @@ class PlannedStep:
         grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
         candidate: name of the candidate; "" for the only way.
         dropped: the candidates that were tried before it.
-        keep: its constraints.
+        keep: of the step.
     """
 
     id: str
@@ -113,6 +114,10 @@ class Plan:
             motion_margins(self.planner.keeping(keep), motion, before)
             for keep, (motion, before, _) in zip(keeps, self.spans(), strict=True)
         )
+
+    def path_kinds(self) -> tuple[str, ...]:
+        """What the path of each of `motions` is; see `path_kind`."""
+        return tuple(path_kind(self.planner, motion, begins) for motion, begins, _ in self.spans())
 
     @property
     def outline(self) -> PlanOutline:

@@ -177,7 +177,7 @@ def test_a_constraint_of_a_step_binds_its_motion(written: Write) -> None:
     free, slow = planned(written(f"{HEAD}steps:\n  - {turn}\n  - {back}\n")).margins()
     assert free.binding is not None and slow.binding is not None
     assert free.binding.joint == "joint_1"
-    assert (slow.binding.joint, slow.binding.quantity) == ("", "tool_speed")
+    assert (slow.binding.joint, slow.binding.quantity) == ("tool", "tool_speed")
     assert slow.binding.share > 0.8  # the rest: it starts and stops
 
 

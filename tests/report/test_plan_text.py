@@ -15,7 +15,9 @@ def test_refused_candidates_are_grouped_and_the_one_taken_is_named() -> None:
     dropped.append(Dropped("far", NotPlannable("reach: out of reach")))
     step = SimpleNamespace(id="pick_1", candidate="from the top", dropped=dropped)
     only = SimpleNamespace(id="wait_1", candidate="", dropped=())
-    plan: Any = SimpleNamespace(motions=(), steps=(step, only), clearances=tuple, margins=tuple, grasps=tuple)
+    plan: Any = SimpleNamespace(
+        motions=(), steps=(step, only), clearances=tuple, path_kinds=tuple, margins=tuple, grasps=tuple
+    )
     text = render_text("t", plan)
     assert "pick_1 takes candidate 92: from the top" in text and "wait_1" not in text
     assert [line.split()[:3] for line in text.splitlines() if line.startswith("     ")] == [
