@@ -150,7 +150,7 @@ class Executor:
             self._tick()
 
     def stop(self) -> None:
-        """Cancel active goals, let the joints stop within their limits, and hold still; alarms are ignored."""
+        """Cancel goals, let the joints stop within their limits, and hold still until they rest; alarms are ignored."""
         self._cancel()
         for _ in range(self._ticks(REST)):
             self._session.tick()
