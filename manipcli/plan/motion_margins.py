@@ -10,7 +10,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.model.configuration import with_mimics
+from manipcli.model.configuration import with_joints, with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.plan.motion_constraints import keeps_of
@@ -152,8 +152,7 @@ def _binding(used: tuple[Used, ...], margins: tuple[Margin, ...], slowed: bool) 
 def _manipulability(planner: Planner, trajectory: JointTrajectory, begins: PlanningState) -> Manipulability | None:
     steps = max(1, round(trajectory.duration / EVERY))
     chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, steps + 1).astype(int))
-    q = np.tile(begins.position, (len(chosen), 1))
-    q[:, planner.robot.indices(trajectory.names)] = trajectory.positions[chosen]
+    q = with_joints(planner.robot, begins.position, trajectory.names, trajectory.positions[chosen])
     try:
         values = [planner.solver.least_singular_value(row) for row in with_mimics(planner.robot, q)]
     except NotPlannable:  # no tool

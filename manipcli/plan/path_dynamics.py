@@ -6,6 +6,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.batch_motion import point_motion
+from manipcli.model.configuration import with_joints
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
@@ -20,6 +21,7 @@ class PathDynamics:
 
     def __init__(self, planner: Planner, state: PlanningState, names: tuple[str, ...]) -> None:
         self.columns = planner.robot.indices(names)
+        self._names = names
         self._rest = np.array(state.position)
         self._robot = planner.robot
         self._loaded = _loaded(planner, state)
@@ -45,14 +47,10 @@ class PathDynamics:
         return point_motion(self._robot, self._whole(q), self._padded(v), self._padded(a), link, X_LT)
 
     def _whole(self, q: Array) -> Array:
-        whole = np.tile(self._rest, (len(q), 1))
-        whole[:, self.columns] = q
-        return whole
+        return with_joints(self._robot, self._rest, self._names, q)
 
     def _padded(self, rates: Array) -> Array:
-        whole = np.zeros((len(rates), len(self._rest)))
-        whole[:, self.columns] = rates
-        return whole
+        return with_joints(self._robot, np.zeros_like(self._rest), self._names, rates)
 
 
 def _loaded(planner: Planner, state: PlanningState) -> Kinematics:
