@@ -131,6 +131,12 @@ class Plan:
         )
 
 
+def unplanned(task: Task) -> Plan:
+    """A plan without steps, for pictures of a task that has none: its start and scene."""
+    task = task.known
+    return Plan(steps=(), start=_start(task), planner=_planner(task))
+
+
 def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None) -> Plan:
     """Plans every step. What a sample changes in the simulation only (`Task.truth`) has no effect.
 
@@ -143,7 +149,7 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     """
     task = task.known
     planner = _planner(task)
-    start = PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+    start = _start(task)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
     return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
 
@@ -213,6 +219,10 @@ def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candi
 def start_position(task: Task) -> Array:
     """Start configuration (n,) [rad or m]: the task's `start` pose, else `home`, else zero clamped to the limits."""
     return configuration(task.robot, task.spec.start)
+
+
+def _start(task: Task) -> PlanningState:
+    return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
 
 
 def _steps(
