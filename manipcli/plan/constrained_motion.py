@@ -12,6 +12,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import CollisionQuery
+from manipcli.model.configuration import with_joints
 from manipcli.plan.inverse_kinematics import Open
 from manipcli.plan.keep import Kept, refuse_unkept, reserving
 from manipcli.plan.kept_path import kept_paths
@@ -122,8 +123,7 @@ def smooth_motion(
     Raises:
         NotPlannable: it exceeds a limit or violates a constraint.
     """
-    end = np.array(state.position)
-    end[planner.robot.indices(limits.names)] = points[-1]
+    end = with_joints(planner.robot, state.position, limits.names, points[-1])
     return _smooth(planner, state, limits, points, applying(keeps_of(planner, state, label), end))
 
 
@@ -164,6 +164,4 @@ def _refuse(planner: Planner, state: PlanningState, keeps: tuple[Kept, ...], tra
 
 
 def _end(planner: Planner, state: PlanningState, trajectory: JointTrajectory) -> Array:
-    end = np.array(state.position)
-    end[planner.robot.indices(trajectory.names)] = trajectory.positions[-1]
-    return end
+    return with_joints(planner.robot, state.position, trajectory.names, trajectory.positions[-1])

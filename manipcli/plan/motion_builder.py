@@ -50,7 +50,7 @@ class MotionBuilder:
         self._planner = planner
         self._now = state
         self._verb = verb
-        self._allowed = allowed
+        self._allowed = allowed | planner.allowed
         self._motions: list[Motion] = []
 
     @property

@@ -88,7 +88,7 @@ class Planner:
         """
         self.clearance = clearance
         self.clearances = clearances
-        self._allowed = NOTHING
+        self.allowed = NOTHING
         self.robot = robot
         self.scene = scene
         self.period = period
@@ -151,7 +151,7 @@ class Planner:
     def allowing(self, pairs: Pairs) -> Planner:
         """A view for one attempt at a step, in which these pairs may touch; it shares everything else."""
         other = self._view()
-        other._allowed = self._allowed | pairs
+        other.allowed = self.allowed | pairs
         other._obstructed, other._search = False, None
         return other
 
@@ -280,7 +280,7 @@ class Planner:
             allowed: further pairs that may touch.
         """
         carried = state.carried
-        allowed |= self._allowed
+        allowed |= self.allowed
         contents: tuple[Carried, ...] = ()
         if carried is not None:
             allowed |= self.hand_contacts(carried.body)

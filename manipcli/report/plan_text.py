@@ -7,29 +7,31 @@ from collections.abc import Sequence
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
 from manipcli.plan.motion_margins import Binding, MotionMargins
-from manipcli.report.plan import PlannedTask
+from manipcli.plan.why_not import by_stage
 from manipcli.report.table import table
+from manipcli.task.plan_task import Plan
 
 
-def render_text(task: str, plan: PlannedTask) -> str:
-    """Tables with one row per motion (the step's name only at its first), per margin, and per step with candidates."""
+def render_text(task: str, plan: Plan) -> str:
+    """Tables with one row per motion (the step's name only at its first), per margin, and per stage of candidates."""
     margins = plan.margins()
     parts = [_motions(plan, margins), _margins(plan, margins)]
     parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
-    if candidates := _candidates(plan):
-        parts.append(candidates)
+    chosen = [step for step in plan.steps if step.dropped and step.candidate]
+    parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
+    parts.append(render_refused(by_stage([(step.id, one) for step in plan.steps for one in step.dropped])))
     total = sum(motion.duration for motion in plan.motions)
     parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {total:.2f} s")
     return "\n\n".join(part for part in parts if part)
 
 
 def render_refused(candidates: Sequence[RefusedCandidates]) -> str:
-    """The refused candidates by stage, the commonest first."""
+    """The refused candidates by stage, the commonest first; "" if there are none."""
     rows = [(str(group.count), group.step, group.stage, group.cause) for group in candidates]
-    return table(("refused", "step", "at", "because"), rows, right=("refused",))
+    return table(("refused", "step", "at", "because"), rows, right=("refused",)) if rows else ""
 
 
-def _motions(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
+def _motions(plan: Plan, found: Sequence[MotionMargins]) -> str:
     rows = []
     previous = None
     for motion, kind, near, margins in zip(plan.motions, plan.path_kinds(), plan.clearances(), found, strict=True):
@@ -57,7 +59,7 @@ def _bound(bound: Binding) -> str:
     return bound.quantity if bound.quantity.startswith(bound.joint) else f"{bound.joint} {bound.quantity}"
 
 
-def _margins(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
+def _margins(plan: Plan, found: Sequence[MotionMargins]) -> str:
     """The nearest joint of each kind of limit in each motion."""
     rows = [
         (
@@ -71,8 +73,3 @@ def _margins(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
         for first, margin in ((k == 0, one) for k, one in enumerate(margins.margins))
     ]
     return table(("motion", "limit", "nearest joint", "used", "at"), rows, right=("used", "at")) if rows else ""
-
-
-def _candidates(plan: PlannedTask) -> str:
-    rows = [(step.id, one.name or "-", one.refusal.cause) for step in plan.steps for one in step.dropped]
-    return table(("step", "dropped candidate", "because"), rows) if rows else ""

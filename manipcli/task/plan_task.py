@@ -111,7 +111,8 @@ class Plan:
         """What binds each of `motions`, its margins and its manipulability."""
         keeps = [step.keep for step in self.steps for _ in step.plan.motions]
         return tuple(
-            motion_margins(self.planner.keeping(keep), *span) for keep, span in zip(keeps, self.spans(), strict=True)
+            motion_margins(self.planner.keeping(keep), motion, before)
+            for keep, (motion, before, _) in zip(keeps, self.spans(), strict=True)
         )
 
     def path_kinds(self) -> tuple[str, ...]:

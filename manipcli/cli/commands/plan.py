@@ -104,7 +104,7 @@ def plan(
     if format_ == "json":
         from manipcli.report.plan import render_json
 
-        console.result(render_json(name, planned, loaded.robot))
+        console.result(render_json(name, planned))
     else:
         from manipcli.report.plan_text import render_text
 
