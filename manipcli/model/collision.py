@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -186,24 +187,34 @@ class CollisionQuery:
             self._geometry.addGeometryObject(
                 pin.GeometryObject(f"{part.name}#{k}", part.joint, part.placement, part.shape)
             )
-        carried = [k for k, part in enumerate(parts) if part.role == "carried"]
-        for i, a in enumerate(parts):
-            # Pairs of scene bodies are never checked, and skipped early because there can be many.
-            for j in [k for k in carried if k > i] if a.role == "scene" else range(i + 1, len(parts)):
-                b = parts[j]
-                if only is not None and only not in (a.name, b.name):
-                    continue
-                if _may_meet(a, b, near) and frozenset((a.name, b.name)) not in allowed:
-                    self._geometry.addCollisionPair(pin.CollisionPair(i, j))
+        self._pairs = _pairs_of(parts, kinematics.model, near, allowed, only)
+        self._geometry.setCollisionPairs(self._pairs)
         self._data = kinematics.model.createData()
         self._state = pin.GeometryData(self._geometry)
-        for pair, request in zip(self._geometry.collisionPairs, self._state.collisionRequests, strict=True):
-            own = frozenset((self._names[pair.first], self._names[pair.second])) if margins else frozenset()
-            request.security_margin = margins.get(own, margin)
+        for request in self._state.collisionRequests:
             request.enable_contact = True
-        self._broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            kinematics.model, self._geometry, self._state
+        self._margins = _margins_of(self._names, margin, margins)
+        self._kept: object = None  # the broad phase whose margins the requests have
+        self._broad = self._managed(self._margins)
+
+    def _managed(self, margins: Array) -> object:
+        """A broad phase of the pairs with these margins (parts, parts)."""
+        self._state.setSecurityMargins(self._geometry, margins, True, False)
+        self._kept = self._pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._kinematics.model, self._geometry, self._state
         )
+        return self._kept
+
+    def _require(self, broad: object, margins: Array) -> None:
+        """Sets the margins with which `broad` was made."""
+        if self._kept is not broad:
+            self._state.setSecurityMargins(self._geometry, margins, True, False)
+            self._kept = broad
+
+    def _touches(self, q: Array, broad: object, margins: Array) -> bool:
+        """Whether any parts touch at `q` with the margins that `broad` was made with."""
+        self._require(broad, margins)
+        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, broad, q, True))
 
     @property
     def shapes(self) -> tuple[pin.GeometryModel, Sequence[str]]:
@@ -227,13 +238,13 @@ class CollisionQuery:
 
     def touches(self, q: npt.ArrayLike) -> bool:
         """Whether any parts touch at `q` (n); faster than `check`."""
-        q = np.asarray(q, dtype=np.float64)
-        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, self._broad, q, True))
+        return self._touches(np.asarray(q, dtype=np.float64), self._broad, self._margins)
 
     def every(self, q: npt.ArrayLike) -> tuple[CollisionHit, ...]:
         """Every touching pair of parts at `q` (n) with its deepest contact, sorted by name."""
         pin, geometry = self._pin, self._geometry
         q = np.asarray(q, dtype=np.float64)
+        self._require(self._broad, self._margins)
         pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, q, False)
         deepest: dict[Pair, float] = {}
         for pair, result in zip(geometry.collisionPairs, self._state.collisionResults, strict=True):
@@ -304,48 +315,36 @@ class InflatedQuery:
         levels: Sequence[float],
     ) -> None:
         self._query = query
-        self._pin, self._kinematics, self._geometry = query._pin, query._kinematics, query._geometry
-        parts, kinematics, geometry = query._parts, query._kinematics, query._geometry
-        self._data = kinematics.model.createData()
-        moves = _moves(kinematics.model)
-        movers: dict[tuple[int, int], int] = {}
-        columns: dict[tuple[int, ...], int] = {}
-        self._column: list[int] = []  # of every pair
-        for pair in geometry.collisionPairs:
-            i, j = pair.first, pair.second
-            a, b = parts[i].joint, parts[j].joint
-            rows = []
-            if moves[a][b]:
-                rows.append(movers.setdefault((i, b), len(movers)))
-            if moves[b][a]:
-                rows.append(movers.setdefault((j, a), len(movers)))
-            self._column.append(columns.setdefault(tuple(rows), len(columns)))
-        self.bound = MotionBound(kinematics, [_mover(parts[k], seen_from) for k, seen_from in movers])
+        parts, moves = query._parts, _moves(query._kinematics.model)
+        i, j = np.nonzero(query._pairs)
+        joint = np.array([part.joint for part in parts], dtype=np.intp)
+        # A mover is a part, seen from a joint; of a pair, each part that moves as seen from the other is one.
+        seen = np.concatenate((i * len(moves) + joint[j], j * len(moves) + joint[i]))
+        moving = np.concatenate((moves[joint[i], joint[j]], moves[joint[j], joint[i]]))
+        movers, rows = np.unique(np.where(moving, seen, -1), return_inverse=True)
+        first, second = np.sort(rows.reshape(2, -1), axis=0)
+        columns, column = np.unique(first * len(movers) + second, return_inverse=True)
         self.summed = np.zeros((len(movers), len(columns)))
-        for key, column in columns.items():
-            self.summed[list(key), column] = 1.0
+        for k in divmod(columns, max(1, len(movers))):
+            self.summed[k, np.arange(len(columns))] = 1.0
+        self.summed = self.summed[movers >= 0]
+        balls = [bounding_ball(part.shape) for part in parts]
+        self.bound = MotionBound(
+            query._kinematics, [_mover(parts, balls, *divmod(int(mover), len(moves))) for mover in movers[movers >= 0]]
+        )
         reach = self.bound.reach.sum(axis=1) @ self.summed
         self.weights = np.maximum(reach / max(1e-9, float(reach.max(initial=0.0))), _LIGHTEST)
-        self._margins = [c * self.weights for c in levels]
-        self._levels: list[tuple[pin.GeometryData, object] | None] = [None] * len(levels)
+        weights = np.zeros((len(parts), len(parts)))
+        weights[i, j] = self.weights[column]
+        self._margins = [query._margins + c * weights for c in levels]
+        self._broad: list[object] = [query._broad, *([None] * (len(levels) - 1))]
 
     def touches(self, q: Array, level: int) -> bool:
         """Whether any parts are closer than their margin of this level."""
-        if level == 0:
-            return self._query.touches(q)
-        made = self._levels[level]
-        if made is None:
-            made = self._levels[level] = self._make(self._margins[level])
-        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, made[1], q, True))
-
-    def _make(self, margins: Array) -> tuple[pin.GeometryData, object]:
-        pin = self._pin
-        state = pin.GeometryData(self._geometry)
-        own = self._query._state.collisionRequests
-        for request, least, column in zip(state.collisionRequests, own, self._column, strict=True):
-            request.security_margin = least.security_margin + float(margins[column])
-        broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._kinematics.model, self._geometry, state)
-        return state, broad
+        query, margins = self._query, self._margins[level]
+        if self._broad[level] is None:
+            self._broad[level] = query._managed(margins)
+        return query._touches(q, self._broad[level], margins)
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,26 +358,57 @@ class _Part:
     shape: CollisionGeometry
 
 
-def _moves(model: pin.Model) -> list[list[bool]]:
+def _pairs_of(
+    parts: Sequence[_Part],
+    model: pin.Model,
+    near: frozenset[tuple[int, int]],
+    allowed: set[frozenset[str]],
+    only: str | None,
+) -> npt.NDArray[np.bool_]:
+    """(parts, parts) the checked pairs: parts that can move relative to each other through more than one joint."""
+    joint = np.array([part.joint for part in parts], dtype=np.intp)
+    link = np.array([part.role == "link" for part in parts], dtype=bool)
+    role = np.array([part.role for part in parts])
+    adjacent = np.zeros((model.njoints, model.njoints), dtype=bool)
+    for a, b in near:
+        adjacent[a, b] = True
+    apart = joint[:, None] != joint
+    links = link[:, None] & link & apart & ~adjacent[joint[:, None], joint]
+    checked = links | ((role[:, None] != role) & (apart | ~(link[:, None] | link)))
+    number: dict[str, int] = {}
+    name = np.array([number.setdefault(part.name, len(number)) for part in parts], dtype=np.intp)
+    free = np.ones((len(number), len(number)), dtype=bool)
+    for pair in allowed:
+        a, b = (number.get(each, -1) for each in (*pair, *pair)[:2])
+        if a >= 0 and b >= 0:
+            free[a, b] = free[b, a] = False
+    checked &= free[name[:, None], name]
+    if only is not None:
+        alone = np.array([part.name == only for part in parts], dtype=bool)
+        checked &= alone[:, None] | alone
+    return np.triu(checked, 1)
+
+
+def _margins_of(names: Sequence[str], margin: float, margins: Mapping[frozenset[str], float]) -> Array:
+    """(parts, parts) [m]: `margin`, or the pair's own one."""
+    found = np.full((len(names), len(names)), margin)
+    if margins:
+        for (i, a), (j, b) in combinations(enumerate(names), 2):
+            found[i, j] = margins.get(frozenset((a, b)), margin)
+    return found
+
+
+def _moves(model: pin.Model) -> npt.NDArray[np.bool_]:
     """[a][b]: whether some joint moves what is fixed to joint a relative to what is fixed to b (0: the world)."""
     chains: list[set[int]] = [set()]
     for k in range(1, model.njoints):
         chains.append({*chains[model.parents[k]], k})
-    return [[not a <= b for b in chains] for a in chains]
+    return np.array([[not a <= b for b in chains] for a in chains], dtype=bool)
 
 
-def _mover(part: _Part, seen_from: int) -> Mover:
-    centre, radius = bounding_ball(part.shape)
-    return Mover(part.joint, seen_from, part.placement.act(centre), radius)
-
-
-def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:
-    """Whether two parts can move relative to each other through more than one joint."""
-    if a.role == b.role == "link":
-        return a.joint != b.joint and (a.joint, b.joint) not in near
-    if a.role == b.role:
-        return False
-    return a.joint != b.joint or "link" not in (a.role, b.role)
+def _mover(parts: Sequence[_Part], balls: Sequence[tuple[Array, float]], k: int, seen_from: int) -> Mover:
+    centre, radius = balls[k]
+    return Mover(parts[k].joint, seen_from, parts[k].placement.act(centre), radius)
 
 
 def _neighbours(model: pin.Model) -> frozenset[tuple[int, int]]:
