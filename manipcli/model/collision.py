@@ -178,6 +178,7 @@ class CollisionQuery:
         self.margin = margin
         self._own_margins = margins
         self._inflated: dict[tuple[float, ...], InflatedQuery] = {}
+        self._nearer: dict[float, CollisionQuery] = {}
         self._parts = tuple(parts)
         self._made = (kinematics, self._parts, near, allowed)
         self._only = only
@@ -261,8 +262,10 @@ class CollisionQuery:
 
     def nearer(self, share: float) -> CollisionQuery:
         """The same query with this share of every margin."""
-        margins = {pair: share * margin for pair, margin in self._own_margins.items()}
-        return CollisionQuery(*self._made, share * self.margin, margins=margins, only=self._only)
+        if share not in self._nearer:
+            margins = {pair: share * margin for pair, margin in self._own_margins.items()}
+            self._nearer[share] = CollisionQuery(*self._made, share * self.margin, margins=margins, only=self._only)
+        return self._nearer[share]
 
     def inflated(self, levels: Sequence[float]) -> InflatedQuery:
         """The same query with larger margins [m]; see `InflatedQuery`."""
