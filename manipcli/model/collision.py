@@ -17,13 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.collision_pairs import Part, checked_pairs, margins_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.motion_bound import MotionBound, Mover
 from manipcli.model.self_collision import lasting_overlaps
@@ -33,7 +33,6 @@ from manipcli.shapes.proximity import bounding_ball, coal_shape
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from manipcli.shapes.proximity import CollisionGeometry
 
 RESOLUTION = 0.01  # rad or m: largest joint motion between two checked positions of a trajectory
 _LIGHTEST = 0.05  # weight of a pair that moves little
@@ -89,14 +88,14 @@ class CollisionChecker:
         self.scene = scene
         self._kinematics = kinematics
         self._bodies = {body.name: [(g.X_LS, coal_shape(g.shape)) for g in body.geometries] for body in scene.bodies}
-        self._links: list[_Part] = []
+        self._links: list[Part] = []
         model = kinematics.model
         for link in kinematics.robot.links:
             frame = model.frames[model.getFrameId(link.name)]
             for g in link.collisions:
                 placement = frame.placement * _se3(g.X_LS)
                 self._links.append(
-                    _Part(f"robot/{link.name}", "link", frame.parentJoint, placement, coal_shape(g.shape))
+                    Part(f"robot/{link.name}", "link", frame.parentJoint, placement, coal_shape(g.shape))
                 )
         self._near = _neighbours(model)
         self._ignored = {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in ignore}
@@ -142,7 +141,7 @@ class CollisionChecker:
                 frame = model.frames[model.getFrameId(held[body].link)]
                 role = "carried"
                 joint, X_JO = frame.parentJoint, frame.placement * _se3(held[body].X_LO)
-            parts += [_Part(body, role, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
+            parts += [Part(body, role, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
         allowed = self._ignored | {frozenset(pair) for pair in ignore}
         if carried is not None:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
@@ -163,7 +162,7 @@ class CollisionQuery:
     def __init__(
         self,
         kinematics: Kinematics,
-        parts: Sequence[_Part],
+        parts: Sequence[Part],
         near: frozenset[tuple[int, int]],
         allowed: set[frozenset[str]],
         margin: float,
@@ -188,13 +187,13 @@ class CollisionQuery:
             self._geometry.addGeometryObject(
                 pin.GeometryObject(f"{part.name}#{k}", part.joint, part.placement, part.shape)
             )
-        self._pairs = _pairs_of(parts, kinematics.model, near, allowed, only)
+        self._pairs = checked_pairs(parts, kinematics.model, near, allowed, only)
         self._geometry.setCollisionPairs(self._pairs)
         self._data = kinematics.model.createData()
         self._state = pin.GeometryData(self._geometry)
         for request in self._state.collisionRequests:
             request.enable_contact = True
-        self._margins = _margins_of(self._names, margin, margins)
+        self._margins = margins_of(self._names, margin, margins)
         self._kept: object = None  # the broad phase whose margins the requests have
         self._broad = self._managed(self._margins)
 
@@ -350,57 +349,6 @@ class InflatedQuery:
         return query._touches(q, self._broad[level], margins)
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """A shape of a link or of a body; `placement` is in the frame of `joint` (0: the world)."""
-
-    name: str
-    role: Literal["link", "carried", "scene"]
-    joint: int
-    placement: pin.SE3
-    shape: CollisionGeometry
-
-
-def _pairs_of(
-    parts: Sequence[_Part],
-    model: pin.Model,
-    near: frozenset[tuple[int, int]],
-    allowed: set[frozenset[str]],
-    only: str | None,
-) -> npt.NDArray[np.bool_]:
-    """(parts, parts) the checked pairs: parts that can move relative to each other through more than one joint."""
-    joint = np.array([part.joint for part in parts], dtype=np.intp)
-    link = np.array([part.role == "link" for part in parts], dtype=bool)
-    role = np.array([part.role for part in parts])
-    adjacent = np.zeros((model.njoints, model.njoints), dtype=bool)
-    for a, b in near:
-        adjacent[a, b] = True
-    apart = joint[:, None] != joint
-    links = link[:, None] & link & apart & ~adjacent[joint[:, None], joint]
-    checked = links | ((role[:, None] != role) & (apart | ~(link[:, None] | link)))
-    number: dict[str, int] = {}
-    name = np.array([number.setdefault(part.name, len(number)) for part in parts], dtype=np.intp)
-    free = np.ones((len(number), len(number)), dtype=bool)
-    for pair in allowed:
-        a, b = (number.get(each, -1) for each in (*pair, *pair)[:2])
-        if a >= 0 and b >= 0:
-            free[a, b] = free[b, a] = False
-    checked &= free[name[:, None], name]
-    if only is not None:
-        alone = np.array([part.name == only for part in parts], dtype=bool)
-        checked &= alone[:, None] | alone
-    return np.triu(checked, 1)
-
-
-def _margins_of(names: Sequence[str], margin: float, margins: Mapping[frozenset[str], float]) -> Array:
-    """(parts, parts) [m]: `margin`, or the pair's own one."""
-    found = np.full((len(names), len(names)), margin)
-    if margins:
-        for (i, a), (j, b) in combinations(enumerate(names), 2):
-            found[i, j] = margins.get(frozenset((a, b)), margin)
-    return found
-
-
 def _moves(model: pin.Model) -> npt.NDArray[np.bool_]:
     """[a][b]: whether some joint moves what is fixed to joint a relative to what is fixed to b (0: the world)."""
     chains: list[set[int]] = [set()]
@@ -409,7 +357,7 @@ def _moves(model: pin.Model) -> npt.NDArray[np.bool_]:
     return np.array([[not a <= b for b in chains] for a in chains], dtype=bool)
 
 
-def _mover(parts: Sequence[_Part], balls: Sequence[tuple[Array, float]], k: int, seen_from: int) -> Mover:
+def _mover(parts: Sequence[Part], balls: Sequence[tuple[Array, float]], k: int, seen_from: int) -> Mover:
     centre, radius = balls[k]
     return Mover(parts[k].joint, seen_from, parts[k].placement.act(centre), radius)
 
