@@ -7,7 +7,7 @@ the arm stays on one branch of its inverse kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -56,17 +56,31 @@ def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
     return (X_WA, *between, X_WB)
 
 
-def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) -> Array:
-    """The straight line of the tool from where `q` (n) has it to `X_WT`.
+def rotated(X_WT: Transform, axis: Array, angle: float) -> tuple[Transform, ...]:
+    """Poses from T on while it rotates in place about an `axis` (3,) of the world by `angle` [rad], of any size."""
+    count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
+    turns = [matrix_from_axis_angle(axis, k / count * angle) for k in range(count + 1)]
+    return tuple(Transform.of(xyz=X_WT.p, R=turn @ X_WT.R) for turn in turns)
+
+
+def linear_path(
+    solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform, visit: Callable[[Array], None] = lambda _: None
+) -> Array:
+    """The straight line of the tool from where `q` (n) has it to `X_WT`; `visit` is called as in `follow_poses`.
 
     Raises:
         NotPlannable: see `follow_poses`.
     """
-    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT), shape="straight line")
+    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT), visit, shape="straight line")
 
 
 def follow_poses(
-    solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform], *, shape: str = "tool's path"
+    solver: InverseKinematics,
+    q: npt.ArrayLike,
+    poses: Sequence[Transform],
+    visit: Callable[[Array], None] = lambda _: None,
+    *,
+    shape: str = "tool's path",
 ) -> Array:
     """Joint positions that move the tool through `poses`; the first is the tool pose at `q` (n).
 
@@ -74,6 +88,7 @@ def follow_poses(
         solver: of the joints that move.
         q: (n) positions of all moving joints of the robot at the start.
         poses: `X_WT`, near neighbours (see `interpolate`).
+        visit: called with the positions (n) of all joints at each pose but the first, as soon as they are found.
         shape: what the path is, for refusals.
 
     Returns:
@@ -109,5 +124,6 @@ def follow_poses(
                 reason="line",
             )
         q = found.q
+        visit(q)
         waypoints.append(q[columns])
     return joint_path(waypoints)

@@ -116,9 +116,9 @@ class Planner:
         view._search = PathSearch.of(self._paths, self.rng)
         return view
 
-    def searching(self) -> PathSearch | None:
-        """The search for a motion that is not free on its straight path; None while only those are tried."""
-        self._obstructed = True
+    def searching(self, *, obstructed: bool = True) -> PathSearch | None:
+        """The search for a motion that is `obstructed` on its straight path; None while only those are tried."""
+        self._obstructed |= obstructed
         return self._search
 
     @property
