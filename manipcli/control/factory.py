@@ -53,7 +53,8 @@ def build_controllers(
     if errors:
         raise InvalidInput(errors)
     context = BuildContext(robot, kinematics=cache(lambda: kinematics or Kinematics(robot)), compat=compat)
-    built = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
+    every = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
+    built = {name: controller for name, controller in every.items() if controller is not None}
     wanted = any(controller.feed_forward != "none" for controller in built.values())
     manager = ControllerManager(
         joints=robot.joint_names,
@@ -64,7 +65,7 @@ def build_controllers(
     for name, controller in built.items():
         manager.load(controller, update_rate=spec.controllers[name].update_rate)
         manager.configure(name)
-    manager.switch(activate=[name for name, own in spec.controllers.items() if own.active])
+    manager.switch(activate=[name for name in built if spec.controllers[name].active])
     return manager
 
 
@@ -98,8 +99,8 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
         commanded.update(own.joints if own.interfaces else ())
         yield from _rate_findings(name, own, robot, period, place((*at, "update_rate")))
         for problem in CONTROLLERS[own.type].check(own, robot):
-            message = f"controller '{name}': {problem.message}"
-            yield Diagnostic(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
+            message, where = f"controller '{name}': {problem.message}", place((*at, *problem.loc))
+            yield Diagnostic(problem.code or "CTRL100", message, where, problem.hint, problem.severity)
     yield from _rivals(spec, together, place)
     idle = [joint.name for joint in robot.moving_joints if joint.independent and joint.name not in commanded]
     if idle:

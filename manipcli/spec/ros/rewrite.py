@@ -5,19 +5,29 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Literal
 
 from pydantic import BaseModel
 
 from manipcli.core.errors import Diagnostic, Place, Severity
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.spec.controllers import ControllerSpec, Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
 from manipcli.spec.ros.table import Block, Table, model_below, value
-from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, INTERFACES, OTHER_NODES, PACKAGES, UNSERVED_TYPES
+from manipcli.spec.ros.tables import (
+    BY_TYPE,
+    DEFAULTS,
+    ELSEWHERE,
+    INTERFACES,
+    OTHER_NODES,
+    PACKAGES,
+    SIMULATORS,
+    UNSERVED_TYPES,
+)
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.ros.wildcards import Wildcards
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, plain
 
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 
@@ -33,10 +43,11 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
     version = {key: entry for key, entry in root.entries.items() if key == "version"}
     wrapped = root.entries.get("controllers")
     if is_ros2(root):
+        work.form = "ros2"
         found = work.of_nodes(root.without("version"))
         place, rest = root.place, MappingNode(version, root.place)
     elif wrapped is None:
-        work.ros1 = True
+        work.form = "ros1"
         found = work.of_blocks(root.without("version"))
         place, rest = root.place, MappingNode(version, root.place)
     elif isinstance(wrapped.node, MappingNode):
@@ -51,6 +62,10 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
     }
     inner = root.place if wrapped is None else wrapped.node.place
     made = MappingNode(work.started(entries), inner)
+    if work.form is not None and work.foreign:
+        work.unlike_ros(entries)
+    if work.form == "ros2" and work.foreign:
+        rest = rest.with_entry("compat", Entry(place, ScalarNode("ros2", place)))
     findings = sorted(work.findings, key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0))
     return rest.with_entry("controllers", Entry(place, made)), findings
 
@@ -58,14 +73,14 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
 class _Rewriting:
     """The rewriting of one file.
 
-    `foreign`: controllers in a form of ROS, which does not state whether they are active. `ros1`: the file is not in
-    the form of ROS 2, so ROS types have their meaning in ROS 1.
+    `foreign`: controllers in a form of ROS, which does not state whether they are active. `form`: that of the file;
+    None for ours, with ROS types.
     """
 
     def __init__(self, types: Mapping[str, type[ControllerSpec]]) -> None:
         self.findings: list[Diagnostic] = []
         self.models = types
-        self.ros1 = False
+        self.form: Literal["ros1", "ros2"] | None = None
         self.foreign: list[str] = []
 
     def report(
@@ -73,14 +88,53 @@ class _Rewriting:
     ) -> None:
         self.findings.append(Diagnostic(code, message, place, hint=hint, severity=severity))
 
+    def unknown(self, where: str, key: str, place: Place, known: Iterable[str]) -> None:
+        """Reports an unknown key: a warning in a file of ROS, whose nodes ignore it; an error if it is one of ours."""
+        ours = any(key in model.model_fields for model in self.models.values())
+        if self.form is None or ours:
+            self.report("CTRL201", place, f"{where}: unknown key '{key}'", hint=did_you_mean(key, known, kind="known"))
+        else:
+            near = nearest(key, known)
+            hint = f"did you mean {any_of(near)}?" if near else None
+            message = f"{where}: unknown key '{key}': left out, as in ROS"
+            self.report("CTRL201", place, message, hint=hint, severity="warning")
+
+    def other_node(self, block: Found) -> None:
+        """Reports a node that is not a controller."""
+        if block.name in SIMULATORS:
+            message = f"'{block.name}' is a simulator's plugin: left out"
+            self.report("CTRL214", block.key_place, message, severity="note")
+        else:
+            message = f"'{block.name}' is not a controller: left out"
+            self.report("CTRL214", block.key_place, message, severity="warning")
+
+    def unlike_ros(self, entries: Mapping[str, Entry]) -> None:
+        """One note on all defaults that differ from those of ROS, and one on a `goal_time` of 0 in ROS 2."""
+        differing: dict[str, None] = {}
+        endless: list[str] = []
+        for name in self.foreign:
+            node = entries[name].node if name in entries else None
+            kind = plain(mapping(node).get("type") or ScalarNode(None, Place("", 0, 0)))
+            for key, text in DEFAULTS.get(str(kind), {}).items():
+                if self.form in text and value_at(node, key) is None:
+                    differing.setdefault(f"{key} {text[self.form]}")
+            given = value_at(node, "constraints.goal_time")
+            if given is not None and plain(given) in (0, 0.0):
+                endless.append(name)
+        first = entries[self.foreign[0]].key_place if self.foreign[0] in entries else None
+        if differing and first is not None:
+            self.report("CTRL218", first, f"defaults that differ from ROS's: {'; '.join(differing)}", severity="note")
+        if endless and first is not None and self.form == "ros2":
+            message = f"goal_time 0 of {listed(endless, most=3)} means no time limit, as in ROS 2 (`compat: ros2`)"
+            hint = "`compat: ros1` in the robot file: no extra time"
+            self.report("CTRL219", entries[endless[0]].key_place, message, hint=hint, severity="note")
+
     def of_blocks(self, root: MappingNode) -> list[Found]:
         """The controllers of a ROS 1 file, or of our form without `controllers:`."""
         found = []
         for block in in_namespaces(root):
-            if block.name in OTHER_NODES and not has_type(block.node):
-                self.report(
-                    "CTRL214", block.key_place, f"'{block.name}' is not a controller: left out", severity="warning"
-                )
+            if block.name in OTHER_NODES | SIMULATORS and not has_type(block.node):
+                self.other_node(block)
             else:
                 found.append(block)
         return found
@@ -110,17 +164,15 @@ class _Rewriting:
         for node in own:
             if node in used:
                 continue
-            given = node if node.name in OTHER_NODES else wildcards.given(node)
+            given = node if node.name in OTHER_NODES | SIMULATORS else wildcards.given(node)
             if has_type(given.node):
                 found.append(given)
-            elif node.name in OTHER_NODES:
-                self.report(
-                    "CTRL214", node.key_place, f"'{node.name}' is not a controller: left out", severity="warning"
-                )
+            elif node.name in OTHER_NODES | SIMULATORS:
+                self.other_node(node)
             else:
                 hint = did_you_mean(node.name, names, kind="it names")
-                message = f"the controller_manager does not declare controller '{node.name}'"
-                self.report("CTRL203", node.key_place, message, hint=hint)
+                message = f"the controller_manager does not declare controller '{node.name}': left out, as in ROS"
+                self.report("CTRL203", node.key_place, message, hint=hint, severity="warning")
         self.of_all(wildcards, found)
         return found
 
@@ -138,8 +190,7 @@ class _Rewriting:
                 kinds = {str(plain(kind)) for kind in (mapping(c.node).get("type") for c in found) if kind is not None}
                 tables = [BY_TYPE[kind] for kind in sorted(kinds) if kind in BY_TYPE]
                 known = [name for t in tables for name in (*self.models[t.own].model_fields, *t.parameters.names)]
-                hint = did_you_mean(key, [*known, *MANAGER_BLOCK.names, *(c.name for c in found)], kind="known")
-                self.report("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+                self.unknown(where, key, entry.key_place, [*known, *MANAGER_BLOCK.names, *(c.name for c in found)])
 
     def declared(self, manager: Found) -> list[Found]:
         """The controllers that a manager declares; reports the manager's own parameters."""
@@ -162,8 +213,7 @@ class _Rewriting:
             message = f"{MANAGER}: 'update_rate' has no effect: the task sets the control rate"
             self.report("CTRL214", entry.key_place, message, hint=hint, severity="note")
         elif not _neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
-            hint = did_you_mean(key, [*MANAGER_BLOCK.names, *declared], kind="known")
-            self.report("CTRL201", entry.key_place, f"{MANAGER}: unknown key '{key}'", hint=hint)
+            self.unknown(MANAGER, key, entry.key_place, [*MANAGER_BLOCK.names, *declared])
 
     def controller(self, name: str, node: Node) -> Node | None:
         """A controller in our form; None if it is left out."""
@@ -182,9 +232,10 @@ class _Rewriting:
         own = ScalarNode(table.own, word.place, written=word.value)
         node = node.with_entry("type", Entry(entry.key_place, own))
         node = table.reshape(_implied(_renamed(node, table.parameters), table, word))
-        if table.needs and table.needs not in node.entries:
-            message = f"controller '{name}' has no '{table.needs}': left out"
-            self.report("CTRL214", word.place, message, hint=f"add `{table.needs}: ...`", severity="warning")
+        if table.needs and not node.entries.keys() & {*table.needs}:
+            needed = table.needs[0]
+            message = f"controller '{name}' has no '{needed}': left out"
+            self.report("CTRL214", word.place, message, hint=f"add `{needed}: ...`", severity="warning")
             return None
         self.foreign.append(name)
         node = self.effective(name, node, table)
@@ -223,7 +274,7 @@ class _Rewriting:
 
     def unclamped(self, name: str, gains: MappingNode) -> None:
         """Reports integral gains that have no effect in ROS 1 but act here."""
-        for joint, entry in gains.entries.items() if self.ros1 else ():
+        for joint, entry in gains.entries.items() if self.form != "ros2" else ():
             block = mapping(entry.node)
             gain = block.entries.get("i")
             if gain is None or plain(gain.node) in (0, 0.0) or _CLAMPS & block.entries.keys():
@@ -290,8 +341,7 @@ class _Rewriting:
                 message = f"{where}: '{key}' is a parameter of other ROS controllers: left out"
                 self.report("CTRL214", entry.key_place, message, severity="warning")
             elif not self.unserved(where, key, entry, block):
-                hint = did_you_mean(key, [*fields, *block.names], kind="known")
-                self.report("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+                self.unknown(where, key, entry.key_place, [*fields, *block.names])
         return MappingNode(kept, node.place)
 
     def unserved(self, where: str, key: str, entry: Entry, block: Block) -> bool:
@@ -364,6 +414,13 @@ def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:
         items = tuple(ScalarNode(value(text), word.place) for text in words.split())
         implied: Node = SequenceNode(items, word.place) if plural else items[0]
         node = node.with_entry(key, Entry(word.place, implied))
+    return node
+
+
+def value_at(node: Node | None, key: str) -> Node | None:
+    """The node under a dotted key."""
+    for part in key.split("."):
+        node = None if node is None else child(node, part)
     return node
 
 

@@ -62,7 +62,7 @@ class Table:
         idle: command interface -> our keys that have no effect on it.
         interface: ROS key that names a hardware interface; a controller with an interface that manipcli does not have
             is left out with a warning.
-        needs: required key; a controller without it is left out with a warning.
+        needs: required keys, of which one suffices; a controller without them is left out with a warning.
     """
 
     own: str
@@ -71,7 +71,7 @@ class Table:
     reshape: Callable[[MappingNode], MappingNode] = _same
     idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     interface: str = ""
-    needs: str = ""
+    needs: tuple[str, ...] = ()
 
 
 def model_below(model: type[BaseModel] | None, key: str) -> type[BaseModel] | None:

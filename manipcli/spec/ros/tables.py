@@ -167,10 +167,9 @@ WRENCH: Final = Table(
             "topic_name",
         },
         quiet=_EVERYWHERE | {"sensor_name", "interface_names"},
-        renamed={"frame_id": "link"},
         neutral=_NEUTRAL | {"additional_frames_to_publish": ([],)},
     ),
-    needs="link",
+    needs=("link", "frame_id"),
 )  # fmt: skip
 
 TABLES: Final = (JOINT_TRAJECTORY, GRIPPER, FORWARD, PID, JOINT_STATES, WRENCH)
@@ -244,7 +243,7 @@ MANAGER: Final = Block(
 OTHER_NODES: Final = frozenset(
     {
         "controller_list", "controller_manager", "controller_manager_ns", "controller_names", "controller_stopper",
-        "gazebo_ros_control", "generic_hw_control_loop", "hardware_control_loop", "hardware_interface",
+        "generic_hw_control_loop", "hardware_control_loop", "hardware_interface",
         "joint_group_limits", "joint_limits", "joint_state_publisher", "joint_state_publisher_gui", "move_group",
         "moveit_controller_manager", "moveit_manage_controllers", "moveit_sim_hw_interface",
         "moveit_simple_controller_manager", "robot_description", "robot_state_publisher", "ros2_control_node",
@@ -252,3 +251,29 @@ OTHER_NODES: Final = frozenset(
     }
 )  # fmt: skip
 """Other blocks of ROS files with controllers."""
+
+SIMULATORS: Final = frozenset(
+    {"gazebo_ros_control", "gazebo_ros2_control", "gz_ros_control", "gz_ros2_control", "ign_ros2_control"}
+)
+"""Plugins of simulators, whose parameters have no meaning here."""
+
+
+def _default(here: str, ros2: str, ros1: str | None = None) -> dict[str, str]:
+    theirs = {"ros1": ros2 if ros1 is None else ros1, "ros2": ros2}
+    return {form: f"{here} (ROS: {value})" for form, value in theirs.items() if value != here}
+
+
+DEFAULTS: Final[dict[str, dict[str, dict[str, str]]]] = {
+    "joint_trajectory": {
+        "constraints.goal_time": _default("2 s", "0, no time limit", "0, no extra time"),
+        "constraints.stopped_velocity_tolerance": _default("0.05", "0.01"),
+        "constraints.decelerate_on_cancel": _default("true", "false"),
+        "interpolate_from_desired_state": _default("true", "false", "true"),
+    },
+    "gripper": {
+        "goal_tolerance": _default("0.05 rad or 0.002 m", "0.01"),
+        "stall_velocity": _default("0.02 rad/s or 0.001 m/s", "0.001"),
+        "stall_time": _default("0.2 s", "1 s"),
+    },
+}
+"""Our type -> key -> by the form of the file, our default and that of ROS, where they differ."""
