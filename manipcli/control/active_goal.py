@@ -165,6 +165,7 @@ class ActiveGoal:
         controller: name, for texts.
         timeout: [s] after its end, when it is aborted.
         begin: [s] of its time 0 in the clock of the active trajectory, once it is followed.
+        unchecked: whether its way from the measured state is not checked yet, because that was unknown.
     """
 
     controller: str
@@ -175,6 +176,7 @@ class ActiveGoal:
     start_time: float
     timeout: float
     begin: float = 0.0
+    unchecked: bool = False
     _before: tuple[float, Array] | None = None
     _now: tuple[float, Array] | None = None
 

@@ -12,6 +12,7 @@ import numpy as np
 from manipcli.control.claims import Claimant, conflicts
 from manipcli.control.controller import Controller, JointState
 from manipcli.control.feed_forward import Index
+from manipcli.control.roles import takes_goals
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
@@ -55,8 +56,8 @@ class Slot:
     """
 
     __slots__ = (
-        "contact_force", "controller", "every", "first", "gathered", "index", "measured", "period",
-        "scattered", "state",
+        "_state", "contact_force", "controller", "every", "first", "gathered", "index", "measured", "period",
+        "scattered",
     )  # fmt: skip
 
     def __init__(self, controller: Controller, index: Index, every: int, period: float) -> None:
@@ -71,6 +72,17 @@ class Slot:
         self.measured = JointState(none, none, none)
         self.contact_force: Array | None = None
         self.gathered: list[tuple[Array, Array]] = []
+
+    @property
+    def state(self) -> ControllerState:
+        """Its state, which decides whether it accepts goals."""
+        return self._state
+
+    @state.setter
+    def state(self, state: ControllerState) -> None:
+        self._state = state
+        if takes_goals(self.controller):
+            self.controller.accepts_goals = state == "active"
 
     def look(self, vectors: Sequence[Array], contact_force: Array | None) -> None:
         """Set the measured vectors: position, velocity, effort."""

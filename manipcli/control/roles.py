@@ -35,6 +35,12 @@ class Hand(Controller, Protocol):
         ...
 
 
+class GoalTaker(Controller, Protocol):
+    """Executes goals; `accepts_goals` is False while its manager has it inactive."""
+
+    accepts_goals: bool
+
+
 class SensorReader(Controller, Protocol):
     """Reads sensors."""
 
@@ -51,6 +57,11 @@ def is_follower(controller: Controller) -> TypeGuard[Follower]:
 def is_hand(controller: Controller) -> TypeGuard[Hand]:
     """Whether it moves a hand, for `grasp` and `release` steps."""
     return controller.role == "hand"
+
+
+def takes_goals(controller: Controller) -> TypeGuard[GoalTaker]:
+    """Whether it executes goals."""
+    return hasattr(controller, "accepts_goals")
 
 
 def reads_sensors(controller: Controller) -> TypeGuard[SensorReader]:

@@ -130,6 +130,15 @@ class ComputedTorqueController:
             wanted_acceleration=self._wanted,
         )
 
+    @property
+    def accepts_goals(self) -> bool:
+        """False while its manager has it inactive."""
+        return self._follower.accepts_goals
+
+    @accepts_goals.setter
+    def accepts_goals(self, active: bool) -> None:
+        self._follower.accepts_goals = active
+
     def send_goal(self, trajectory: JointTrajectory, *, constraints: ConstraintsSpec | None = None) -> GoalHandle:
         """Accept a trajectory; see `JointTrajectoryController.send_goal`."""
         return self._follower.send_goal(trajectory, constraints=constraints)

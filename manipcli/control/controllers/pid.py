@@ -14,7 +14,8 @@ Steps cannot use it; it is for Python programs:
 
 u = ff r + PID(r - x, d/dt). With one interface, r is its reference, and the PID computes the derivative of the error:
 (e - last e) / period, from 0 at first. With two, the error of the second interface is the derivative, and ff applies to
-the second reference: u = ff r' + PID(r - x, r' - x').
+the second reference: u = ff r' + PID(r - x, r' - x'). On the position interface u is a position, as in ROS 2; without
+a reference it is the measured one.
 """
 
 from __future__ import annotations
@@ -65,7 +66,9 @@ class PidSpec(ControllerSpec):
 
     type: Literal["pid"] = Field(description="`pid`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    command_interface: Literal["velocity", "effort"] = Field("effort", description="What it commands. Default effort.")
+    command_interface: Literal["position", "velocity", "effort"] = Field(
+        "effort", description="What it commands. Default effort."
+    )
     reference_and_state_interfaces: Annotated[
         tuple[Literal["position", "velocity"], ...],
         Field(
@@ -201,6 +204,8 @@ class PidController:
         if not self._has_reference:
             output.rows[:] = 0.0
             output.position[:] = measured.position
+            if self.interfaces == ("position",):
+                output.command[:] = measured.position
             return output
         error = np.subtract(self._reference, state, out=self._error)
         if self._has_wraps:
@@ -264,6 +269,12 @@ def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
         message = f"{list(spec.reference_and_state_interfaces)} cannot be controlled together"
         hint = "use [position], [position, velocity] or [velocity]"
         yield Problem(("reference_and_state_interfaces",), message, hint, "CTRL182")
+    small = [joint for joint in spec.joints if (own := spec.gains.get(joint)) is not None and not own.feedforward_gain]
+    if spec.command_interface == "position" and spec.reference_and_state_interfaces == ("position",) and small:
+        message = f"joint '{small[0]}' has no feedforward_gain: its position command is p times its error, near 0"
+        yield Problem(
+            ("gains", small[0]), message, "for reference + PID, use feedforward_gain: 1", "CTRL182", "warning"
+        )
     if spec.gravity_compensation and spec.command_interface != "effort":
         message = f"gravity_compensation needs the effort interface, not {spec.command_interface}"
         yield Problem(
