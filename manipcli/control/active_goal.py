@@ -12,10 +12,11 @@ import numpy as np
 
 from manipcli.control.action import ErrorCode, GoalHandle
 from manipcli.control.active_trajectory import INSTANT
-from manipcli.control.trajectory_goal import JointFacts, JointTolerance, TrajectoryGoal
+from manipcli.control.trajectory_goal import JointFacts, TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
+from manipcli.plan.motion import JointTolerance
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
 

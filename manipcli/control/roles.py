@@ -7,6 +7,7 @@ from typing import Protocol, TypeGuard
 
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.controller import Controller
+from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
 
@@ -14,7 +15,7 @@ from manipcli.plan.trajectory import JointTrajectory
 class Follower(Controller, Protocol):
     """Follows joint trajectories, on any interface."""
 
-    def send_goal(self, trajectory: JointTrajectory) -> GoalHandle:
+    def send_goal(self, trajectory: JointTrajectory | TrajectoryGoal) -> GoalHandle:
         """Accept a trajectory of all its joints, which starts at the next update; the previous goal is aborted.
 
         Raises:

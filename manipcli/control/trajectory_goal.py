@@ -15,6 +15,7 @@ from manipcli.control.limit_laws import limit_array
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, distinguished
 from manipcli.description.elements import JointLimits, JointType
+from manipcli.plan.motion import JointTolerance
 from manipcli.plan.trajectory import LINEAR, JointTrajectory
 from manipcli.spec.controllers import Interface
 
@@ -69,19 +70,6 @@ class JointFacts:
             lower=self.lower[k], upper=self.upper[k], velocity=self.velocity[k], acceleration=self.acceleration[k],
             continuous=self.continuous[k], wraps=bool(self.continuous[k].any()),
         )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class JointTolerance:
-    """control_msgs/JointTolerance: rad or m, per second, per second squared.
-
-    Each: above 0 is the tolerance, 0 leaves the controller's own, -1 means that it is not enforced.
-    """
-
-    name: str
-    position: float = 0.0
-    velocity: float = 0.0
-    acceleration: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

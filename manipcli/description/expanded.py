@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from xml.dom import minidom
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
@@ -47,8 +48,7 @@ def read_description(
         InvalidInput: with file, line and column.
     """
     document = read_document(path)
-    top = document.documentElement
-    declared = top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
+    declared = _declares_xacro(document)
     findings: tuple[Diagnostic, ...] = ()
     expanded = path.suffix == ".xacro" or declared
     if expanded:
@@ -64,6 +64,19 @@ def read_description(
     if root.tag != "robot":
         raise _other_format(root)
     return Description(path=path, root=root, packages=packages, findings=findings, expanded=expanded)
+
+
+def _declares_xacro(document: minidom.Document) -> bool:
+    top = document.documentElement
+    return top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
+
+
+def is_plain(path: Path) -> bool:
+    """Whether this is readable plain URDF, which takes no arguments."""
+    try:
+        return path.suffix != ".xacro" and not _declares_xacro(read_document(path))
+    except InvalidInput:
+        return False
 
 
 def unread_description(urdf: bytes, name: str) -> Description:

@@ -30,6 +30,7 @@ from manipcli.control.control_loop import ControlLoop, InverseDynamicsLoop, erro
 from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
+from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
@@ -139,7 +140,9 @@ class ComputedTorqueController:
     def accepts_goals(self, active: bool) -> None:
         self._follower.accepts_goals = active
 
-    def send_goal(self, trajectory: JointTrajectory, *, constraints: ConstraintsSpec | None = None) -> GoalHandle:
+    def send_goal(
+        self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
+    ) -> GoalHandle:
         """Accept a trajectory; see `JointTrajectoryController.send_goal`."""
         return self._follower.send_goal(trajectory, constraints=constraints)
 
