@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from functools import cache
 
+from manipcli.control.chain import chain_finding, target_of
 from manipcli.control.command import may_go_together
 from manipcli.control.controller import BuildContext
 from manipcli.control.controllers import CONTROLLERS
@@ -92,11 +93,12 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
         for k, joint in enumerate(own.joints):
             where = place((*at, "joints", k))
             yield from _joint_findings(name, own, joint, robot, where)
-            if own.active:
+            if own.active and not target_of(own):
                 before = set(owners.get(joint, {}).values())
                 yield from _claim_findings(name, own, joint, owners, where)
                 together |= {(other, name, joint) for other in before if name in owners[joint].values()}
-        commanded.update(own.joints if own.interfaces else ())
+        commanded.update(own.joints if own.interfaces and not target_of(own) else ())
+        yield from chain_finding(name, own, spec.controllers, place((*at, "chained_to")))
         yield from _rate_findings(name, own, robot, period, place((*at, "update_rate")))
         for problem in CONTROLLERS[own.type].check(own, robot):
             message, where = f"controller '{name}': {problem.message}", place((*at, *problem.loc))
@@ -129,7 +131,7 @@ def _rate_findings(
         for joint in robot.moving_joints
         if joint.name in spec.joints and joint.limits.acceleration is not None
     ]
-    if ticks > 1 and "position" in spec.interfaces and limited:
+    if ticks > 1 and "position" in spec.interfaces and limited and not target_of(spec):
         message = f"controller '{name}' commands positions only every {ticks} control ticks: the acceleration limits "
         message += f"of {listed(limited, most=3)} saturate such steps, and the joints lag"
         hint = "remove `update_rate`; positions are then commanded at every tick"

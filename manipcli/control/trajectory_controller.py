@@ -79,6 +79,7 @@ class JointTrajectoryController:
         stop_trajectory_duration: [s] of the stop after a cancel; 0: by deceleration.
         speed_scaling: initial trajectory seconds per second.
         positions_upsampling: points with only positions get the velocities of a spline.
+        chained_to: the controller whose references it commands; None: it commands the joints.
 
     Attributes:
         notes: arguments that have no effect, and why.
@@ -115,8 +116,9 @@ class JointTrajectoryController:
         stop_trajectory_duration: float = 0.0,
         speed_scaling: float = 1.0,
         positions_upsampling: bool = False,
+        chained_to: str | None = None,
     ) -> None:
-        self.name = name
+        self.name, self.chained_to = name, chained_to
         self.joints = distinct(name, joints)
         if isinstance(command_interfaces, str):
             command_interfaces = (command_interfaces,)

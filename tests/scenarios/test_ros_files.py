@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
-from conftest import Pendulum, RunCli
+
+Pendulum = Callable[..., Path]
+RunCli = Callable[..., Any]
 
 CONTROLLERS = """\
 /**: {ros__parameters: {gains: {"$(var side)nge": {p: 60, d: 8}}}}

@@ -123,3 +123,56 @@ def test_a_missing_blank_is_read_as_pyyaml_reads_it(text: str) -> None:
     node = parse(text, "t.yaml")
     assert node is not None
     assert plain(node) == yaml.load(text, yaml.SafeLoader)
+
+
+CHAIN = """\
+controller_manager:
+  ros__parameters:
+    arm: {type: joint_trajectory_controller/JointTrajectoryController}
+    inner: {type: pid_controller/PidController}
+arm: {ros__parameters: {joints: [a, b], command_joints: [inner/a, inner/b], command_interfaces: [position]}}
+inner:
+  ros__parameters:
+    dof_names: [a, b]
+    command_interface: effort
+    reference_and_state_interfaces: [position]
+    gains: {a: {p: 10.0}, b: {p: 5.0}}
+"""
+
+
+def test_command_joints_of_a_controller_are_a_chain_and_both_start_active() -> None:
+    controllers, findings = loaded(CHAIN)
+    assert controllers["arm"]["joints"] == controllers["inner"]["joints"] == ("a", "b")
+    assert controllers["arm"]["chained_to"] == "inner"
+    assert "active" not in controllers["arm"] | controllers["inner"]
+    assert codes(findings) == []
+    controllers, _ = loaded(CHAIN.replace("[inner/a, inner/b]", "[a, b]"))
+    assert "chained_to" not in controllers["arm"]
+
+
+def test_a_pid_commands_references_of_another_by_its_dof_names() -> None:
+    text = (
+        CHAIN
+        + """\
+outer:
+  ros__parameters:
+    type: pid_controller/PidController
+    dof_names: [inner/a, inner/b]
+    reference_and_state_dof_names: [a, b]
+    command_interface: position
+    reference_and_state_interfaces: [position]
+    gains: {inner/a: {p: 10.0}, inner/b: {p: 5.0}}
+"""
+    )
+    controllers, _ = loaded(text)
+    outer = controllers["outer"]
+    assert (outer["joints"], outer["chained_to"], set(outer["gains"])) == (("a", "b"), "inner", {"a", "b"})
+    assert (outer["active"], controllers["arm"].get("active", True)) == (False, True)  # 'arm' has the references
+
+
+@pytest.mark.parametrize("wrong", ["[a]", "[inner/b, inner/a]", "[inner/a, other/b]", "[inner/a, b]"])
+def test_what_cannot_be_chained_is_refused_and_commands_nothing_else(wrong: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        loaded(CHAIN.replace("[inner/a, inner/b]", wrong))
+    (finding,) = [finding for finding in caught.value.findings if finding.severity == "error"]
+    assert (finding.code, finding.place and finding.place.line) == ("CTRL220", 5)

@@ -317,6 +317,9 @@ class _Rewriting:
             if _neutral(block, key, entry.node):
                 continue
             given = plain(entry.node)
+            if key in block.refused:
+                self.report("CTRL220", entry.key_place, f"{where}: {key}: {block.refused[key]}")
+                continue
             if key in block.filled and given == []:
                 self.report("CTRL206", entry.node.place, f"{where}.{key}: expected at least 1 item, got none")
             if isinstance(given, int | float) and given > block.most.get(key, math.inf):
@@ -377,6 +380,20 @@ class _Rewriting:
                 else:
                     owners.update(dict.fromkeys(joints, name))
             result[name] = entry
+        return self.chained(result)
+
+    def chained(self, entries: dict[str, Entry]) -> dict[str, Entry]:
+        """Deactivates controllers that command references of one that starts inactive."""
+        result = dict(entries)
+        off = {name for name, entry in entries.items() if _value(entry.node, "active") is False}
+        for name, entry in entries.items():
+            target = _value(entry.node, "chained_to")
+            if name in self.foreign and target in off and name not in off and isinstance(entry.node, MappingNode):
+                message = f"controller '{name}' starts inactive, as '{target}', whose references it commands"
+                hint = "set `active`, or add a `switch_controllers` step"
+                self.report("CTRL215", entry.key_place, message, hint=hint, severity="note")
+                active = Entry(entry.key_place, ScalarNode(False, entry.key_place))
+                result[name] = Entry(entry.key_place, entry.node.with_entry("active", active))
         return result
 
 
@@ -385,7 +402,15 @@ def _joints(node: MappingNode) -> list[str]:
     word, joints = node.get("type"), node.get("joints")
     if not isinstance(word, ScalarNode) or not isinstance(joints, SequenceNode) or "broadcaster" in str(word.value):
         return []
-    return [item.value for item in joints.items if isinstance(item, ScalarNode) and isinstance(item.value, str)]
+    target = _value(node, "chained_to")
+    above = f"{target}/" if target else ""
+    return [above + item.value for item in joints.items if isinstance(item, ScalarNode) and isinstance(item.value, str)]
+
+
+def _value(node: Node, key: str) -> object:
+    """The scalar under a key; None without one."""
+    found = mapping(node).get(key)
+    return found.value if isinstance(found, ScalarNode) else None
 
 
 def _may_be(node: Found, controller: Found) -> bool:

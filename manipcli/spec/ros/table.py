@@ -27,6 +27,7 @@ class Block:
         neutral: values with the same effect as a missing key, as in parameter dumps.
         unserved: values of a key that ROS supports and manipcli does not.
         most: largest tolerance; a larger one is left out with a warning.
+        refused: key -> why a controller that has it cannot be served: it would command something else.
         filled: lists that must not be empty, though ours may be.
     """
 
@@ -38,12 +39,13 @@ class Block:
     neutral: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     unserved: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     most: Mapping[str, float] = field(default_factory=dict)
+    refused: Words = field(default_factory=dict)
     filled: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
         """All ROS parameters of the block."""
-        return (*self.known, *self.quiet, *self.renamed, *self.inner)
+        return (*self.known, *self.quiet, *self.renamed, *self.inner, *self.refused)
 
 
 def _same(node: MappingNode) -> MappingNode:

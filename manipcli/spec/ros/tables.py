@@ -10,7 +10,7 @@ from typing import Final
 
 from manipcli.spec.block_fields import bounds_of
 from manipcli.spec.quantity import JointTolerance
-from manipcli.spec.ros.reshape import joint_trajectory, one_joint, pid
+from manipcli.spec.ros.reshape import forward, joint_trajectory, one_joint, pid
 from manipcli.spec.ros.table import Block, Table
 from manipcli.spec.source.tree import Plain
 
@@ -52,7 +52,7 @@ JOINT_TRAJECTORY: Final = Table(
         "joint_trajectory_controller/JointTrajectoryController": {},
     },
     parameters=Block(
-        known=_ANY | {"command_joints", "hold_trajectory_duration", "velocity_ff"}
+        known=_ANY | {"hold_trajectory_duration", "velocity_ff"}
         | {"set_last_command_interface_value_as_state_on_activation"},
         quiet=_EVERYWHERE | {"action_monitor_rate"},
         renamed={"open_loop_control": "interpolate_from_desired_state"},
@@ -68,6 +68,8 @@ JOINT_TRAJECTORY: Final = Table(
             ),
         },
         neutral=_NEUTRAL | {"command_joints": ([],)},
+        refused={"command_joints": "only `joints` can be commanded: give the same names, or the references "
+                 "of one controller (`CONTROLLER/joint`)"},
         filled=frozenset({"command_interfaces"}),
     ),
     reshape=joint_trajectory,
@@ -113,7 +115,7 @@ FORWARD: Final = Table(
         renamed={"interface_name": "command_interface"},
         neutral=_NEUTRAL,
     ),
-    reshape=one_joint,
+    reshape=forward,
     interface="interface_name",
 )
 
@@ -130,13 +132,15 @@ PID: Final = Table(
     },
     parameters=Block(
         known=_ANY | {
-            "reference_and_state_dof_names", "use_external_measured_states", "enable_feedforward",
+            "use_external_measured_states", "enable_feedforward",
             "measured_state_suffix", "export_params",
         },
         quiet=_EVERYWHERE,
         renamed={"dof_names": "joints"},
         inner={"gains": Block(joint=_GAINS)},
         neutral=_NEUTRAL | {"reference_and_state_dof_names": ([],), "use_external_measured_states": (False,)},
+        refused={"reference_and_state_dof_names": "its states are those of `dof_names`: give the same names there, or "
+                 "the references of one controller (`CONTROLLER/joint`)"},
     ),
     reshape=pid,
 )  # fmt: skip
