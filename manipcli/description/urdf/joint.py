@@ -195,6 +195,11 @@ def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -
 def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
     name = element.name or "(without a name)"
     kind = element.first("type") or element.first("plugin")
+    if kind is None and element.attributes.get("type"):
+        message = f"transmission '{name}' has its type as an attribute, as before ros_control: ignored"
+        hint = f"write <type>transmission_interface/{element.attributes['type'].rpartition('/')[2]}</type> inside"
+        reader.report("URDF015", message, element.place, hint=hint, severity="warning")
+        return None
     if kind is None or not kind.text:
         message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"
         reader.report("URDF015", message, element.place)
