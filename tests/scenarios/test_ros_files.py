@@ -73,3 +73,26 @@ def test_a_goal_that_is_wrong_is_refused_at_its_place(
     ran = call_cli("check", "task.yaml", cwd=folder)
     assert ran.code == 1
     assert message in ran.out + ran.err
+
+
+def test_an_arm_that_is_too_weak_is_told_before_what_it_hits(pendulum: Pendulum, call_cli: RunCli) -> None:
+    """1 kg that sticks out 0.5 m needs 4.9 N m, which nothing here allows; it falls onto the table."""
+    folder = pendulum("mount: {xyz: [0, 0, 1]}\nposes: {out: {all: [-1.5]}, higher: {all: [-1.9]}}\n")
+    urdf = folder / "pendulum.urdf"
+    box = (
+        '<collision><origin xyz="0 0 -0.3"/><geometry><box size="0.04 0.04 0.5"/></geometry></collision></link>\n<joint'
+    )
+    text = urdf.read_text().replace("0 0 -0.25", "0 0 -0.5").replace('effort="20"', 'effort="2"')
+    urdf.write_text(text.replace("</link>\n<joint", box))
+    (folder / "controllers.yaml").write_text(
+        "controllers: {arm: {type: joint_trajectory, joints: [hinge], gains: {hinge: {p: 400, d: 40}}}}\n"
+    )
+    (folder / "task.yaml").write_text(
+        "task: weak\nrobot: robot.yaml\ncontrollers: controllers.yaml\nstart: out\nreplan: false\n"
+        "scene: {table: {box: {size: [2, 2, 0.1]}, pose: {xyz: [0, 0, 0.55]}, fixed: true}}\n"
+        "steps: [{move: {to: higher}}]\nwatch: [{always: {no_collision: {pairs: [[robot, table]]}}}]\n"
+    )
+    ran = call_cli("run", "task.yaml", cwd=folder)
+    assert ran.code == 1
+    assert "'move_1' failed: joint 'hinge' falls for lack of effort: gravity needs" in ran.out
+    assert "its limit is 2 N m" in ran.out

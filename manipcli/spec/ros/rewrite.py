@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-import re
 from collections.abc import Iterable, Mapping
 from typing import Literal
 
@@ -14,20 +12,30 @@ from manipcli.core.errors import Diagnostic, Place, Severity
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.spec.controllers import ControllerSpec, Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
-from manipcli.spec.ros.table import Block, Table, model_below, value
+from manipcli.spec.ros.questions import (
+    commanded_joints,
+    implied,
+    is_typo,
+    is_vendor_type,
+    may_be,
+    neutral,
+    renamed,
+    scalar_at,
+    value_at,
+)
+from manipcli.spec.ros.table import Block, Table, model_below
 from manipcli.spec.ros.tables import (
     BY_TYPE,
     DEFAULTS,
     ELSEWHERE,
     INTERFACES,
     OTHER_NODES,
-    PACKAGES,
     SIMULATORS,
     UNSERVED_TYPES,
 )
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.ros.wildcards import Wildcards
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, plain
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, plain
 
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 
@@ -113,18 +121,17 @@ class _Rewriting:
         differing: dict[str, None] = {}
         endless: list[str] = []
         for name in self.foreign:
-            node = entries[name].node if name in entries else None
-            kind = plain(mapping(node).get("type") or ScalarNode(None, Place("", 0, 0)))
-            for key, text in DEFAULTS.get(str(kind), {}).items():
+            node = entries[name].node
+            for key, text in DEFAULTS.get(str(scalar_at(node, "type")), {}).items():
                 if self.form in text and value_at(node, key) is None:
                     differing.setdefault(f"{key} {text[self.form]}")
             given = value_at(node, "constraints.goal_time")
             if given is not None and plain(given) in (0, 0.0):
                 endless.append(name)
-        first = entries[self.foreign[0]].key_place if self.foreign[0] in entries else None
-        if differing and first is not None:
+        if differing:
+            first = entries[self.foreign[0]].key_place
             self.report("CTRL218", first, f"defaults that differ from ROS's: {'; '.join(differing)}", severity="note")
-        if endless and first is not None and self.form == "ros2":
+        if endless and self.form == "ros2":
             message = f"goal_time 0 of {listed(endless, most=3)} means no time limit, as in ROS 2 (`compat: ros2`)"
             hint = "`compat: ros1` in the robot file: no extra time"
             self.report("CTRL219", entries[endless[0]].key_place, message, hint=hint, severity="note")
@@ -149,9 +156,7 @@ class _Rewriting:
         used: list[Found] = []
         found = []
         for controller in declared:
-            blocks = [node for node in own if node.path == controller.path] or [
-                n for n in own if _may_be(n, controller)
-            ]
+            blocks = [node for node in own if node.path == controller.path] or [n for n in own if may_be(n, controller)]
             used += blocks
             entries = dict(mapping(controller.node).entries)
             for block in blocks:
@@ -212,7 +217,7 @@ class _Rewriting:
                 hint = f"write `simulation: {{control_period: {1.0 / rate:g} s}}` in the task"
             message = f"{MANAGER}: 'update_rate' has no effect: the task sets the control rate"
             self.report("CTRL214", entry.key_place, message, hint=hint, severity="note")
-        elif not _neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
+        elif not neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
             self.unknown(MANAGER, key, entry.key_place, [*MANAGER_BLOCK.names, *declared])
 
     def controller(self, name: str, node: Node) -> Node | None:
@@ -231,7 +236,7 @@ class _Rewriting:
             return None
         own = ScalarNode(table.own, word.place, written=word.value)
         node = node.with_entry("type", Entry(entry.key_place, own))
-        node = table.reshape(_implied(_renamed(node, table.parameters), table, word))
+        node = table.reshape(implied(renamed(node, table.parameters), table, word))
         if table.needs and not node.entries.keys() & {*table.needs}:
             needed = table.needs[0]
             message = f"controller '{name}' has no '{needed}': left out"
@@ -249,7 +254,7 @@ class _Rewriting:
         word = node.get(key) if key else None
         if not isinstance(word, ScalarNode) or not isinstance(word.value, str) or word.value in INTERFACES:
             return True
-        near = [interface for interface in INTERFACES if _is_typo(word.value, interface)]
+        near = [interface for interface in INTERFACES if is_typo(word.value, interface)]
         if near:
             message = f"controller '{name}': unknown {key} '{word.value}'"
             self.report("CTRL203", word.place, message, hint=did_you_mean(word.value, near))
@@ -265,7 +270,7 @@ class _Rewriting:
         interface = str(word.value) if isinstance(word, ScalarNode) else ""
         for key in table.idle.get(interface, ()):
             entry = node.entries.get(key)
-            if entry is not None and not _neutral(table.parameters, key, entry.node):
+            if entry is not None and not neutral(table.parameters, key, entry.node):
                 message = f"{name}: '{key}' has no effect on the {interface} interface: left out"
                 hint = "for a grip force, use `command_interface: effort` with `gains`"
                 self.report("CTRL214", entry.key_place, message, hint=hint, severity="warning")
@@ -286,7 +291,7 @@ class _Rewriting:
         if word in UNSERVED_TYPES:
             message = f"controller '{name}': ROS type '{word}' is not supported: left out"
             self.report("CTRL214", place, message, severity="warning")
-        elif _is_vendor_type(word):
+        elif is_vendor_type(word):
             package, _, own = word.partition("/")
             message = f"controller '{name}': type '{word}' of package '{package}' is not supported: left out"
             same = [known for known in BY_TYPE if known.partition("/")[2] == own]
@@ -310,11 +315,11 @@ class _Rewriting:
         """
         if not isinstance(node, MappingNode):
             return node
-        node = _renamed(node, block)
+        node = renamed(node, block)
         kept: dict[str, Entry] = {}
         fields = () if model is None else tuple(model.model_fields)
         for key, entry in node.entries.items():
-            if _neutral(block, key, entry.node):
+            if neutral(block, key, entry.node):
                 continue
             given = plain(entry.node)
             if key in block.refused:
@@ -369,7 +374,7 @@ class _Rewriting:
             entry = entries[name]
             node = entry.node
             if isinstance(node, MappingNode) and name in self.foreign and "active" not in node.entries:
-                joints = _joints(node)
+                joints = commanded_joints(node)
                 taken = next((joint for joint in joints if joint in owners), None)
                 if taken is not None:
                     message = f"controller '{name}' starts inactive: '{owners[taken]}' commands '{taken}'"
@@ -385,9 +390,9 @@ class _Rewriting:
     def chained(self, entries: dict[str, Entry]) -> dict[str, Entry]:
         """Deactivates controllers that command references of one that starts inactive."""
         result = dict(entries)
-        off = {name for name, entry in entries.items() if _value(entry.node, "active") is False}
+        off = {name for name, entry in entries.items() if scalar_at(entry.node, "active") is False}
         for name, entry in entries.items():
-            target = _value(entry.node, "chained_to")
+            target = scalar_at(entry.node, "chained_to")
             if name in self.foreign and target in off and name not in off and isinstance(entry.node, MappingNode):
                 message = f"controller '{name}' starts inactive, as '{target}', whose references it commands"
                 hint = "set `active`, or add a `switch_controllers` step"
@@ -395,71 +400,3 @@ class _Rewriting:
                 active = Entry(entry.key_place, ScalarNode(False, entry.key_place))
                 result[name] = Entry(entry.key_place, entry.node.with_entry("active", active))
         return result
-
-
-def _joints(node: MappingNode) -> list[str]:
-    """The joints that a controller commands."""
-    word, joints = node.get("type"), node.get("joints")
-    if not isinstance(word, ScalarNode) or not isinstance(joints, SequenceNode) or "broadcaster" in str(word.value):
-        return []
-    target = _value(node, "chained_to")
-    above = f"{target}/" if target else ""
-    return [above + item.value for item in joints.items if isinstance(item, ScalarNode) and isinstance(item.value, str)]
-
-
-def _value(node: Node, key: str) -> object:
-    """The scalar under a key; None without one."""
-    found = mapping(node).get(key)
-    return found.value if isinstance(found, ScalarNode) else None
-
-
-def _may_be(node: Found, controller: Found) -> bool:
-    """Whether these parameters belong to this controller: same name, and one of the two has no namespace."""
-    return node.name == controller.name and 1 in (len(node.path), len(controller.path))
-
-
-def _is_vendor_type(word: str) -> bool:
-    """Whether this is `package/Class` of a package that is not ROS's, and not a typo of one."""
-    package = word.partition("/")[0]
-    return re.fullmatch(r"\w+/\w+", word) is not None and not any(_is_typo(package, known) for known in PACKAGES)
-
-
-def _is_typo(given: str, known: str) -> bool:
-    """Whether at most two letters differ, ignoring case."""
-    match = difflib.SequenceMatcher(None, given.casefold(), known.casefold(), autojunk=False)
-    return max(len(given), len(known)) - sum(block.size for block in match.get_matching_blocks()) <= 2
-
-
-def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:
-    """Adds the keys that the ROS type implies."""
-    for key, words in table.types[str(word.value)].items():
-        if key in node.entries or key.removesuffix("s") in node.entries:
-            continue
-        plural = key.endswith("interfaces")
-        items = tuple(ScalarNode(value(text), word.place) for text in words.split())
-        implied: Node = SequenceNode(items, word.place) if plural else items[0]
-        node = node.with_entry(key, Entry(word.place, implied))
-    return node
-
-
-def value_at(node: Node | None, key: str) -> Node | None:
-    """The node under a dotted key."""
-    for part in key.split("."):
-        node = None if node is None else child(node, part)
-    return node
-
-
-def _neutral(block: Block, key: str, node: Node) -> bool:
-    given = plain(node)
-    return any(given == nothing and type(given) is type(nothing) for nothing in block.neutral.get(key, ()))
-
-
-def _renamed(node: MappingNode, block: Block) -> MappingNode:
-    """Renames ROS keys to ours; if both are given, ours is used and the other is unknown."""
-    return MappingNode(
-        {
-            (key if (own := block.renamed.get(key)) is None or own in node.entries else own): entry
-            for key, entry in node.entries.items()
-        },
-        node.place,
-    )

@@ -137,3 +137,11 @@ def test_findings_with_one_cause_are_one_line(tmp_path: Path) -> None:
     assert "58 warnings" in shown
     assert sum(map(len, alike(examination.findings))) == len(examination.findings)
     assert len(alike(examination.findings[:2])) == 2
+
+
+@pytest.mark.parametrize(("gain", "told"), [("", 1), ('k_position="0" ', 1), ('k_position="20" ', 0)])
+def test_soft_limits_without_effect_are_told(gain: str, told: int, tmp_path: Path) -> None:
+    safety = f'<safety_controller {gain}k_velocity="1" soft_lower_limit="-0.5" soft_upper_limit="0.5"/>'
+    joint = f'<joint name="j" type="revolute"><parent link="base"/><child link="tip"/>{LIMIT}{safety}</joint>'
+    examination = examined(tmp_path, f'<robot name="r"><link name="base"/><link name="tip"/>{joint}</robot>')
+    assert [finding.severity for finding in found(examination, "URDF086")] == ["warning"] * told

@@ -97,6 +97,14 @@ READING_TREE: tuple[Check, ...] = (
         severity="note",
     ),
     physics_check(
+        "URDF086",
+        "soft-limits",
+        "The soft limits of a joint have no effect, because k_position is missing or 0",
+        "k_position is the velocity per distance to the soft limit; with 0 the joint does not slow down before it.",
+        one_joint(f'{LIMIT}<safety_controller soft_lower_limit="-0.5" soft_upper_limit="0.5" k_velocity="1"/>'),
+        severity="warning",
+    ),
+    physics_check(
         "URDF009",
         "axis",
         "The axis of a joint is zero or too long",
