@@ -10,7 +10,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.plan.motion import Motion, PlanningState
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory
+from manipcli.spec.resolved import number_text, yaml_word
 
 TOLERANCE: Final = 1e-6
 """[rad or m] Deviation in position of the written splines."""
@@ -106,24 +107,30 @@ def _add(rows: _Rows, begins: float, trajectory: JointTrajectory, names: Sequenc
 
 def message(trajectory: JointTrajectory, comment: str) -> str:
     """The message in YAML; numbers read back bit for bit, times to the nanosecond."""
-    lines = [f"# {comment}", "header: {frame_id: ''}", f"joint_names: [{', '.join(trajectory.names)}]", "points:"]
-    velocities, accelerations = trajectory.velocities, trajectory.accelerations
-    assert velocities is not None and accelerations is not None  # `step_trajectory` gives both
+    return "\n".join([f"# {comment}", *message_lines(trajectory)]) + "\n"
+
+
+def message_lines(trajectory: JointTrajectory) -> list[str]:
+    """The lines of the message; a point has the velocities and accelerations that it gives."""
+    names = ", ".join(yaml_word(name) for name in trajectory.names)
+    lines = ["header: {frame_id: ''}", f"joint_names: [{names}]", "points:"]
+    orders = trajectory.order_of_points
     for k, time in enumerate(trajectory.times.tolist()):
-        sec, nanosec = divmod(round(time * 1e9), 1_000_000_000)
-        lines.append(
-            f"- {{positions: {_list(trajectory.positions[k])}, velocities: {_list(velocities[k])}, "
-            f"accelerations: {_list(accelerations[k])}, "
-            f"time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}"
-        )
-    return "\n".join(lines) + "\n"
+        given = {"positions": trajectory.positions}
+        if orders[k] >= CUBIC and trajectory.velocities is not None:
+            given["velocities"] = trajectory.velocities
+        if orders[k] >= QUINTIC and trajectory.accelerations is not None:
+            given["accelerations"] = trajectory.accelerations
+        values = ", ".join(f"{key}: {_list(rows[k])}" for key, rows in given.items())
+        lines.append(f"- {{{values}, time_from_start: {duration_text(time)}}}")
+    return lines
+
+
+def duration_text(seconds: float) -> str:
+    """builtin_interfaces/Duration in YAML, to the nanosecond."""
+    sec, nanosec = divmod(round(seconds * 1e9), 1_000_000_000)
+    return f"{{sec: {sec}, nanosec: {nanosec}}}"
 
 
 def _list(values: Array) -> str:
-    return f"[{', '.join(_number(float(value)) for value in values)}]"
-
-
-def _number(value: float) -> str:
-    """With a point: YAML 1.1 reads `1e-05` as a string."""
-    text = repr(value)
-    return text if "." in text else text.replace("e", ".0e")
+    return f"[{', '.join(number_text(float(value)) for value in values)}]"
