@@ -66,10 +66,10 @@ def step_trajectory(spans: Sequence[Span], columns: dict[str, int]) -> JointTraj
     )
 
 
-def thinned(trajectory: JointTrajectory) -> JointTrajectory:
-    """Fewer points of a trajectory with accelerations, whose quintic splines differ from it by at most `TOLERANCE`.
+def thinned(trajectory: JointTrajectory, *, tolerance: float = TOLERANCE, jerk: float = JERK) -> JointTrajectory:
+    """Fewer points of a trajectory with accelerations, whose quintic splines differ from it by at most `tolerance`.
 
-    Intervals are halved as long as they differ.
+    Intervals are halved as long as they differ, or the changes of acceleration by a share `jerk` of the largest.
     """
     times, positions, velocities, accelerations = (
         trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations
@@ -84,8 +84,8 @@ def thinned(trajectory: JointTrajectory) -> JointTrajectory:
             trajectory.names, times[kept], positions[kept], velocities[kept], accelerations[kept]
         )
         p, _, a = shorter.sample(times)
-        off = np.max(np.abs(p - positions), axis=1)[1:] > TOLERANCE
-        off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > JERK * steepest
+        off = np.max(np.abs(p - positions), axis=1)[1:] > tolerance
+        off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > jerk * steepest
         wrong = np.unique(np.searchsorted(kept, np.flatnonzero(off), side="right") - 1)
         middles = (kept[wrong] + kept[wrong + 1]) // 2
         more = np.setdiff1d(middles, kept)

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 LONGEST: Final = 131_071
 """[bytes] Longest argument of a command in Linux."""
+PRECISIONS: Final = ((1e-7, 0.01), (1e-6, 0.1), (1e-5, 1.0))
+"""[rad or m] Deviation in position of the points that are written, and share of the largest change of acceleration;
+the first by which a message is short enough."""
 ARRIVED: Final = 1e-9
 """[rad or m] Shorter motions of a hand are none."""
 
@@ -109,13 +112,19 @@ class _Sender:
         self, name: str, trajectory: JointTrajectory, tolerances: GoalTolerances | None, stem: str, title: str
     ) -> Goal:
         action, kind = self._action(name)
-        quintic = trajectory.order == QUINTIC and trajectory.orders is None
-        lines = message_lines(thinned(trajectory) if quintic else trajectory)
-        body = ["trajectory:", *(f"  {line}" for line in lines)]
+        end = []
         if tolerances is not None:
-            body += _tolerances("path_tolerance", tolerances.path) + _tolerances("goal_tolerance", tolerances.goal)
-            body.append(f"goal_time_tolerance: {duration_text(tolerances.goal_time)}")
-        return Goal(f"{stem}.yaml", action, kind, "\n".join([f"# {title}; {name}", *body]) + "\n")
+            end += _tolerances("path_tolerance", tolerances.path) + _tolerances("goal_tolerance", tolerances.goal)
+            end.append(f"goal_time_tolerance: {duration_text(tolerances.goal_time)}")
+        quintic = trajectory.order == QUINTIC and trajectory.orders is None
+        text = ""
+        for tolerance, jerk in PRECISIONS if quintic else PRECISIONS[:1]:
+            chosen = thinned(trajectory, tolerance=tolerance, jerk=jerk) if quintic else trajectory
+            lines = [f"# {title}; {name}", "trajectory:", *(f"  {line}" for line in message_lines(chosen)), *end]
+            text = "\n".join(lines) + "\n"
+            if len(text.encode()) <= LONGEST:
+                break
+        return Goal(f"{stem}.yaml", action, kind, text)
 
     def _grip(self, name: str, grip: Grip, q: Array, stem: str, title: str) -> Goal:
         action, kind = self._action(name)
