@@ -133,4 +133,5 @@ def duration_text(seconds: float) -> str:
 
 
 def _list(values: Array) -> str:
-    return f"[{', '.join(number_text(float(value)) for value in values)}]"
+    """In brackets; never '-0.0'."""
+    return f"[{', '.join(number_text(float(value) + 0.0) for value in values)}]"

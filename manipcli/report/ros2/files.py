@@ -57,7 +57,7 @@ def task_files(task: Task, plan: Plan, matrix: SelfCollisionMatrix) -> tuple[dic
         SCRIPT: _script(title, controllers, parts),
     }
     files |= {goal.file: goal.text for phase in parts for goal in phase.goals}
-    notes = [*left, *(note for own in controllers for note in own.notes), *_of_plan(parts)]
+    notes = [*left, *(note for own in controllers for note in own.notes), *_of_plan(task, parts)]
     return {README: _readme(title, robot, urdf, files, notes), **files}, tuple(notes)
 
 
@@ -65,8 +65,8 @@ def _is_hand(task: Task, own: Exported) -> bool:
     return task.controllers.controllers[own.name].role == "hand"
 
 
-def _of_plan(parts: Sequence[Phase]) -> list[str]:
-    waits = [phase.title for phase in parts if phase.waits]
+def _of_plan(task: Task, parts: Sequence[Phase]) -> list[str]:
+    waits = [str(step.id) for step in task.spec.steps if step.until is not None]
     notes = [f"{listed(waits, most=3)}: a goal has no `until`; the script does not wait for it"] if waits else []
     long = [goal.file for phase in parts for goal in phase.goals if len(goal.text.encode()) > LONGEST]
     if long:

@@ -52,7 +52,6 @@ class Phase:
         goals: of one motion.
         activate, deactivate: names of controllers.
         pause: [s].
-        waits: the step waits here for a condition, which no goal has.
     """
 
     title: str
@@ -60,7 +59,6 @@ class Phase:
     activate: tuple[str, ...] = ()
     deactivate: tuple[str, ...] = ()
     pause: float = 0.0
-    waits: bool = False
 
 
 def phases(plan: Plan, spec: ControllersSpec, exported: Sequence[Exported], robot: RobotModel) -> tuple[Phase, ...]:
@@ -83,7 +81,7 @@ def phases(plan: Plan, spec: ControllersSpec, exported: Sequence[Exported], robo
             stem = f"goals/{k:02d}.{j:02d}_{_word(step.id)}_{_word(motion.label)}"
             goals = tuple(sender.goals(motion, before, claims, stem, title))
             pause = 0.0 if goals else motion.duration
-            found.append(Phase(title, goals, pause=pause, waits=motion.awaits))
+            found.append(Phase(title, goals, pause=pause))
     return tuple(found)
 
 
