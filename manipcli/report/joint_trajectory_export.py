@@ -67,25 +67,27 @@ def step_trajectory(spans: Sequence[Span], columns: dict[str, int]) -> JointTraj
 
 
 def thinned(trajectory: JointTrajectory, *, tolerance: float = TOLERANCE, jerk: float = JERK) -> JointTrajectory:
-    """Fewer points of a trajectory with accelerations, whose quintic splines differ from it by at most `tolerance`.
+    """Fewer points of a trajectory, whose curves of the same order differ from it by at most `tolerance`.
 
-    Intervals are halved as long as they differ, or the changes of acceleration by a share `jerk` of the largest.
+    Intervals are halved as long as they differ, or the changes of acceleration by a share `jerk` of the largest. A
+    trajectory whose points give different values is returned as it is.
     """
-    times, positions, velocities, accelerations = (
-        trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations
-    )  # fmt: skip
-    assert velocities is not None and accelerations is not None
-    last = len(times) - 1
-    kept = np.array([0, last])
-    steps = np.diff(accelerations, axis=0)
-    steepest = max(float(np.max(np.abs(steps))), 1e-9)
+    if trajectory.orders is not None:
+        return trajectory
+    times, positions = trajectory.times, trajectory.positions
+    velocities, accelerations = trajectory.velocities, trajectory.accelerations
+    kept = np.array([0, len(times) - 1])
+    steps = None if accelerations is None else np.diff(accelerations, axis=0)
+    steepest = 0.0 if steps is None else max(float(np.max(np.abs(steps))), 1e-9)
     while True:
         shorter = JointTrajectory.of_arrays(
-            trajectory.names, times[kept], positions[kept], velocities[kept], accelerations[kept]
-        )
+            trajectory.names, times[kept], positions[kept], None if velocities is None else velocities[kept],
+            None if accelerations is None else accelerations[kept],
+        )  # fmt: skip
         p, _, a = shorter.sample(times)
         off = np.max(np.abs(p - positions), axis=1)[1:] > tolerance
-        off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > jerk * steepest
+        if steps is not None:
+            off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > jerk * steepest
         wrong = np.unique(np.searchsorted(kept, np.flatnonzero(off), side="right") - 1)
         middles = (kept[wrong] + kept[wrong + 1]) // 2
         more = np.setdiff1d(middles, kept)

@@ -14,7 +14,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claim, Claims
 from manipcli.plan.hand import closing_speed, ramp
 from manipcli.plan.motion import GoalTolerances, Grip, JointTolerance, Motion, PlanningState
-from manipcli.plan.trajectory import QUINTIC, JointTrajectory
+from manipcli.plan.trajectory import JointTrajectory
 from manipcli.report.joint_trajectory_export import duration_text, message_lines, thinned
 from manipcli.report.ros2.controllers import GRIP, Exported
 from manipcli.spec.controllers_file import ControllersSpec
@@ -114,11 +114,10 @@ class _Sender:
         if tolerances is not None:
             end += _tolerances("path_tolerance", tolerances.path) + _tolerances("goal_tolerance", tolerances.goal)
             end.append(f"goal_time_tolerance: {duration_text(tolerances.goal_time)}")
-        quintic = trajectory.order == QUINTIC and trajectory.orders is None
         text = ""
-        for tolerance, jerk in PRECISIONS if quintic else PRECISIONS[:1]:
-            chosen = thinned(trajectory, tolerance=tolerance, jerk=jerk) if quintic else trajectory
-            lines = [f"# {title}; {name}", "trajectory:", *(f"  {line}" for line in message_lines(chosen)), *end]
+        for tolerance, jerk in PRECISIONS:
+            points = message_lines(thinned(trajectory, tolerance=tolerance, jerk=jerk))
+            lines = [f"# {title}; {name}", "trajectory:", *(f"  {line}" for line in points), *end]
             text = "\n".join(lines) + "\n"
             if len(text.encode()) <= LONGEST:
                 break
