@@ -46,7 +46,7 @@ def render_text(
 
 MOST_ALIKE = 3
 """More findings with one cause than this are shown as one."""
-_PATH = re.compile(r"'(?:\w+://)?/?[^' ]*/[^' ]*'")
+_PATH = re.compile(r"'(?:\w+://)?/?[^' ]*/[^' ]*'|(?<= )/[^ ]*")
 
 
 def alike(findings: Sequence[Diagnostic]) -> list[list[Diagnostic]]:

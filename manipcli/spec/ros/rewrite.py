@@ -109,12 +109,10 @@ class _Rewriting:
 
     def other_node(self, block: Found) -> None:
         """Reports a node that is not a controller."""
-        if block.name in SIMULATORS:
-            message = f"'{block.name}' is a simulator's plugin: left out"
-            self.report("CTRL214", block.key_place, message, severity="note")
-        else:
-            message = f"'{block.name}' is not a controller: left out"
-            self.report("CTRL214", block.key_place, message, severity="warning")
+        simulator = block.name in SIMULATORS
+        what = "a simulator's plugin" if simulator else "not a controller"
+        severity: Severity = "note" if simulator else "warning"
+        self.report("CTRL214", block.key_place, f"'{block.name}' is {what}: left out", severity=severity)
 
     def unlike_ros(self, entries: Mapping[str, Entry]) -> None:
         """One note on all defaults that differ from those of ROS, and one on a `goal_time` of 0 in ROS 2."""

@@ -135,6 +135,10 @@ def test_findings_with_one_cause_are_one_line(tmp_path: Path) -> None:
     (line,) = [line for line in shown.splitlines() if "URDF033" in line]
     assert line.endswith("'/none/robot/0/m.stl' is not found (x 29, all below /none/robot)")
     assert "58 warnings" in shown
+    relative = meshes.replace("/none/robot/", "parts/")  # the message then names the place that was searched, too
+    examination = examined(tmp_path, f'<robot name="r"><link name="base">{relative}</link></robot>')
+    shown = render_text("r.urdf", examination.findings, None, passed=True)
+    assert [line.endswith("(x 29, all below parts)") for line in shown.splitlines() if "URDF033" in line] == [True]
     assert sum(map(len, alike(examination.findings))) == len(examination.findings)
     assert len(alike(examination.findings[:2])) == 2
 
