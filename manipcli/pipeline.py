@@ -90,9 +90,15 @@ def ros2_files(path: Path, **options: Unpack[FileOptions]) -> tuple[dict[str, st
         InvalidInput: all errors of the files.
         NotPlannable: a step of the task has no plan.
     """
-    if kind_of(path) == "task":
+    kind = kind_of(path)
+    if kind == "task":
         task = load_task(path, **options)
         return task_files(task, plan_task(task), self_collision_matrix(task.robot))
+    if kind == "controllers":
+        hint = "give the task that uses it"
+        raise InvalidInput(
+            [Diagnostic("USE091", f"'{path}' is a controllers file; expected a robot or a task", None, hint)]
+        )
     if options.get("overrides") or options.get("seed") is not None:
         raise InvalidInput([Diagnostic("USE091", f"--set and --seed need a task; '{path}' is not one")])
     sight = load_sight(
