@@ -38,7 +38,8 @@ from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
 from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
-from manipcli.task.controller_rows import controllers_of
+from manipcli.spec.simulation import SimulationSpec
+from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
@@ -83,8 +84,15 @@ def self_collisions(
     return robot, self_collision_matrix(robot)
 
 
-def ros2_files(path: Path, **options: Unpack[FileOptions]) -> tuple[dict[str, str], tuple[str, ...]]:
+def ros2_files(
+    path: Path, *, controllers: Path | None = None, **options: Unpack[FileOptions]
+) -> tuple[dict[str, str], tuple[str, ...]]:
     """A robot file, a description or a planned task as files for ROS 2: texts by path, and notes on what differs.
+
+    Args:
+        path: the file.
+        controllers: controllers file of a robot; a task names its own.
+        options: how the files are read.
 
     Raises:
         InvalidInput: all errors of the files.
@@ -92,19 +100,21 @@ def ros2_files(path: Path, **options: Unpack[FileOptions]) -> tuple[dict[str, st
     """
     kind = kind_of(path)
     if kind == "task":
+        if controllers is not None:
+            raise InvalidInput([Diagnostic("USE091", f"task '{path}' names its controllers: remove --controllers")])
         task = load_task(path, **options)
         return task_files(task, plan_task(task), self_collision_matrix(task.robot))
     if kind == "controllers":
-        hint = "give the task that uses it"
-        raise InvalidInput(
-            [Diagnostic("USE091", f"'{path}' is a controllers file; expected a robot or a task", None, hint)]
-        )
+        message = f"'{path}' is a controllers file; expected a robot or a task"
+        raise InvalidInput([Diagnostic("USE091", message, hint="give the task that uses it")])
     if options.get("overrides") or options.get("seed") is not None:
         raise InvalidInput([Diagnostic("USE091", f"--set and --seed need a task; '{path}' is not one")])
     sight = load_sight(
         path, package_path=options.get("package_path", ()), allow_outside=options.get("allow_outside", False)
     )
-    return robot_files(sight.robot, sight.q, self_collision_matrix(sight.robot))
+    period = SimulationSpec().control_period
+    spec = None if controllers is None else checked_controllers(controllers, sight.robot, period)
+    return robot_files(sight.robot, sight.q, self_collision_matrix(sight.robot), spec, period=period)
 
 
 def run_task(

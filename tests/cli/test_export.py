@@ -282,6 +282,20 @@ def test_controllers_that_ros_lacks_get_trajectories_and_are_named(tmp_path: Pat
     assert "sleep 0.500" in script
 
 
+def test_a_robot_is_exported_with_its_controllers(tmp_path: Path, call_cli: RunCli) -> None:
+    robot, own = ROOT / "robots/panda/robot.yaml", ROOT / "controllers/panda.yaml"
+    ran = call_cli("export", robot, "--controllers", own, "--ros2", "out", cwd=tmp_path)
+    assert ran.code == 0, ran.err
+    assert {*yaml.safe_load((tmp_path / "out/controllers.yaml").read_text())} == {
+        "controller_manager", "arm_controller", "hand_controller"
+    }  # fmt: skip
+    other = ROOT / "controllers/iiwa7.yaml"
+    wrong = call_cli("export", robot, "--controllers", other, "--ros2", "other", cwd=tmp_path)
+    assert wrong.code == 4
+    assert "lbr_iiwa_joint_1" in wrong.err
+    assert not (tmp_path / "other").exists()
+
+
 def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path, call_cli: RunCli) -> None:
     robot, out = ROOT / "robots/differential_wrist/robot.yaml", tmp_path / "out"
     out.mkdir()

@@ -21,6 +21,9 @@ def export(
     ros2: Annotated[
         Path, typer.Option("--ros2", metavar="DIR", help="Folder of the files for ROS 2.", show_default=False)
     ],
+    controllers: Annotated[
+        Path | None, typer.Option("--controllers", metavar="FILE", help="Controllers file, for a robot without a task.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not empty.")] = False,
     seed: Seed = None,
     overrides: Overrides = None,
@@ -29,7 +32,7 @@ def export(
 ) -> ExitCode:
     """Write a robot or a planned task for ROS 2.
 
-    URDF with a ros2_control block, SRDF and, for a task, controllers.yaml and each goal of the plan as YAML, with a
+    URDF with a ros2_control block, SRDF, controllers.yaml and, for a task, each goal of the plan as YAML, with a
     script that sends them in order.
     """
     _check_folder(ros2, force=force)
@@ -38,6 +41,7 @@ def export(
 
     files, notes = pipeline.ros2_files(
         file,
+        controllers=controllers,
         overrides=tuple(overrides or ()),
         seed=seed,
         package_path=tuple(package_path or ()),

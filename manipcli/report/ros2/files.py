@@ -14,6 +14,7 @@ from manipcli.report.ros2.controllers import Exported, exported, parameters_file
 from manipcli.report.ros2.description import PLUGIN, packages, ros2_urdf
 from manipcli.report.ros2.goals import LONGEST, Phase, phases
 from manipcli.report.ros2.srdf import srdf
+from manipcli.spec.controllers_file import ControllersSpec
 
 if TYPE_CHECKING:
     from manipcli.task.plan_task import Plan
@@ -33,36 +34,58 @@ send() {{  # ACTION TYPE FILE
 """
 
 
-def robot_files(robot: RobotModel, q: Array, matrix: SelfCollisionMatrix) -> tuple[dict[str, str], tuple[str, ...]]:
-    """The files of a robot without controllers, and notes."""
-    urdf = ros2_urdf(robot, q, None)
-    files = {"robot.urdf": urdf, "robot.srdf": srdf(robot, matrix)}
-    notes = ("a robot file names no controllers: controllers.yaml and goals need a task",)
-    return {README: _readme(f"Robot '{robot.name}'", robot, urdf, files, notes), **files}, notes
+Files = tuple[dict[str, str], tuple[str, ...]]
+"""Texts by path, and notes on what differs in ROS."""
 
 
-def task_files(task: Task, plan: Plan, matrix: SelfCollisionMatrix) -> tuple[dict[str, str], tuple[str, ...]]:
-    """The files of a task and its plan, and notes."""
+def robot_files(
+    robot: RobotModel, q: Array, matrix: SelfCollisionMatrix, spec: ControllersSpec | None, *, period: float
+) -> Files:
+    """The files of a robot.
+
+    Args:
+        robot: the robot.
+        q: (n) configuration at the start [rad or m].
+        matrix: of its pairs of links.
+        spec: its controllers, if they are known.
+        period: [s] of the controller manager.
+    """
+    files, _, notes = _of_robot(robot, q, matrix, spec, period)
+    if spec is None:
+        notes = (
+            "a robot file names no controllers: name them with --controllers, or give a task, which has goals, too",
+        )
+    return _with_readme(f"Robot '{robot.name}'", robot, files, notes)
+
+
+def task_files(task: Task, plan: Plan, matrix: SelfCollisionMatrix) -> Files:
+    """The files of a task and its plan."""
     robot, spec = task.robot, task.controllers
-    controllers, left = exported(spec, robot)
     period = task.spec.simulation.control_period
+    files, controllers, notes = _of_robot(robot, plan.start.position, matrix, spec, period)
     parts = phases(plan, spec, controllers, robot)
-    hand = [name for own in controllers if own.action is not None and _is_hand(task, own) for name in own.joints]
-    urdf = ros2_urdf(robot, plan.start.position, spec)
     title = f"Task '{task.name}' of robot '{robot.name}'"
-    files = {
-        "controllers.yaml": parameters_file(controllers, period=period, notes=left),
-        "robot.urdf": urdf,
-        "robot.srdf": srdf(robot, matrix, hand=hand),
-        SCRIPT: _script(title, controllers, parts),
-    }
+    files[SCRIPT] = _script(title, controllers, parts)
     files |= {goal.file: goal.text for phase in parts for goal in phase.goals}
-    notes = [*left, *(note for own in controllers for note in own.notes), *_of_plan(task, parts)]
-    return {README: _readme(title, robot, urdf, files, notes), **files}, tuple(notes)
+    return _with_readme(title, robot, files, (*notes, *_of_plan(task, parts)))
 
 
-def _is_hand(task: Task, own: Exported) -> bool:
-    return task.controllers.controllers[own.name].role == "hand"
+def _of_robot(
+    robot: RobotModel, q: Array, matrix: SelfCollisionMatrix, spec: ControllersSpec | None, period: float
+) -> tuple[dict[str, str], tuple[Exported, ...], tuple[str, ...]]:
+    """The files of robot and controllers; the controllers; notes on these."""
+    own = {} if spec is None else spec.controllers
+    hand = [name for each in own.values() if each.role == "hand" for name in each.joints]
+    files = {"robot.urdf": ros2_urdf(robot, q, spec), "robot.srdf": srdf(robot, matrix, hand=hand)}
+    if spec is None:
+        return files, (), ()
+    controllers, left = exported(spec, robot)
+    files = {"controllers.yaml": parameters_file(controllers, period=period, notes=left), **files}
+    return files, controllers, (*left, *(note for each in controllers for note in each.notes))
+
+
+def _with_readme(title: str, robot: RobotModel, files: dict[str, str], notes: tuple[str, ...]) -> Files:
+    return {README: _readme(title, robot, files, notes), **files}, notes
 
 
 def _of_plan(task: Task, parts: Sequence[Phase]) -> list[str]:
@@ -96,7 +119,7 @@ def _script(title: str, controllers: Sequence[Exported], parts: Sequence[Phase])
     return "\n".join(lines) + "\n"
 
 
-def _readme(title: str, robot: RobotModel, urdf: str, files: dict[str, str], notes: Sequence[str]) -> str:
+def _readme(title: str, robot: RobotModel, files: dict[str, str], notes: Sequence[str]) -> str:
     what = {
         "controllers.yaml": "parameters of the controller manager and its controllers",
         "robot.urdf": f"expanded description with a `<ros2_control>` block; its plugin is `{PLUGIN}`: write that of "
@@ -111,7 +134,7 @@ def _readme(title: str, robot: RobotModel, urdf: str, files: dict[str, str], not
     if SCRIPT in files:
         lines += ["", f'Each goal by itself, as in `{SCRIPT}`: `ros2 action send_goal ACTION TYPE "$(cat FILE)"`.']
         lines.append("The plan holds only from its start configuration, with its bodies in place.")
-    used = packages(urdf)
+    used = packages(files["robot.urdf"])
     lines += ["", f"Packages with meshes: {listed(used)}."] if used else []
     X = robot.X_WB
     if X.p.any() or X.rpy.any():
