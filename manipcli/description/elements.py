@@ -36,7 +36,10 @@ class UnusableInertial:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link; `place`: its position in the description file. `unusable`: an inertial that was refused."""
+    """A link; `place`: its position in the description file.
+
+    `unusable`: an inertial that was refused. `missing`: the errors about collision meshes that cannot be used.
+    """
 
     name: str
     inertial: Inertial | None
@@ -44,6 +47,7 @@ class Link:
     collisions: tuple[Geometry, ...]
     place: Place | None = field(default=None, compare=False)
     unusable: UnusableInertial | None = field(default=None, compare=False)
+    missing: tuple[Diagnostic, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,7 +99,7 @@ def _points(shape: Primitive) -> Array:
     middles = (np.arange(SAMPLES) + 0.5) / SAMPLES
     u, v, w = (axis.ravel() for axis in np.meshgrid(middles, middles, middles, indexing="ij"))
     if isinstance(shape, Box):
-        return np.stack([u - 0.5, v - 0.5, w - 0.5], axis=1) * np.array(shape.size)
+        return np.asarray(np.stack([u - 0.5, v - 0.5, w - 0.5], axis=1) * np.array(shape.size))
     angle = 2.0 * np.pi * v
     if isinstance(shape, Cylinder):
         across, height = shape.radius * np.sqrt(u), shape.length * (w - 0.5)

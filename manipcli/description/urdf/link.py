@@ -23,6 +23,8 @@ ROUNDING = 1e-6
 """Relative error of a principal moment that is only rounding: such an inertia is made regular, not refused."""
 IMPOSSIBLE: Final = "URDF011"
 REGULARISED: Final = "URDF038"
+UNUSABLE_MESH: Final = ("URDF013", "URDF200", "URDF210")
+"""Codes of errors about a collision mesh: missing, unusable, flat."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")
 _ELSEWHERE = frozenset({"capsule", "plane", "cone", "ellipsoid", "polyline", "heightmap", "sdf"})
 """Shapes of other formats and of URDF extensions."""
@@ -36,13 +38,18 @@ def read_link(reader: Reader, element: Element, name: str, packages: Packages, m
     """The link of a <link> element; invalid parts are omitted, with a finding."""
     inertial = _inertial(reader, element, name)
     unusable = inertial if isinstance(inertial, UnusableInertial) else None
+    visuals = tuple(_geometries(reader, element, "visual", packages, materials))
+    before = len(reader.findings)
+    collisions = tuple(_geometries(reader, element, "collision", packages, materials))
+    missing = tuple(finding for finding in reader.findings[before:] if finding.code in UNUSABLE_MESH)
     return Link(
         name=name,
         inertial=inertial if isinstance(inertial, Inertial) else None,
-        visuals=tuple(_geometries(reader, element, "visual", packages, materials)),
-        collisions=tuple(_geometries(reader, element, "collision", packages, materials)),
+        visuals=visuals,
+        collisions=collisions,
         place=element.place,
         unusable=unusable,
+        missing=missing,
     )
 
 
