@@ -89,7 +89,7 @@ class LinkInertial:
     source: str
 
     def __str__(self) -> str:
-        centre, moments = (", ".join(f"{value:.4g}" for value in values) for values in (self.centre, self.moments))
+        centre, moments = (", ".join(f"{round(value, 9):.4g}" for value in values) for values in (self.centre, self.moments))
         return (
             f"{self.kind}: {digits(self.mass)} kg, centre [{centre}] m, principal moments [{moments}] kg m2, "
             f"from {self.source}"
