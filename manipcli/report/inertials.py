@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
 from manipcli.core.text import digits
 from manipcli.model.robot import LinkInertial
+from manipcli.record.attachments import INERTIALS
 from manipcli.report.table import table
-
-RECORD: Final = "inertials"
-"""The metadata record of a log: how the inertial of each link was made, by its name."""
 
 
 def render_table(rows: Sequence[LinkInertial]) -> str:
@@ -25,8 +22,8 @@ def render_table(rows: Sequence[LinkInertial]) -> str:
 
 def recorded_inertials(metadata: Mapping[str, Mapping[str, str]]) -> tuple[tuple[str, str], ...]:
     """Name and value for each link of a log: ("inertial of link_1", "estimated: 4.2 kg, ...")."""
-    return tuple((f"inertial of {link}", how) for link, how in metadata.get(RECORD, {}).items())
+    return tuple((f"inertial of {link}", how) for link, how in metadata.get(INERTIALS, {}).items())
 
 
 def _three(values: Sequence[float]) -> str:
-    return " ".join(f"{round(value, 6):.3g}" for value in values)
+    return " ".join(f"{round(value, 6) + 0.0:.3g}" for value in values)

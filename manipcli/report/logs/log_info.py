@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
+from manipcli.record.attachments import INERTIALS
 from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
-from manipcli.report.inertials import RECORD, recorded_inertials
+from manipcli.report.inertials import recorded_inertials
 from manipcli.report.json import Json, dumps, number, saturated_object, step_object
 from manipcli.report.logs.engine_choice import engine_choices
 from manipcli.report.table import table
@@ -107,7 +108,7 @@ def render_json(info: LogInfo) -> str:
             "run": dict(info.run),
             "versions": dict(info.versions),
             "engine_settings": dict(found.metadata.get("engine", {})),
-            "inertials": dict(found.metadata.get(RECORD, {})),
+            "inertials": dict(found.metadata.get(INERTIALS, {})),
             "verdict": dict(info.verdict) or None,
             "saturated": saturated_object(info.saturations),
             "steps": [step_object(step) for step in info.steps],
