@@ -134,11 +134,11 @@ def _plausible(reader: Reader, inertia: Array, name: str, element: Element) -> A
         )
         reader.report(IMPOSSIBLE, message, element.place, hint="compute it from the shape and the mass of the link")
         return None
-    if principal[0] > 0.0:
+    least = ROUNDING * largest
+    if principal[0] >= least * (1.0 - 1e-9):
         return inertia
     # The least moment of a thin rod is rounded to 0; as little as rounding is added.
     message = f"link '{name}': inertia is singular by rounding (principal moments {shown} kg m2)"
-    least = ROUNDING * largest
     reader.report(
         REGULARISED, f"{message}; {least:.2g} kg m2 is used for the least one", element.place, severity="note"
     )
