@@ -171,6 +171,11 @@ class Packages:
                 self._below = packages_below(folder) | self._below
         return self._below.get(name)
 
+    def found_by_name(self, uri: str) -> bool:
+        """Whether a `file://` URI is in a package that was found by its name, as `file://$(find NAME)/...` gives it."""
+        path = Path("/" + unquote(uri.removeprefix("file://").removeprefix("localhost")).lstrip("/"))
+        return any(path.is_relative_to(root) for root in self._found.values())
+
     def below(self, description: Path) -> Packages:
         """For the URIs in a file that was found here: the same search path and rules, relative to that file."""
         return Packages(
