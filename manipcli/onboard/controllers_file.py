@@ -1,0 +1,122 @@
+"""Controllers for a guessed arm and hand, with tuned gains where these are stable, else position control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from manipcli.core.errors import InvalidInput
+from manipcli.onboard.writer import Entry, written
+from manipcli.spec.source.tree import Plain
+from manipcli.tuning.propose_gains import Tuning, Wish, tune
+
+PERIOD: Final = 0.001
+"""[s] Control period of a task by default."""
+BANDWIDTHS: Final = (5.0, 3.0, 2.0)
+"""[Hz] tried in turn."""
+TRAJECTORY: Final = 0.2
+GOAL: Final = 0.03
+"""[rad or m] Tolerances."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenControllers:
+    """A controllers file: its text, entries and notes."""
+
+    text: str
+    entries: dict[str, Entry]
+    notes: tuple[str, ...]
+
+
+def guess_controllers(
+    robot_path: Path, folder: Path, arm: tuple[str, ...], hand: tuple[str, ...], *, package_path: tuple[Path, ...], allow_outside: bool
+) -> WrittenControllers:
+    """The file for the joints of an arm and of a hand.
+
+    Args:
+        robot_path: the robot file.
+        folder: where a file may be written for the tuning.
+        arm, hand: their joints; () for neither.
+        package_path, allow_outside: see `read_robot`.
+    """
+    path = folder / "untuned.yaml"
+    path.write_text(written(_entries(arm, hand, None)))
+    failed = ""
+    for bandwidth in BANDWIDTHS:
+        wish = Wish(bandwidth, 1.0, PERIOD)
+        try:
+            tuning = tune(robot_path, path, wish, package_path=package_path, allow_outside=allow_outside)
+        except InvalidInput as refusal:
+            failed = failed or refusal.findings[0].message
+            continue
+        entries = _entries(arm, hand, tuning)
+        return WrittenControllers(written(entries, head=_HEAD), entries, tuning.notes)
+    entries = _entries(arm, hand, None, position=failed)
+    note = f"the joints are commanded by position: no gains for efforts were found ({failed})"
+    return WrittenControllers(written(entries, head=_HEAD), entries, (note,))
+
+
+_HEAD: Final = (
+    "yaml-language-server: $schema=schemas/controllers.json",
+    "Written by `manipcli init --robot`; `manipcli tune robot.yaml controllers.yaml` proposes other gains.",
+)
+
+
+def _entries(
+    arm: tuple[str, ...], hand: tuple[str, ...], tuning: Tuning | None, *, position: str | None = None
+) -> dict[str, Entry]:
+    found: dict[str, Entry] = {}
+    if arm:
+        found["arm_controller"] = Entry(_trajectory(arm, tuning, position), "")
+    if hand:
+        found["hand_controller"] = Entry(_gripper(hand, tuning, position), "")
+    return {"controllers": Entry(found)}
+
+
+def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | None) -> dict[str, Entry]:
+    tolerances: dict[str, Entry] = {name: Entry({"trajectory": TRAJECTORY, "goal": GOAL}) for name in joints}
+    constraints = {
+        "goal_time": Entry("2 s"),
+        "stopped_velocity_tolerance": Entry(0.05),
+        "joints": Entry(tolerances),
+    }
+    control = {"command_interface": Entry("position", f"no gains for efforts were found: {position}", True)}
+    if position is None:
+        control = {
+            "command_interface": Entry("effort", "PID on efforts, and the model's inverse dynamics as feed-forward"),
+            "inverse_dynamics": Entry(True),
+            **_gains(joints, tuning),
+        }
+    return {
+        "type": Entry("joint_trajectory"),
+        "joints": Entry(list(joints)),
+        **control,
+        "constraints": Entry(constraints, "tolerances of a goal: far above the error of these gains"),
+    }
+
+
+def _gripper(joints: tuple[str, ...], tuning: Tuning | None, position: str | None) -> dict[str, Entry]:
+    control = {"command_interface": Entry("position")} if position is not None else _gains(joints, tuning)
+    return {"type": Entry("gripper"), "joints": Entry(list(joints)), **control}
+
+
+def _gains(joints: tuple[str, ...], tuning: Tuning | None) -> dict[str, Entry]:
+    if tuning is None:
+        gains: dict[str, Plain] = {name: {"p": 1.0, "d": 0.1} for name in joints}
+        return {"gains": Entry(gains)}
+    by_joint = {tuned.joint: tuned for tuned in tuning.joints}
+    rows: dict[str, Entry] = {}
+    for name in joints:
+        tuned = by_joint[name]
+        row: dict[str, Plain] = {"p": tuned.p, "d": tuned.d}
+        if tuned.i:
+            row |= {"i": tuned.i, "i_clamp": tuned.i_clamp}
+        rows[name] = Entry(row)
+    limited = {tuned.limited_by for tuned in (by_joint[name] for name in joints)} - {""}
+    why = f"by `tune`: {tuning.wish.bandwidth:g} Hz, damping {tuning.wish.damping:g}, at the largest inertia of each joint"
+    if limited:
+        why += f"; some are limited by: {', '.join(sorted(limited))}"
+    return {"gains": Entry(rows, why)}
+
+

@@ -1,0 +1,158 @@
+"""A start configuration: free of collision, well inside the limits, where the tool can move in every direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.core.text import digits
+from manipcli.core.units import readable
+from manipcli.model.collision import CollisionChecker
+from manipcli.model.configuration import with_mimics
+from manipcli.model.kinematics import Kinematics
+from manipcli.scene.scene import Scene
+
+SAMPLES: Final = 1500
+CENTRAL: Final = 0.8
+"""Share of the range of each joint, around its middle, in which a start may be."""
+HALF_TURN: Final = np.pi
+"""[rad] Range to each side of a joint without limits; of a limited one at most so much counts."""
+CLEARANCE: Final = 0.02
+"""[m] between parts at the start."""
+TIDY: Final = 0.85
+"""A rounder configuration is used if its score is at least this share of the best."""
+HIGH: Final = 0.15
+"""[m] The tool is at least so high above the floor."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Home:
+    """A start configuration: `q` (n), and why."""
+
+    q: Array
+    evidence: str
+
+
+class HomeSearch:
+    """Scores of configurations of an arm."""
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        scene: Scene,
+        joints: tuple[str, ...],
+        link: str,
+        X_LT: Transform,
+        *,
+        q: Array,
+        ignore: tuple[tuple[str, str], ...] = (),
+        down: bool,
+    ) -> None:
+        """
+        Args:
+            kinematics: of the robot.
+            scene: its floor is an obstacle.
+            joints: of the arm.
+            link, X_LT: the tool frame.
+            q: (n) all joints; those of the arm are replaced.
+            ignore: pairs of links that may touch.
+            down: prefer that the tool's z axis points down, as to pick from a table.
+        """
+        robot = kinematics.robot
+        self._kinematics, self._link, self._X_LT, self._q, self._down = kinematics, link, X_LT, q, down
+        self._robot, self._columns = robot, robot.indices(joints)
+        ranges = np.array([robot.joint(name).limits.within_soft for name in joints])
+        self.lower = np.where(np.isfinite(ranges[:, 0]), ranges[:, 0], -HALF_TURN)
+        self.upper = np.where(np.isfinite(ranges[:, 1]), ranges[:, 1], HALF_TURN)
+        self._limited = np.isfinite(ranges).all(axis=1)
+        middle = np.where(self._limited, (self.lower + self.upper) / 2.0, 0.0)
+        self.middle = np.where((self.lower < -0.1) & (self.upper > 0.1), np.clip(0.0, self.lower, self.upper), middle)
+        checker = CollisionChecker(kinematics, scene, ignore=ignore)
+        self.query = checker.at(margin=CLEARANCE)
+        self.nearer = checker.at(margin=CLEARANCE / 4)
+
+    def whole(self, arm: Array) -> Array:
+        """(n) all joints with those of the arm at `arm` (m)."""
+        q = np.array(self._q)
+        q[self._columns] = arm
+        return with_mimics(self._robot, q)
+
+    def score(self, arm: Array) -> float:
+        """Manipulability, times the least margin to a limit, times the direction of the tool; 0 on the floor."""
+        q = self.whole(arm)
+        R, p, J = self._kinematics.pose_and_jacobian(q, self._link, self._X_LT)
+        if p[2] < HIGH:
+            return 0.0
+        reduced = J[:, self._columns]
+        if len(self._columns) < 6:
+            reduced = reduced[:3] if len(self._columns) >= 3 else reduced[: len(self._columns)]
+        singular = np.linalg.svd(reduced, compute_uv=False)
+        bend = float(singular[-1] / max(singular[0], 1e-9))
+        half = (self.upper - self.lower) / 2.0
+        inside = np.where(self._limited, 1.0 - np.abs(arm - (self.lower + self.upper) / 2.0) / half, 1.0)
+        room = float(np.clip(inside.min() / 0.3, 0.0, 1.0))
+        pointing = 0.2 + 0.8 * max(0.0, -float(R[2, 2])) ** 2 if self._down else 1.0
+        near = 1.0 / (1.0 + 0.15 * float(np.square(arm - self.middle).sum()))
+        return bend * room * pointing * near
+
+    def free(self, arm: Array) -> bool:
+        """Whether the robot is clear of itself and the floor."""
+        return not self.query.touches(self.whole(arm))
+
+
+def guess_home(search: HomeSearch, *, seed: int = 0) -> Home | None:
+    """The best of many random configurations, made round; None if none is free."""
+    rng = np.random.default_rng(seed)
+    centre, half = (search.lower + search.upper) / 2.0, CENTRAL * (search.upper - search.lower) / 2.0
+    drawn = [search.middle, *rng.uniform(centre - half, centre + half, (SAMPLES, len(half)))]
+    scores = np.array([search.score(arm) for arm in drawn])
+    order = np.argsort(-scores, kind="stable")
+    free: Callable[[Array], bool] = search.free
+    best = next((drawn[int(k)] for k in order[:300] if scores[k] > 0.0 and free(drawn[int(k)])), None)
+    if best is None:
+        free = lambda arm: not search.nearer.touches(search.whole(arm))  # noqa: E731
+        best = next((drawn[int(k)] for k in order if free(drawn[int(k)])), None)
+    if best is None:
+        return None
+    best = _tidied(search, free, np.array(best))
+    return Home(search.whole(best), _evidence(search, best, scores))
+
+
+def _tidied(search: HomeSearch, free: Callable[[Array], bool], arm: Array) -> Array:
+    """Nearly as good, with round values and joints in the middle of their range where possible."""
+    least = search.score(arm)
+    for k in range(len(arm)):
+        for value in _rounder(search, arm, k):
+            other = np.array(arm)
+            other[k] = value
+            score = search.score(other)
+            if search.lower[k] <= value <= search.upper[k] and score >= TIDY * least and free(other):
+                arm, least = other, max(score, TIDY * least)
+                break
+    return arm
+
+
+def _rounder(search: HomeSearch, arm: Array, k: int) -> Iterator[float]:
+    """Values of a joint to try: the middle, then multiples of 15 and of 5 degrees, or of 5 and 1 cm."""
+    yield float(search.middle[k])
+    turning = search.upper[k] - search.lower[k] > 1.0
+    for unit in (np.radians(15.0), np.radians(5.0)) if turning else (0.05, 0.01):
+        yield float(np.round(arm[k] / unit) * unit)
+
+
+def _evidence(search: HomeSearch, arm: Array, scores: Array) -> str:
+    q = search.whole(arm)
+    J = search._kinematics.jacobian(q, search._link, search._X_LT)[:, search._columns]
+    least = float(np.linalg.svd(J if len(search._columns) >= 6 else J[:3], compute_uv=False)[-1])
+    half = (search.upper - search.lower) / 2.0
+    inside = np.where(search._limited, half - np.abs(arm - (search.lower + search.upper) / 2.0), np.inf)
+    room = f"{digits(float(inside.min()))} from the nearest limit, " if np.isfinite(inside.min()) else ""
+    clear = CLEARANCE if not search.query.touches(q) else CLEARANCE / 4
+    return (
+        f"best of {len(scores)} configurations (seed 0): {room}all parts {readable(clear, 'm')} apart, "
+        f"smallest singular value of the tool's Jacobian {digits(least)}"
+    )

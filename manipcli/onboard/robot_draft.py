@@ -1,0 +1,285 @@
+"""The entries of a robot file for a description: groups, poses, tool, limits, mount; each with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.core.text import digits, listed
+from manipcli.core.units import readable
+from manipcli.model.collision import CollisionChecker
+from manipcli.model.configuration import with_mimics, zero_configuration
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel, Tool
+from manipcli.onboard.closure import Closure, HandShape, guess_closure
+from manipcli.onboard.home import Home, HomeSearch, guess_home
+from manipcli.onboard.limits import ProposedLimits, propose_limits
+from manipcli.onboard.parts import Hand, RobotParts, guess_parts
+from manipcli.onboard.shape_points import ShapePoints
+from manipcli.onboard.tool_frame import ToolFrame, guess_tool_frame
+from manipcli.onboard.writer import Entry
+from manipcli.scene.scene import Scene
+from manipcli.spec.source.tree import Plain
+
+BLOCK: Final = 0.04
+"""[m] Edge of the block that a hand is asked to pick."""
+HAND_HEIGHT: Final = 0.1
+"""[m] A hand alone is held so high above the floor."""
+OVERLAP: Final = 1e-3
+"""[m] Fingers that close stop before they overlap by more."""
+STEPS: Final = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotDraft:
+    """What was found out.
+
+    Attributes:
+        robot: with its mount, tool and limits, without groups and poses.
+        parts: its arm and hand.
+        entries: of the robot file, behind `robot`, `description` and `args`.
+        home: (n) the start.
+        search: scores of configurations of the arm; None without an arm.
+        hand, frame: what was measured on the hand; None without one.
+        notes: for the user.
+    """
+
+    robot: RobotModel
+    parts: RobotParts
+    entries: Mapping[str, Entry]
+    home: Array
+    search: HomeSearch | None
+    closure: Closure | None
+    frame: ToolFrame | None
+    notes: tuple[str, ...]
+
+
+def draft_robot(bare: RobotModel, scene: Scene) -> RobotDraft:
+    """Everything about a robot that its description leaves open.
+
+    Args:
+        bare: the robot of a description, with its root at the world's origin.
+        scene: the floor.
+    """
+    kinematics = Kinematics(bare)
+    points = ShapePoints(kinematics)
+    parts = guess_parts(bare, points, kinematics)
+    notes: list[str] = []
+    arm = parts.arm.joints if parts.arm else ()
+    fingers = parts.hand.joints if parts.hand else ()
+    zero = zero_configuration(bare)
+    closure, frame, shape = _hand(bare, parts.hand, kinematics, points, zero, notes)
+    limits = propose_limits(kinematics, arm, fingers, _lengths(kinematics, points, (*arm, *fingers), zero))
+    tool, tool_entry = _tool(parts, frame)
+    mount, mount_entry = _mount(kinematics, points, parts, shape, closure, zero)
+    robot = replace(bare, tool=tool, X_WB=mount, joints=_limited(bare, limits))
+    kinematics = Kinematics(robot)
+    opened = np.array(zero) if closure is None or shape is None else np.array(shape.whole(closure.opened))
+    ignore = _within_hand(robot, parts.hand)
+    home, search = Home(opened, ""), None
+    ignored: tuple[tuple[str, str], ...] = ()
+    if parts.arm is not None and tool is not None:
+        search = HomeSearch(
+            kinematics, scene, arm, tool.link, tool.X_LT, q=opened, ignore=ignore, down=parts.hand is not None
+        )
+        found = guess_home(search)
+        if found is None:
+            home, ignored = _least_touching(search, notes)
+        else:
+            home = found
+    entries: dict[str, Entry] = {}
+    if mount_entry is not None:
+        entries["mount"] = mount_entry
+    entries["groups"] = Entry(_groups(parts))
+    if ignored:
+        entries["collision_ignore"] = Entry(
+            [list(pair) for pair in ignored], "they touch in every configuration that was tried", True
+        )
+    poses = _poses(robot, parts, home, closure)
+    if poses:
+        entries["poses"] = Entry(poses)
+    if tool_entry is not None:
+        entries["tool"] = tool_entry
+    if limits:
+        entries["limits"] = Entry(_limit_entries(limits))
+    return RobotDraft(
+        replace(robot, collision_ignore=ignored), parts, entries, home.q, search, closure, frame, tuple(notes)
+    )
+
+
+def _hand(
+    robot: RobotModel, hand: Hand | None, kinematics: Kinematics, points: ShapePoints, zero: Array, notes: list[str]
+) -> tuple[Closure | None, ToolFrame | None, HandShape | None]:
+    if hand is None:
+        return None, None, None
+    shape = HandShape(hand, kinematics, points, zero)
+    links = [link for branch in hand.branches for link in branch]
+    bare = [link for link in points.missing(links)]
+    if len(bare) == len(links):
+        notes.append("the hand has no shapes at all: its poses and the tool are guessed from its frames alone")
+    touching = [link for link in links if robot.link(link).collisions]
+    if not touching:
+        notes.append("the hand has no collision shapes, so that it cannot hold anything")
+    closure = guess_closure(shape)
+    closure = replace(closure, closed=_before_overlap(robot, kinematics, shape, closure))
+    return closure, guess_tool_frame(shape, closure, width=BLOCK), shape
+
+
+def _before_overlap(robot: RobotModel, kinematics: Kinematics, shape: HandShape, closure: Closure) -> Array:
+    """(m) The closed hand, or where it stops because its fingers would overlap."""
+    finger_of = {link: k for k, links in enumerate(closure.fingers) for link in links}
+    query = CollisionChecker(kinematics, Scene((), (), np.array([0.0, 0.0, -9.81]))).at()
+
+    def overlapping(q: Array) -> set[frozenset[str]]:
+        found = set()
+        for hit in query.every(q):
+            a, b = hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")
+            if hit.distance < -OVERLAP and a in finger_of and b in finger_of and finger_of[a] != finger_of[b]:
+                found.add(frozenset((a, b)))
+        return found
+
+    at_first = overlapping(shape.whole(closure.opened))
+    last = closure.opened
+    for share in np.linspace(0.0, 1.0, STEPS + 1):
+        here = (1.0 - share) * closure.opened + share * closure.closed
+        if overlapping(shape.whole(here)) - at_first:
+            return last if share > 0.2 else closure.closed
+        last = here
+    return closure.closed
+
+
+def _within_hand(robot: RobotModel, hand: Hand | None) -> tuple[tuple[str, str], ...]:
+    """Pairs of links of the hand: fingers may meet."""
+    if hand is None:
+        return ()
+    links = {hand.palm, *hand.fixed, *(link for branch in hand.branches for link in branch)}
+    return tuple(combinations(sorted(links), 2))
+
+
+def _lengths(kinematics: Kinematics, points: ShapePoints, joints: Sequence[str], q: Array) -> dict[str, float]:
+    """[m] from the axis of each joint to the farthest point that it moves, where the robot is stretched most."""
+    robot, rng = kinematics.robot, np.random.default_rng(0)
+    ends = [joint.limits.within_soft for joint in robot.moving_joints]
+    lower = np.array([max(low, -np.pi) for low, _ in ends])
+    upper = np.array([min(high, np.pi) for _, high in ends])
+    found = dict.fromkeys(joints, 0.0)
+    for sample in (q, *rng.uniform(lower, upper, (12, len(lower)))):
+        here = np.array(with_mimics(robot, sample))
+        for name in joints:
+            joint = robot.joint(name)
+            X_WJ = kinematics.forward(here, joint.child)
+            links = sorted(robot.descendants(joint.child))
+            frames = np.array([kinematics.forward(here, link).p for link in links])
+            away = np.vstack([frames, points.at(here, links)]) - X_WJ.p
+            axis = X_WJ.R @ joint.axis
+            found[name] = max(found[name], float(np.linalg.norm(away - np.outer(away @ axis, axis), axis=1).max()))
+    return found
+
+
+def _tool(parts: RobotParts, frame: ToolFrame | None) -> tuple[Tool | None, Entry | None]:
+    if frame is not None:
+        pose: dict[str, Plain] = {"xyz": [float(value) for value in frame.X_PT.p]}
+        rpy = [round(float(value), 5) for value in frame.X_PT.rpy]
+        if any(rpy):
+            pose["rpy"] = [*rpy]
+        X = Transform.of(xyz=frame.X_PT.p, rpy=rpy)
+        return Tool(frame.link, X), Entry({"link": frame.link, "pose": pose}, frame.evidence)
+    if parts.arm is not None:
+        why = "the last link of the arm, which has no hand"
+        return Tool(parts.arm.tip, Transform.identity()), Entry({"link": parts.arm.tip}, why)
+    return None, None
+
+
+def _mount(
+    kinematics: Kinematics,
+    points: ShapePoints,
+    parts: RobotParts,
+    shape: HandShape | None,
+    closure: Closure | None,
+    zero: Array,
+) -> tuple[Transform, Entry | None]:
+    """X_WB above the floor: of a hand alone, and of a robot whose lowest point is below its root."""
+    robot = kinematics.robot
+    arm = parts.arm
+    if arm is None and shape is not None and closure is not None:
+        every = [shape.whole(closure.opened), shape.whole((closure.opened + closure.closed) / 2), shape.whole(closure.closed)]
+        low = min(float(points.at(q, [link.name for link in robot.links])[:, 2].min(initial=0.0)) for q in every)
+        up, why = HAND_HEIGHT - low, "the hand alone is held above the floor"
+    else:
+        first = robot.joint(arm.joints[0]).child if arm is not None else ""
+        still = [link.name for link in robot.links if not first or link.name not in robot.descendants(first)]
+        low = float(points.at(zero, still)[:, 2].min(initial=0.0))
+        up, why = (-low, "its lowest link is on the floor") if low < -2e-3 else (0.0, "")
+    if up <= 0.0:
+        return Transform.identity(), None
+    up = round(float(np.ceil(up * 1000.0) / 1000.0), 3)
+    return Transform.of(xyz=(0.0, 0.0, up)), Entry({"xyz": [0.0, 0.0, up]}, f"{why}: {readable(up, 'm')} above the root")
+
+
+def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple:  # type: ignore[type-arg]
+    """The joints with the proposed limits."""
+    found = []
+    for joint in robot.joints:
+        own = limits.get(joint.name)
+        if own is not None:
+            stated = {key: value for key, value in own.spec.model_dump(exclude_unset=True).items()}
+            joint = replace(joint, limits=replace(joint.limits, **stated))
+        found.append(joint)
+    return tuple(found)
+
+
+def _groups(parts: RobotParts) -> dict[str, Entry]:
+    found: dict[str, Entry] = {}
+    if parts.arm is not None:
+        why = parts.arm_evidence
+        if parts.others:
+            why += f"; not commanded, held by brakes: {listed(parts.others)}"
+        found["arm"] = Entry({"chain": {"base": parts.arm.base, "tip": parts.arm.tip}}, why)
+    if parts.hand is not None:
+        found["hand"] = Entry({"joints": list(parts.hand.joints)}, parts.hand_evidence)
+    return found
+
+
+def _poses(robot: RobotModel, parts: RobotParts, home: Home, closure: Closure | None) -> dict[str, Entry]:
+    found: dict[str, Entry] = {}
+    hand: dict[str, Plain] = {"hand": "open"} if closure is not None else {}
+    if parts.arm is not None:
+        arm: list[Plain] = [round(float(home.q[k]), 4) for k in robot.indices(parts.arm.joints)]
+        found["home"] = Entry({"arm": arm, **hand}, home.evidence)
+    elif hand:
+        found["home"] = Entry({**hand})
+    if closure is not None:
+        rounded = [[round(float(value), 4) for value in values] for values in (closure.opened, closure.closed)]
+        found["open"] = Entry({"hand": [*rounded[0]]}, closure.evidence)
+        found["closed"] = Entry({"hand": [*rounded[1]]})
+    return found
+
+
+def _limit_entries(limits: Mapping[str, ProposedLimits]) -> dict[str, Entry]:
+    found: dict[str, Entry] = {}
+    before = ""
+    for name, own in limits.items():
+        row: dict[str, Plain] = dict(own.spec.model_dump(exclude_unset=True))
+        why = own.evidence
+        if own.missing:
+            why = f"{listed(own.missing)} missing in the description or unusable; {why}"
+        found[name] = Entry(row, "" if why == before else why, bool(own.missing))
+        before = why
+    return found
+
+
+def _least_touching(search: HomeSearch, notes: list[str]) -> tuple[Home, tuple[tuple[str, str], ...]]:
+    """The middle of the ranges, and the pairs of links that touch there: nothing better was found."""
+    q = search.whole(search.middle)
+    hits = [hit for hit in search.nearer.every(q) if hit.a.startswith("robot/") and hit.b.startswith("robot/")]
+    pairs = tuple((hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")) for hit in hits)
+    notes.append(
+        f"no start free of collision was found; 'home' is the middle of the ranges, where {digits(len(pairs))} pairs of "
+        "links touch: they are under `collision_ignore`"
+    )
+    return Home(q, "the middle of the ranges: no configuration without contacts was found"), pairs
