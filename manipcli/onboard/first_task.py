@@ -112,7 +112,9 @@ class TaskSearch:
             if plans:
                 cause = max(self._causes, key=self._causes.count) if self._causes else "unknown"
                 notes.append(f"{kind} failed in {number_of(plans, 'attempt')} ({number_of(runs, 'run')}): {cause}")
-        assert last is not None
+        if last is None:
+            last = self._waits()
+            notes.append("no motion was found that could be tried; the task only waits")
         return FirstTask(last.name, last.entries, last.poses, last.does, False, tuple(notes))
 
     def _path(self, candidate: _Candidate) -> Path:
@@ -179,6 +181,13 @@ class TaskSearch:
                 "expect": Entry([{"at_pose": {"pose": "home", "group": "arm", "within": "2 deg"}}]),
             }
             yield _Candidate("moves", entries, "the arm moves between three poses", poses)
+
+    def _waits(self) -> _Candidate:
+        entries = {**_head("wait", "The robot holds still."), "steps": Entry([{"wait": "1 s"}])}
+        candidate = _Candidate("wait", entries, "the robot holds still", {})
+        if not (self._plans(candidate) and self._passes(candidate)):
+            self._progress("not even that")
+        return candidate
 
     def _closes(self) -> Iterator[_Candidate]:
         if self._draft.parts.hand is None:

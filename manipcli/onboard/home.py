@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,12 +18,14 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.scene.scene import Scene
 
 SAMPLES: Final = 1500
+TRIED: Final = 300
+"""Configurations checked for collisions, the best first."""
 CENTRAL: Final = 0.8
 """Share of the range of each joint, around its middle, in which a start may be."""
 HALF_TURN: Final = np.pi
 """[rad] Range to each side of a joint without limits; of a limited one at most so much counts."""
-CLEARANCE: Final = 0.02
-"""[m] between parts at the start."""
+CLEARANCES: Final = (0.02, 0.01, 0.005)
+"""[m] between parts, the largest first; the links of some wrists are always near each other."""
 TIDY: Final = 0.85
 """A rounder configuration is used if its score is at least this share of the best."""
 HIGH: Final = 0.15
@@ -71,9 +74,13 @@ class HomeSearch:
         self._limited = np.isfinite(ranges).all(axis=1)
         middle = np.where(self._limited, (self.lower + self.upper) / 2.0, 0.0)
         self.middle = np.where((self.lower < -0.1) & (self.upper > 0.1), np.clip(0.0, self.lower, self.upper), middle)
-        checker = CollisionChecker(kinematics, scene, ignore=ignore)
-        self.query = checker.at(margin=CLEARANCE)
-        self.nearer = checker.at(margin=CLEARANCE / 4)
+        self._checker = CollisionChecker(kinematics, scene, ignore=ignore)
+        self.keep(CLEARANCES[0])
+
+    def keep(self, clearance: float) -> None:
+        """From now on parts are apart by this clearance [m]."""
+        self.clearance = clearance
+        self.query = self._checker.at(margin=clearance)
 
     def whole(self, arm: Array) -> Array:
         """(n) all joints with those of the arm at `arm` (m)."""
@@ -111,18 +118,20 @@ def guess_home(search: HomeSearch, *, seed: int = 0) -> Home | None:
     drawn = [search.middle, *rng.uniform(centre - half, centre + half, (SAMPLES, len(half)))]
     scores = np.array([search.score(arm) for arm in drawn])
     order = np.argsort(-scores, kind="stable")
-    free: Callable[[Array], bool] = search.free
-    best = next((drawn[int(k)] for k in order[:300] if scores[k] > 0.0 and free(drawn[int(k)])), None)
-    if best is None:
-        free = lambda arm: not search.nearer.touches(search.whole(arm))  # noqa: E731
-        best = next((drawn[int(k)] for k in order if free(drawn[int(k)])), None)
+    best = None
+    for clearance in CLEARANCES:
+        search.keep(clearance)
+        tried = (drawn[int(k)] for k in order if scores[k] > 0.0)
+        best = next((arm for arm in itertools.islice(tried, TRIED) if search.free(arm)), None)
+        if best is not None:
+            break
     if best is None:
         return None
-    best = _tidied(search, free, np.array(best))
+    best = _tidied(search, np.array(best))
     return Home(search.whole(best), _evidence(search, best, scores))
 
 
-def _tidied(search: HomeSearch, free: Callable[[Array], bool], arm: Array) -> Array:
+def _tidied(search: HomeSearch, arm: Array) -> Array:
     """Nearly as good, with round values and joints in the middle of their range where possible."""
     least = search.score(arm)
     for k in range(len(arm)):
@@ -130,7 +139,7 @@ def _tidied(search: HomeSearch, free: Callable[[Array], bool], arm: Array) -> Ar
             other = np.array(arm)
             other[k] = value
             score = search.score(other)
-            if search.lower[k] <= value <= search.upper[k] and score >= TIDY * least and free(other):
+            if search.lower[k] <= value <= search.upper[k] and score >= TIDY * least and search.free(other):
                 arm, least = other, max(score, TIDY * least)
                 break
     return arm
@@ -151,8 +160,7 @@ def _evidence(search: HomeSearch, arm: Array, scores: Array) -> str:
     half = (search.upper - search.lower) / 2.0
     inside = np.where(search._limited, half - np.abs(arm - (search.lower + search.upper) / 2.0), np.inf)
     room = f"{digits(float(inside.min()))} from the nearest limit, " if np.isfinite(inside.min()) else ""
-    clear = CLEARANCE if not search.query.touches(q) else CLEARANCE / 4
     return (
-        f"best of {len(scores)} configurations (seed 0): {room}all parts {readable(clear, 'm')} apart, "
+        f"best of {len(scores)} configurations (seed 0): {room}all parts {readable(search.clearance, 'm')} apart, "
         f"smallest singular value of the tool's Jacobian {digits(least)}"
     )

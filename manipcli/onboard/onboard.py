@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from manipcli.core.errors import Diagnostic
 from manipcli.model.build_robot import build_robot
 from manipcli.onboard.controllers_file import guess_controllers
-from manipcli.onboard.first_task import FirstTask, TaskSearch
+from manipcli.onboard.first_task import TaskSearch
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
+from manipcli.onboard.summary import summary
 from manipcli.onboard.writer import Entry, checks, written
+from manipcli.report.text import describe
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.spec.load import load_task_text, read_bytes
@@ -32,6 +33,8 @@ class Request:
         arguments: of the xacro file.
         folder: of the project; relative paths in its files start there.
         package_path, allow_outside: see `build_robot`.
+        srdf: a MoveIt SRDF, for groups, poses, end effectors and pairs of links that touch.
+        controllers: a controllers file to use instead of a guess.
     """
 
     description: str
@@ -39,6 +42,8 @@ class Request:
     arguments: Mapping[str, str]
     package_path: tuple[Path, ...] = ()
     allow_outside: bool = False
+    srdf: Path | None = None
+    controllers: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +52,17 @@ class Onboarded:
 
     Attributes:
         files: texts by relative path.
-        task: the first task.
-        task_file: its relative path.
-        found: what was found, a line each.
-        checks: (path, evidence) of values that are only plausible.
-        notes: the rest.
-        findings: warnings of the reader of the description.
+        task_file: relative path of the first task.
+        passed: whether its run passed.
+        summary: what was found, guessed and tried, as lines of text.
+        package_path: folders that every command needs; () if the robot file names the packages.
     """
 
     files: Mapping[str, str]
-    task: FirstTask
     task_file: str
-    found: tuple[str, ...]
-    checks: tuple[tuple[str, str], ...]
-    notes: tuple[str, ...]
-    findings: tuple[Diagnostic, ...]
+    passed: bool
+    summary: tuple[str, ...]
+    package_path: tuple[Path, ...] = ()
 
 
 def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: None) -> Onboarded:
@@ -117,14 +118,14 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         task_file: written(task.entries, head=[f"{SCHEMA}../schemas/task.json"]),
     }
     entries = _robot_entries(name, final, request, draft, task.poses)
+    doubts = (*checks(entries), *checks(controllers.entries))
+    remarks = (*draft.notes, *controllers.notes, *(describe(f) for f in findings if f.severity != "note"))
     return Onboarded(
         files,
-        task,
         task_file,
-        tuple(_found(draft)),
-        tuple((*checks(entries), *checks(controllers.entries))),
-        (*draft.notes, *controllers.notes, *task.notes),
-        tuple(finding for finding in findings if finding.severity != "note"),
+        task.passed,
+        tuple(summary(found=tuple(_found(draft)), checks=doubts, notes=remarks, task=task)),
+        request.package_path,
     )
 
 

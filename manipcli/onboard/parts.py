@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.core.text import listed, number_of
+from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.description.elements import Joint
 from manipcli.model.configuration import zero_configuration
@@ -184,9 +184,9 @@ class _Tree:
             return None, ""
         palm = branches[0].parent
         mimics = sum(joint.mimic is not None for joint in self._robot.joints if any(joint.child in b for b in below))
-        follow = f", {number_of(mimics, 'joint')} that mimic" if mimics else ""
+        follow = f" and {number_of(mimics, 'mimic joint')}" if mimics else ""
         why = (
-            f"{number_of(len(branches), 'branch')} at '{palm}', at most {readable(reach, 'm')} long: "
+            f"{len(branches)} branches at '{palm}', at most {readable(reach, 'm')} long: "
             f"{number_of(len(joints), 'independent joint')}{follow}"
         )
         return Hand(palm, joints, tuple(tuple(links) for links in below)), why
@@ -238,7 +238,3 @@ class _Tree:
 
         return max(bare, key=order)
 
-
-def others_text(joints: tuple[str, ...]) -> str:
-    """A comment on the joints that belong to neither part."""
-    return f"not commanded, held by brakes: {listed(joints)}"

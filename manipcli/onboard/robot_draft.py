@@ -276,7 +276,7 @@ def _limit_entries(limits: Mapping[str, ProposedLimits]) -> dict[str, Entry]:
 def _least_touching(search: HomeSearch, notes: list[str]) -> tuple[Home, tuple[tuple[str, str], ...]]:
     """The middle of the ranges, and the pairs of links that touch there: nothing better was found."""
     q = search.whole(search.middle)
-    hits = [hit for hit in search.nearer.every(q) if hit.a.startswith("robot/") and hit.b.startswith("robot/")]
+    hits = [hit for hit in search.query.every(q) if hit.a.startswith("robot/") and hit.b.startswith("robot/")]
     pairs = tuple((hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")) for hit in hits)
     notes.append(
         f"no start free of collision was found; 'home' is the middle of the ranges, where {digits(len(pairs))} pairs of "
