@@ -183,8 +183,8 @@ def _lengths(kinematics: Kinematics, points: ShapePoints, joints: Sequence[str],
 
 def _tool(parts: RobotParts, frame: ToolFrame | None) -> tuple[Tool | None, Entry | None]:
     if frame is not None:
-        pose: dict[str, Plain] = {"xyz": [float(value) for value in frame.X_PT.p]}
-        rpy = [round(float(value), 5) for value in frame.X_PT.rpy]
+        pose: dict[str, Plain] = {"xyz": [float(value) + 0.0 for value in frame.X_PT.p]}
+        rpy = [round(float(value), 5) + 0.0 for value in frame.X_PT.rpy]
         if any(rpy):
             pose["rpy"] = [*rpy]
         X = Transform.of(xyz=frame.X_PT.p, rpy=rpy)

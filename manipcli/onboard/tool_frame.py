@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
-from manipcli.onboard.closure import SLAB, STEPS, Closure, HandShape, tips_of
+from manipcli.onboard.closure import SLAB, STEPS, Closure, HandShape
 
 INSIDE: Final = 0.012
 """[m] The frame is so far inside the finger tips."""
@@ -58,8 +58,7 @@ def _axes(shape: HandShape, closure: Closure) -> Array:
     """R_PT (3, 3)."""
     moved = []
     for finger in closure.fingers:
-        tip = [tips_of(shape.points(finger, q), closure.out).mean(axis=0) for q in (closure.opened, closure.closed)]
-        step = tip[1] - tip[0]
+        step = shape.tip(finger, closure.closed) - shape.tip(finger, closure.opened)
         moved.append(step - (step @ closure.out) * closure.out)
     d = np.array(moved)
     if shape.hand.fixed or len(d) == 1:
