@@ -16,7 +16,8 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.onboard.home import HomeSearch
-from manipcli.onboard.reachable import SAMPLES, Spots, reachable_spots
+from manipcli.model.kinematics import Kinematics
+from manipcli.onboard.reachable import Spots, reachable_spots
 from manipcli.onboard.robot_draft import BLOCK, RobotDraft
 from manipcli.onboard.writer import Entry, written
 from manipcli.spec.source.tree import Plain
@@ -109,7 +110,7 @@ class TaskSearch:
                     )
                 if plans >= MOST_PLANS or runs >= MOST_RUNS:
                     break
-            if plans:
+            if plans or self._causes:
                 cause = max(self._causes, key=self._causes.count) if self._causes else "unknown"
                 notes.append(f"{kind} failed in {number_of(plans, 'attempt')} ({number_of(runs, 'run')}): {cause}")
         if last is None:
@@ -159,8 +160,14 @@ class TaskSearch:
                 f"the finger tips are {readable(frame.narrowest, 'm')} to {readable(frame.widest, 'm')} apart"
             )
             return
-        for spots in reachable_spots(draft.robot, arm.joints, draft.home, tool_height=edge / 2):
-            yield _pick(spots, edge)
+        assert draft.search is not None
+        spots = reachable_spots(
+            Kinematics(draft.robot), draft.search, arm.joints, draft.home, tool_height=edge / 2
+        )
+        if not spots:
+            self._causes.append("no place was found that the tool reaches from the top or from the side")
+        for one in spots:
+            yield _pick(one, edge)
 
     def _moves(self) -> Iterator[_Candidate]:
         draft = self._draft
@@ -237,7 +244,7 @@ def _pick(spots: Spots, edge: float) -> _Candidate:
             "rests_on": support,
             "at": [px, py],
         },
-        f"where many configurations hold the tool {word}: {spots.count} of {SAMPLES} random ones within 5 cm",
+        f"reached with the tool {word}, here, 12 cm higher, and at the other place (inverse kinematics)",
     )
     entries = {
         **_head("pick_place", f"A block of {readable(edge, 'm')} is picked and placed elsewhere on the {support}."),

@@ -1,4 +1,4 @@
-"""Where a hand can pick and place: cells of the space in which many configurations hold the tool the right way."""
+"""Where a hand can pick and place: places on the floor or on a desk that the arm reaches with the tool the right way."""
 
 from __future__ import annotations
 
@@ -9,27 +9,25 @@ from typing import Final, Literal
 
 import numpy as np
 
-from manipcli.core.geometry import Array, rotate
-from manipcli.model.batch_kinematics import tool_poses
-from manipcli.model.configuration import with_mimics
-from manipcli.model.robot import RobotModel
+from manipcli.core.geometry import Array, Transform
+from manipcli.model.kinematics import Kinematics
+from manipcli.onboard.home import HomeSearch
+from manipcli.plan.inverse_kinematics import InverseKinematics
 
-SAMPLES: Final = 40_000
-CELL: Final = 0.05
-"""[m] Size of a cell in radius and height."""
-SECTOR: Final = np.radians(20.0)
-WITHIN: Final = np.cos(np.radians(25.0))
-"""Least cosine between the tool's axis and the direction of the approach."""
-LIFT: Final = 2
-"""Cells above the place that the tool must reach, too."""
-MOST_HEIGHTS: Final = 3
-"""Heights of the support that are tried."""
-PAIRS: Final = 4
-"""Pairs of places that are tried at each height."""
+ABOVE: Final = 0.12
+"""[m] The tool must also reach so high above the place: to come and to lift."""
+STEP: Final = 0.1
+"""[m] between the examined heights and distances."""
+ASIDE: Final = (25.0, 40.0)
+"""[deg] Place and pick are so far to the left and the right of the direction in which the arm starts."""
 LEAST_APART: Final = 0.12
 """[m] from the place where the block is picked to where it is placed."""
-FLOOR_SHARE: Final = 0.4
-"""The floor is preferred if it has at least this share of the best height's configurations."""
+STARTS: Final = 6
+"""Random starts of the inverse kinematics, after the home position."""
+FLOOR_BONUS: Final = 2.0
+"""The floor counts so much more than a desk, which could be in the way."""
+EXAMINED: Final = 60
+"""Places examined at most for each approach, spread over heights and distances."""
 
 Approach = Literal["top", "side"]
 
@@ -42,98 +40,108 @@ class Spots:
         height: [m] of the support; 0: the floor.
         pick, place: (x, y) [m].
         approach: how the hand comes.
-        count: configurations, of `SAMPLES`, that hold the tool so there.
+        score: smallest singular value of the tool's Jacobian at these places; on the floor times `FLOOR_BONUS`.
     """
 
     height: float
     pick: tuple[float, float]
     place: tuple[float, float]
     approach: Approach
-    count: int
+    score: float
 
 
-def reachable_spots(robot: RobotModel, joints: tuple[str, ...], q: Array, *, tool_height: float, seed: int = 0) -> Iterator[Spots]:
-    """Candidates, the most reachable first.
+def reachable_spots(
+    kinematics: Kinematics, search: HomeSearch, joints: tuple[str, ...], home: Array, *, tool_height: float, seed: int = 0
+) -> list[Spots]:
+    """Candidates, the most dexterous first; those from the top before those from the side.
 
     Args:
-        robot: with its tool.
+        kinematics: of the robot, with its tool.
+        search: checks configurations for collisions.
         joints: of the arm.
-        q: (n) all joints; those of the arm are drawn.
+        home: (n) the start.
         tool_height: [m] of the tool above the support.
-        seed: of the drawn configurations.
+        seed: of the inverse kinematics.
     """
-    rng = np.random.default_rng(seed)
-    columns = robot.indices(joints)
-    ranges = np.array([robot.joint(name).limits.within_soft for name in joints])
-    lower = np.where(np.isfinite(ranges[:, 0]), ranges[:, 0], -np.pi)
-    upper = np.where(np.isfinite(ranges[:, 1]), ranges[:, 1], np.pi)
-    centre, half = (lower + upper) / 2.0, 0.95 * (upper - lower) / 2.0
-    drawn = np.tile(q, (SAMPLES, 1))
-    drawn[:, columns] = rng.uniform(centre - half, centre + half, (SAMPLES, len(columns)))
-    p, quat = tool_poses(robot, with_mimics(robot, drawn))
-    z, y = rotate(quat, np.array([0.0, 0.0, 1.0])), rotate(quat, np.array([0.0, 1.0, 0.0]))
-    down = -z[:, 2] > WITHIN
-    side = (np.abs(z[:, 2]) < np.sqrt(1.0 - WITHIN**2)) & (np.abs(y[:, 2]) < np.sqrt(1.0 - WITHIN**2))
-    axis = robot.X_WB.p[:2]
-    found = [*_spots(p[down], axis, tool_height, "top"), *_spots(p[side], axis, tool_height, "side")]
-    return iter(sorted(found, key=lambda spots: (spots.approach == "side" and down.sum() > SAMPLES // 500)))
+    tool = kinematics.robot.tool
+    assert tool is not None
+    solver = InverseKinematics(kinematics, joints, tool.link, X_LT=tool.X_LT)
+    reach = _Reach(solver, search, home, np.random.default_rng(seed))
+    first = kinematics.robot.joint(joints[0]).child
+    axis = kinematics.forward(home, first).p
+    ahead = solver.forward(home).p - axis
+    front = float(np.arctan2(ahead[1], ahead[0]))
+    far = _farthest(solver, search, home, axis)
+    heights = [0.0, *np.arange(STEP, axis[2] + 0.7 * far, STEP).tolist()]
+    radii = np.arange(max(0.15, 0.2 * far), far, STEP / 2 if far < 0.6 else STEP).tolist()
+    found: list[Spots] = []
+    for approach in ("top", "side"):
+        open_ = solver.leaving("spin" if approach == "top" else "nothing")
+        grid = sorted(itertools.product(heights, radii), key=lambda cell: _oddness(cell, axis, far))
+        own = [
+            spots
+            for h, r in grid[:EXAMINED]
+            if (spots := reach.spots(open_, h, r, front, axis, tool_height, approach)) is not None  # type: ignore[arg-type]
+        ]
+        found += sorted(own, key=lambda spots: -spots.score)
+    return found
 
 
-def _spots(p: Array, axis: Array, tool_height: float, approach: Approach) -> Iterator[Spots]:
-    if len(p) < 10:
-        return
-    flat = p[:, :2] - axis
-    radius, angle = np.linalg.norm(flat, axis=1), np.arctan2(flat[:, 1], flat[:, 0])
-    level = np.round((p[:, 2] - tool_height) / CELL).astype(int)
-    ring, sector = np.round(radius / CELL).astype(int), np.round(angle / SECTOR).astype(int)
-    cells: dict[int, dict[tuple[int, int], int]] = {}
-    for h, r, s in zip(level.tolist(), ring.tolist(), sector.tolist(), strict=True):
-        here = cells.setdefault(h, {})
-        here[r, s] = here.get((r, s), 0) + 1
-    scored: dict[int, dict[tuple[int, int], int]] = {}
-    for h, here in cells.items():
-        if h >= 0:
-            above = cells.get(h + LIFT, {})
-            scored[h] = {cell: min(count, above.get(cell, 0)) for cell, count in here.items() if cell[0] > 1}
-    totals = {h: sum(sorted(here.values())[-12:]) for h, here in scored.items()}
-    heights = sorted((h for h in totals if totals[h] > 0), key=lambda h: -totals[h])
-    if not heights:
-        return
-    if 0 in totals and totals[0] >= FLOOR_SHARE * totals[heights[0]]:
-        heights = [0, *(h for h in heights if h)]
-    chosen: list[int] = []
-    for h in heights:
-        if all(abs(h - other) > 1 for other in chosen):
-            chosen.append(h)
-    for h in chosen[:MOST_HEIGHTS]:
-        for pick, place, count in itertools.islice(_pairs(scored[h]), PAIRS):
-            yield Spots(h * CELL, _xy(pick, axis), _xy(place, axis), approach, count)
+class _Reach:
+    def __init__(self, solver: InverseKinematics, search: HomeSearch, home: Array, rng: np.random.Generator) -> None:
+        self._solver, self._search, self._home = solver, search, home
+        self._starts = [home, *solver.random_configurations(home, rng, STARTS)]
+
+    def spots(
+        self, solver: InverseKinematics, h: float, r: float, front: float, axis: Array, up: float, approach: Approach
+    ) -> Spots | None:
+        """The places at a height and a distance, if the arm reaches both."""
+        for degrees in ASIDE:
+            aside = float(np.radians(degrees))
+            if 2.0 * r * np.sin(aside) < LEAST_APART:
+                continue
+            places = [(float(axis[0] + r * np.cos(a)), float(axis[1] + r * np.sin(a))) for a in (front - aside, front + aside)]
+            scores = []
+            for (x, y), a in zip(places, (front - aside, front + aside), strict=True):
+                for z in (h + up, h + up + ABOVE):
+                    score = self._reached(solver, Transform.of(xyz=(x, y, z), R=_tool_axes(approach, a)))
+                    if score is None:
+                        break
+                    scores.append(score)
+            if len(scores) == 4:
+                (px, py), (gx, gy) = ((round(x, 3), round(y, 3)) for x, y in places)
+                bonus = FLOOR_BONUS if h == 0.0 else 1.0
+                return Spots(round(h, 3), (px, py), (gx, gy), approach, bonus * min(scores))
+        return None
+
+    def _reached(self, solver: InverseKinematics, X_WT: Transform) -> float | None:
+        """The smallest singular value where the tool is at this pose, without collisions; None if it cannot be."""
+        for start in self._starts:
+            solution = solver.track(X_WT, start)
+            if solution.converged and not self._search.query.touches(solution.q):
+                return max(1e-3, self._solver.least_singular_value(solution.q))
+        return None
 
 
-def _pairs(cells: dict[tuple[int, int], int]) -> Iterator[tuple[tuple[int, int], tuple[int, int], int]]:
-    """Two cells at about the same radius, two or three sectors apart; those ahead of the robot first where equal."""
-    smooth = {
-        (r, s): min(cells.get((r, s), 0), cells.get((r + 1, s), 0), cells.get((r - 1, s), 0)) or cells[r, s] // 4
-        for r, s in cells
-    }
-    pairs = []
-    for (r, s), count in smooth.items():
-        for step in (2, 3, 4):
-            other = (r, s + step)
-            if other in smooth and 2.0 * r * CELL * np.sin(step * SECTOR / 2.0) >= LEAST_APART:
-                both = min(count, smooth[other])
-                ahead = abs(s + step / 2.0)
-                pairs.append((both / (1.0 + 0.1 * ahead), (r, s), other, min(cells[r, s], cells[other])))
-                break
-    pairs.sort(key=lambda pair: (-pair[0], pair[1]))
-    used: set[tuple[int, int]] = set()
-    for score, first, second, count in pairs:
-        if score <= 0.0 or any(abs(first[0] - r) <= 1 and abs(first[1] - s) <= 1 for r, s in used):
-            continue
-        used.add(first)
-        yield first, second, count
+def _oddness(cell: tuple[float, float], axis: Array, far: float) -> float:
+    """How unusual a place is: the middle of the reach, a little below the arm's first joint or on the floor."""
+    h, r = cell
+    low = min(abs(h - max(0.0, float(axis[2]) - 0.3 * far)), h)
+    return abs(r - 0.55 * far) + low
 
 
-def _xy(cell: tuple[int, int], axis: Array) -> tuple[float, float]:
-    r, a = cell[0] * CELL, cell[1] * SECTOR
-    return round(float(axis[0] + r * np.cos(a)), 3), round(float(axis[1] + r * np.sin(a)), 3)
+def _farthest(solver: InverseKinematics, search: HomeSearch, home: Array, axis: Array) -> float:
+    """[m] from the first joint to the tool, over random configurations."""
+    rng = np.random.default_rng(1)
+    return max(
+        float(np.linalg.norm(solver.forward(search.whole(arm)).p - axis))
+        for arm in rng.uniform(search.lower, search.upper, (300, len(search.lower)))
+    )
+
+
+def _tool_axes(approach: Approach, yaw: float) -> Array:
+    """R_WT (3, 3): z down or away from the base; y level."""
+    ahead, left = np.array([np.cos(yaw), np.sin(yaw), 0.0]), np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    z = np.array([0.0, 0.0, -1.0]) if approach == "top" else ahead
+    y = left if approach == "side" else -left
+    return np.column_stack([np.cross(y, z), y, z])
