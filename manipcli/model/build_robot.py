@@ -14,9 +14,12 @@ from manipcli.description.expanded import unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.link import REGULARISED
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
+from manipcli.model.inertials import ESTIMATE, repaired_links, with_inertials
 from manipcli.model.joint_units import misread_units
+from manipcli.model.link_collisions import REMEDY, replaced_meshes, with_collisions
 from manipcli.model.link_parts import LINK_PARTS, link_parts_from_json, split_links, with_parts
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalised_urdf import portable_urdf
@@ -50,11 +53,11 @@ def build_robot(
         InvalidInput: all errors of the descriptions at once; if these are valid, all errors of the robot file.
     """
     reporter = Reporter(source)
-    sources = Packages(file, package_path=package_path, allow_outside=True)
-    read = _Descriptions(reporter, sources, file, tuple(package_path), allow_outside)
+    read = _Descriptions(reporter, spec, file, tuple(package_path), allow_outside)
     main = read.parts(spec.description, spec.args, ("description",))
     attached = [
-        read.parts(each.description, each.args, ("attach", k, "description")) for k, each in enumerate(spec.attach)
+        read.parts(each.description, each.args, ("attach", k, "description"), each.prefix)
+        for k, each in enumerate(spec.attach)
     ]
     reporter.stop()
     assert main is not None
@@ -63,9 +66,12 @@ def build_robot(
         assert parts is not None
         body.weld(reporter, each, parts, k)
     reporter.stop()
+    body.links = with_collisions(reporter, spec.collision, body.links)
+    body.links, inertials = with_inertials(reporter, spec.inertials, body.links, body.ordered())
     names = [name for k, name in enumerate(spec.collision_parts) if _known(reporter, name, body, k)]
     body.links = list(split_links(reporter, body.links, names))
-    return _assembled(reporter, spec, body), tuple(reporter.findings)
+    robot = dataclasses.replace(_assembled(reporter, spec, body), inertials=inertials)
+    return robot, tuple(reporter.findings)
 
 
 def rebuild_robot(spec: RobotSpec, urdf: bytes, *, link_parts: bytes | None = None) -> RobotModel:
@@ -141,34 +147,58 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     )
 
 
+def package_folders(spec: RobotSpec, file: Path) -> dict[str, Path]:
+    """The folders of `packages:` by name; relative ones start at the folder of the robot file."""
+    return {name: file.resolve().parent / folder for name, folder in (spec.packages or {}).items()}
+
+
 class _Descriptions:
     """Reads the description files that a robot file names."""
 
     def __init__(
-        self, reporter: Reporter, sources: Packages, file: Path, package_path: tuple[Path, ...], allow_outside: bool
+        self, reporter: Reporter, spec: RobotSpec, file: Path, package_path: tuple[Path, ...], allow_outside: bool
     ) -> None:
         self._reporter = reporter
-        self._sources = sources
+        self._spec = spec
         self._folder = file.resolve().parent
         self._package_path = package_path
         self._allow_outside = allow_outside
+        self._named = package_folders(spec, file)
+        for name, folder in self._named.items():
+            if not folder.is_dir():
+                message = f"package '{name}': there is no folder '{(spec.packages or {})[name]}'"
+                reporter.error("ROBOT309", message, ("packages", name), hint="write it relative to this file")
+        self._sources = Packages(file, package_path=package_path, allow_outside=True, named=self._named)
 
-    def parts(self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc) -> Parts | None:
-        """The parts of a description, or None; findings go to the reporter."""
+    def parts(
+        self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc, prefix: str = ""
+    ) -> Parts | None:
+        """The parts of a description, or None; findings go to the reporter, but those that the robot file mends."""
         try:
             path = self._sources.resolve(uri, relative_to=self._folder)
         except NotFound as error:
             self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
-        packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
+        packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside, named=self._named)
         errors_only = tuple(check for check in CHECKS if check.severity == "error")  # others also read visual meshes
         examination = examine(path, packages=packages, arguments=arguments, checks=errors_only)
-        self._reporter.findings += examination.errors
-        if examination.parts is not None:
-            # Notes are for the author of a description, not for its users.
-            read = [finding for finding in examination.parts.findings if finding.severity == "warning"]
+        parts = examination.parts
+        links = parts.links if parts is not None else ()
+        mended = {
+            *repaired_links(self._spec.inertials, links, prefix),
+            *replaced_meshes(self._spec.collision, links, prefix),
+        }
+        remedies = {finding: ESTIMATE for link in links if link.unusable for finding in link.unusable.findings}
+        remedies |= {finding: REMEDY.format(link=prefix + link.name) for link in links for finding in link.missing}
+        for finding in examination.errors:
+            if finding not in mended:
+                hint = "; or ".join(filter(None, (remedies.get(finding), finding.hint)))
+                self._reporter.findings.append(dataclasses.replace(finding, hint=hint or None))
+        if parts is not None:
+            # Other notes are for the author of a description, not for its users.
+            read = [each for each in parts.findings if each.severity == "warning" or each.code == REGULARISED]
             self._reporter.findings += list(dict.fromkeys(read))
-        return examination.parts
+        return parts
 
 
 class _Body:

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Literal
 
 from manipcli.core.geometry import Transform
+from manipcli.core.text import digits
 from manipcli.description.elements import (
     Joint,
     Link,
@@ -67,6 +68,34 @@ class Actuator:
     latency: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class LinkInertial:
+    """Where the inertial of a link comes from, if not from its description.
+
+    Attributes:
+        link: name.
+        kind: `given` by the robot file; `estimated`; `repaired`: the mass is the description's, the inertia estimated.
+        mass: [kg].
+        centre: (3,) [m] centre of mass in the link.
+        moments: (3,) [kg m2] principal moments of inertia, increasing.
+        source: what was measured: "collision shapes (closed mesh)"; "robot file".
+    """
+
+    link: str
+    kind: Literal["given", "estimated", "repaired"]
+    mass: float
+    centre: tuple[float, ...]
+    moments: tuple[float, ...]
+    source: str
+
+    def __str__(self) -> str:
+        centre, moments = (", ".join(f"{value:.4g}" for value in values) for values in (self.centre, self.moments))
+        return (
+            f"{self.kind}: {digits(self.mass)} kg, centre [{centre}] m, principal moments [{moments}] kg m2, "
+            f"from {self.source}"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class RobotModel:
     """The robot, with joints in depth-first order from the root: parent links come before child links.
@@ -74,7 +103,7 @@ class RobotModel:
     `urdf`: normalised description with package:// mesh URIs, as stored in logs. `X_WB`: pose of the root link in the
     world. `friction`: friction coefficient of its surfaces. `collision_ignore`: pairs of links that planning never
     checks against each other. `compat`: convention of four-bar linkages, which differ between ROS 1 and ROS 2.
-    `actuators`: those with known parameters.
+    `actuators`: those with known parameters. `inertials`: those that are not the description's; empty in a log's robot.
     """
 
     name: str
@@ -91,6 +120,7 @@ class RobotModel:
     friction: float = 1.0
     compat: Literal["ros1", "ros2"] = "ros2"
     actuators: tuple[Actuator, ...] = ()
+    inertials: tuple[LinkInertial, ...] = ()
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:
