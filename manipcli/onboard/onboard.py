@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from manipcli.model.build_robot import build_robot
 from manipcli.onboard.controllers_file import guess_controllers
 from manipcli.onboard.first_task import TaskSearch
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
+from manipcli.onboard.source import read_source
 from manipcli.onboard.summary import summary
 from manipcli.onboard.writer import Entry, checks, written
-from manipcli.report.text import describe
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
-from manipcli.spec.load import load_task_text, read_bytes
-from manipcli.spec.robot import RobotSpec
+from manipcli.spec.load import load_task_text
 from manipcli.task.vocabulary import task_spec
 
 SCHEMA = "yaml-language-server: $schema="
@@ -55,14 +52,12 @@ class Onboarded:
         task_file: relative path of the first task.
         passed: whether its run passed.
         summary: what was found, guessed and tried, as lines of text.
-        package_path: folders that every command needs; () if the robot file names the packages.
     """
 
     files: Mapping[str, str]
     task_file: str
     passed: bool
     summary: tuple[str, ...]
-    package_path: tuple[Path, ...] = ()
 
 
 def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: None) -> Onboarded:
@@ -71,24 +66,24 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
     Raises:
         InvalidInput: the description has errors that no guess mends.
     """
-    name = Path(request.description).name.partition(".")[0]
-    given, final = _description(request)
     on_progress("reading the description")
-    spec = RobotSpec(robot=name, description=given, args=dict(request.arguments))
-    bare, findings = build_robot(
-        spec, file=request.folder / "robot.yaml", package_path=request.package_path, allow_outside=request.allow_outside
+    source = read_source(
+        request.description,
+        request.arguments,
+        request.folder,
+        package_path=request.package_path,
+        allow_outside=request.allow_outside,
     )
     on_progress("looking for the arm, the hand and a start")
-    draft = draft_robot(bare, floor_scene())
-
-    def robot_text(description: str, poses: Mapping[str, Entry]) -> str:
-        return written(_robot_entries(name, description, request, draft, poses), head=_head(request))
+    draft = draft_robot(source.robot, floor_scene())
+    head = _head(request)
 
     with TemporaryDirectory(prefix="manipcli-") as scratch:
         folder = Path(scratch)
 
         def write_robot(poses: Mapping[str, Entry]) -> None:
-            (folder / "robot.yaml").write_text(robot_text(given, poses))
+            entries = {**source.anywhere, **_with_poses(draft, poses)}
+            (folder / "robot.yaml").write_text(written(entries, head=head))
 
         write_robot({})
         on_progress("tuning gains")
@@ -112,20 +107,19 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         )
         task = search.search()
     task_file = f"tasks/{task.name}.yaml"
+    entries = {**source.entries, **_with_poses(draft, task.poses)}
     files = {
-        "robot.yaml": robot_text(final, task.poses),
+        "robot.yaml": written(entries, head=head),
         "controllers.yaml": controllers.text,
         task_file: written(task.entries, head=[f"{SCHEMA}../schemas/task.json"]),
     }
-    entries = _robot_entries(name, final, request, draft, task.poses)
     doubts = (*checks(entries), *checks(controllers.entries))
-    remarks = (*draft.notes, *controllers.notes, *(describe(f) for f in findings if f.severity != "note"))
+    remarks = (*source.notes, *draft.notes, *controllers.notes)
     return Onboarded(
         files,
         task_file,
         task.passed,
         tuple(summary(found=tuple(_found(draft)), checks=doubts, notes=remarks, task=task)),
-        request.package_path,
     )
 
 
@@ -133,16 +127,6 @@ def floor_scene() -> Scene:
     """A scene with the floor alone."""
     text = "task: floor\nrobot: robot.yaml\ncontrollers: controllers.yaml\nsteps: [{wait: 1 s}]\n"
     return build_scene(load_task_text(text, "floor", model=task_spec()).spec)
-
-
-def _description(request: Request) -> tuple[str, str]:
-    """The description for files anywhere, and as the robot file in the folder names it."""
-    if "://" in request.description:
-        return request.description, request.description
-    path = Path(request.description)
-    read_bytes(path)  # the usual error for a missing file
-    whole = os.path.realpath(path)
-    return whole, os.path.relpath(whole, os.path.realpath(request.folder))
 
 
 def _head(request: Request) -> list[str]:
@@ -154,13 +138,9 @@ def _head(request: Request) -> list[str]:
     ]
 
 
-def _robot_entries(
-    name: str, description: str, request: Request, draft: RobotDraft, poses: Mapping[str, Entry]
-) -> dict[str, Entry]:
-    entries: dict[str, Entry] = {"robot": Entry(name), "description": Entry(description)}
-    if request.arguments:
-        entries["args"] = Entry(dict(request.arguments))
-    entries |= draft.entries
+def _with_poses(draft: RobotDraft, poses: Mapping[str, Entry]) -> dict[str, Entry]:
+    """The entries of the draft, with further poses."""
+    entries = dict(draft.entries)
     if poses:
         own = entries["poses"].value
         assert isinstance(own, dict)

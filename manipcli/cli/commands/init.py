@@ -95,7 +95,7 @@ def init(
         console.result(line)
     for note in notes(folder):
         console.talk(f"note: {note}")
-    options = "".join(f" --package-path {path}" for path in made.package_path) + " --allow-outside" * allow_outside
+    options = " --allow-outside" * allow_outside
     console.talk(f"next: {enter(folder)}manipcli run {made.task_file}{options}")
     return ExitCode.PASSED if made.passed else ExitCode.FAILED
 
