@@ -187,7 +187,7 @@ def _ends(shape: HandShape, rest: Array, lower: Array, upper: Array) -> Closure:
     opened = np.where(idle, rest, np.where(upwards, lower, upper))
     closed = np.where(idle, rest, np.where(upwards, upper, lower))
     out = _outward(shape, fingers, opened, (opened + closed) / 2.0)
-    wide, narrow = (_spread(shape, fingers, positions) for positions in (opened, closed))
+    wide, narrow = (tip_distance(shape, fingers, positions) for positions in (opened, closed))
     evidence = f"the finger tips are {readable(wide, 'm')} apart when open, {readable(narrow, 'm')} when closed"
     return Closure(opened, closed, out, fingers, evidence)
 
@@ -204,13 +204,13 @@ def _facing(shape: HandShape, rest: Array, lower: Array, upper: Array) -> Array:
     Fingers that point to the same side at rest then face each other.
     """
     best = np.array(rest)
-    most = _spread(shape, shape.hand.branches, best) * FACING
+    most = tip_distance(shape, shape.hand.branches, best) * FACING
     for _ in range(2):
         for k in np.flatnonzero(_spreads(shape, rest, rest)):
             for value in (lower[k], (lower[k] + upper[k]) / 2.0, upper[k]):
                 there = np.array(best)
                 there[k] = value
-                wide = _spread(shape, shape.hand.branches, there)
+                wide = tip_distance(shape, shape.hand.branches, there)
                 if wide > most + 1e-3:
                     best, most = there, wide
     return best
@@ -280,7 +280,7 @@ def _fingers(shape: HandShape, positions: Array, out: Array) -> tuple[tuple[str,
     return tuple(found) or shape.hand.branches
 
 
-def _spread(shape: HandShape, fingers: tuple[tuple[str, ...], ...], positions: Array) -> float:
+def tip_distance(shape: HandShape, fingers: tuple[tuple[str, ...], ...], positions: Array) -> float:
     """[m] mean distance between finger tips; of one jaw, from the tip of the fixed one."""
     tips = [shape.tip(links, positions) for links in (*fingers, *([shape.hand.fixed] if shape.hand.fixed else []))]
     apart = [float(np.linalg.norm(a - b)) for a, b in combinations(tips, 2)]

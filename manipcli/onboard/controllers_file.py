@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -29,49 +30,75 @@ class WrittenControllers:
     notes: tuple[str, ...]
 
 
-def guess_controllers(
-    robot_path: Path, folder: Path, arm: tuple[str, ...], hand: tuple[str, ...], *, package_path: tuple[Path, ...], allow_outside: bool
-) -> WrittenControllers:
-    """The file for the joints of an arm and of a hand.
-
-    Args:
-        robot_path: the robot file.
-        folder: where a file may be written for the tuning.
-        arm, hand: their joints; () for neither.
-        package_path, allow_outside: see `read_robot`.
-    """
-    path = folder / "untuned.yaml"
-    path.write_text(written(_entries(arm, hand, None)))
-    failed = ""
-    for bandwidth in BANDWIDTHS:
-        wish = Wish(bandwidth, 1.0, PERIOD)
-        try:
-            tuning = tune(robot_path, path, wish, package_path=package_path, allow_outside=allow_outside)
-        except InvalidInput as refusal:
-            failed = failed or refusal.findings[0].message
-            continue
-        entries = _entries(arm, hand, tuning)
-        return WrittenControllers(written(entries, head=_HEAD), entries, tuning.notes)
-    entries = _entries(arm, hand, None, position=failed)
-    note = f"the joints are commanded by position: no gains for efforts were found ({failed})"
-    return WrittenControllers(written(entries, head=_HEAD), entries, (note,))
-
-
 _HEAD: Final = (
     "yaml-language-server: $schema=schemas/controllers.json",
     "Written by `manipcli init --robot`; `manipcli tune robot.yaml controllers.yaml` proposes other gains.",
 )
 
 
-def _entries(
-    arm: tuple[str, ...], hand: tuple[str, ...], tuning: Tuning | None, *, position: str | None = None
-) -> dict[str, Entry]:
-    found: dict[str, Entry] = {}
+class ControllersGuess:
+    """Controllers for the joints of an arm and of a hand: by effort where gains are stable, else by position."""
+
+    def __init__(
+        self,
+        robot_path: Path,
+        arm: tuple[str, ...],
+        hand: tuple[str, ...],
+        *,
+        package_path: tuple[Path, ...],
+        allow_outside: bool,
+    ) -> None:
+        """
+        Args:
+            robot_path: the robot file; another file is written beside it.
+            arm, hand: their joints; () for neither.
+            package_path, allow_outside: see `read_robot`.
+        """
+        self._arm, self._hand = arm, hand
+        self._tuning, self._failed = _tuned(robot_path, arm, hand, package_path, allow_outside)
+
+    def variants(self) -> Iterator[Callable[[str], WrittenControllers]]:
+        """What to try, the best first; each takes the reason why the one before failed."""
+        if self._tuning is not None:
+            yield lambda _: self._written(())
+            if self._arm and self._hand:
+                yield lambda why: self._written(("hand",), why)
+        yield lambda why: self._written(("arm", "hand"), why or self._failed)
+
+    def _written(self, by_position: tuple[str, ...], why: str = "") -> WrittenControllers:
+        entries: dict[str, Entry] = {}
+        if self._arm:
+            reason = why if "arm" in by_position else None
+            entries["arm_controller"] = Entry(_trajectory(self._arm, self._tuning, reason))
+        if self._hand:
+            reason = why if "hand" in by_position else None
+            entries["hand_controller"] = Entry(_gripper(self._hand, self._tuning, reason))
+        file = {"controllers": Entry(entries)}
+        notes = self._tuning.notes if self._tuning is not None else ()
+        if by_position:
+            notes = (*notes, f"commanded by position: {' and '.join(by_position)}, because by effort: {why}")
+        return WrittenControllers(written(file, head=_HEAD), file, notes)
+
+
+def _tuned(
+    robot_path: Path, arm: tuple[str, ...], hand: tuple[str, ...], package_path: tuple[Path, ...], allow_outside: bool
+) -> tuple[Tuning | None, str]:
+    """Gains at the highest bandwidth with which all joints are stable; else None, and why."""
+    path = robot_path.with_name("untuned.yaml")
+    parts = {}
     if arm:
-        found["arm_controller"] = Entry(_trajectory(arm, tuning, position), "")
+        parts["arm_controller"] = Entry(_trajectory(arm, None, None))
     if hand:
-        found["hand_controller"] = Entry(_gripper(hand, tuning, position), "")
-    return {"controllers": Entry(found)}
+        parts["hand_controller"] = Entry(_gripper(hand, None, None))
+    path.write_text(written({"controllers": Entry(parts)}))
+    failed = ""
+    for bandwidth in BANDWIDTHS:
+        wish = Wish(bandwidth, 1.0, PERIOD)
+        try:
+            return tune(robot_path, path, wish, package_path=package_path, allow_outside=allow_outside), ""
+        except InvalidInput as refusal:
+            failed = failed or refusal.findings[0].message
+    return None, failed
 
 
 def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | None) -> dict[str, Entry]:
@@ -81,7 +108,7 @@ def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | 
         "stopped_velocity_tolerance": Entry(0.05),
         "joints": Entry(tolerances),
     }
-    control = {"command_interface": Entry("position", f"no gains for efforts were found: {position}", True)}
+    control = {"command_interface": Entry("position", f"by effort: {position}", True)}
     if position is None:
         control = {
             "command_interface": Entry("effort", "PID on efforts, and the model's inverse dynamics as feed-forward"),
@@ -97,7 +124,7 @@ def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | 
 
 
 def _gripper(joints: tuple[str, ...], tuning: Tuning | None, position: str | None) -> dict[str, Entry]:
-    control = {"command_interface": Entry("position")} if position is not None else _gains(joints, tuning)
+    control = {"command_interface": Entry("position", f"by effort: {position}", True)} if position is not None else _gains(joints, tuning)
     return {"type": Entry("gripper"), "joints": Entry(list(joints)), **control}
 
 

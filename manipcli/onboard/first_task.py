@@ -87,6 +87,15 @@ class TaskSearch:
         self._progress = on_progress
         self._causes: list[str] = []
 
+    def unsteady(self) -> str | None:
+        """Why the robot does not hold still with these controllers; None if it does."""
+        self._causes.clear()
+        candidate = self._waits()
+        self._progress("holding still: a run")
+        if self._plans(candidate) and self._passes(candidate):
+            return None
+        return self._causes[-1]
+
     def search(self) -> FirstTask:
         """The most ambitious task that passes: pick and place, else moves, else open and close."""
         notes: list[str] = []
@@ -104,6 +113,8 @@ class TaskSearch:
                 self._progress(f"{candidate.does} ({plans})")
                 planned = self._plans(candidate)
                 runs += planned
+                if planned:
+                    self._progress(f"{candidate.does}: a run")
                 if planned and self._passes(candidate):
                     return FirstTask(
                         candidate.name, candidate.entries, candidate.poses, candidate.does, True, tuple(notes)
@@ -137,7 +148,6 @@ class TaskSearch:
         return True
 
     def _passes(self, candidate: _Candidate) -> bool:
-        self._progress(f"{candidate.does}: a run")
         try:
             report = pipeline.run_task(
                 self._path(candidate), log=self._folder / "first.mcap", force=True, **self._options
@@ -175,26 +185,23 @@ class TaskSearch:
             return
         columns = draft.robot.indices(draft.parts.arm.joints)
         others = _elsewhere(draft.search, draft.home[columns])
-        hand: dict[str, Plain] = {"hand": "open"} if draft.parts.hand else {}
+        hand: dict[str, Plain] = {draft.hand_name: "open"} if draft.parts.hand else {}
         for a, b in itertools.islice(zip(others[::2], others[1::2], strict=False), MOVES):
             poses = {
-                name: Entry({"arm": [round(float(value), 3) for value in arm], **hand}, why)
+                name: Entry({draft.arm_name: [round(float(value), 3) for value in arm], **hand}, why)
                 for name, arm, why in (("first", a, "for the first task: free, and inside the limits"), ("second", b, ""))
             }
             names = ["first", "second", "home"]
             entries = {
                 **_head("moves", "The arm moves between named poses."),
                 "steps": Entry([{"move": {"to": name}} for name in names]),
-                "expect": Entry([{"at_pose": {"pose": "home", "group": "arm", "within": "2 deg"}}]),
+                "expect": Entry([{"at_pose": {"pose": "home", "group": draft.arm_name, "within": "2 deg"}}]),
             }
             yield _Candidate("moves", entries, "the arm moves between three poses", poses)
 
     def _waits(self) -> _Candidate:
-        entries = {**_head("wait", "The robot holds still."), "steps": Entry([{"wait": "1 s"}])}
-        candidate = _Candidate("wait", entries, "the robot holds still", {})
-        if not (self._plans(candidate) and self._passes(candidate)):
-            self._progress("not even that")
-        return candidate
+        entries = {**_head("wait", "The robot holds still."), "steps": Entry([{"wait": "0.5 s"}])}
+        return _Candidate("wait", entries, "the robot holds still", {})
 
     def _closes(self) -> Iterator[_Candidate]:
         if self._draft.parts.hand is None:
@@ -202,7 +209,7 @@ class TaskSearch:
         entries = {
             **_head("open_close", "The hand closes and opens."),
             "steps": Entry([{"move": {"to": "closed"}}, {"move": {"to": "open"}}]),
-            "expect": Entry([{"at_pose": {"pose": "open", "group": "hand", "within": "5 deg"}}]),
+            "expect": Entry([{"at_pose": {"pose": "open", "group": self._draft.hand_name, "within": "5 deg"}}]),
         }
         yield _Candidate("open_close", entries, "the hand closes and opens", {})
 

@@ -106,6 +106,10 @@ class HomeSearch:
         near = 1.0 / (1.0 + 0.15 * float(np.square(arm - self.middle).sum()))
         return bend * room * pointing * near
 
+    def within(self, arm: Array) -> bool:
+        """Whether a configuration is inside the limits."""
+        return bool(np.all((arm >= self.lower) & (arm <= self.upper)))
+
     def free(self, arm: Array) -> bool:
         """Whether the robot is clear of itself and the floor."""
         return not self.query.touches(self.whole(arm))

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from manipcli.onboard.controllers_file import guess_controllers
+from manipcli.description.srdf import read_srdf
+from manipcli.onboard.controllers_file import ControllersGuess
 from manipcli.onboard.first_task import TaskSearch
+from manipcli.onboard.from_srdf import stated_parts
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
 from manipcli.onboard.source import read_source
 from manipcli.onboard.summary import summary
@@ -75,7 +77,11 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         allow_outside=request.allow_outside,
     )
     on_progress("looking for the arm, the hand and a start")
-    draft = draft_robot(source.robot, floor_scene())
+    stated = None
+    if request.srdf is not None:
+        srdf = read_srdf(request.srdf, package_path=request.package_path, arguments=request.arguments)
+        stated = stated_parts(source.robot, srdf)
+    draft = draft_robot(source.robot, floor_scene(), stated)
     head = _head(request)
 
     with TemporaryDirectory(prefix="manipcli-") as scratch:
@@ -88,15 +94,13 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         write_robot({})
         on_progress("tuning gains")
         parts = draft.parts
-        controllers = guess_controllers(
+        guess = ControllersGuess(
             folder / "robot.yaml",
-            folder,
             parts.arm.joints if parts.arm else (),
             parts.hand.joints if parts.hand else (),
             package_path=request.package_path,
             allow_outside=request.allow_outside,
         )
-        (folder / "controllers.yaml").write_text(controllers.text)
         search = TaskSearch(
             folder,
             draft,
@@ -105,6 +109,13 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
             allow_outside=request.allow_outside,
             on_progress=on_progress,
         )
+        why: str | None = ""
+        for variant in guess.variants():
+            controllers = variant(why)
+            (folder / "controllers.yaml").write_text(controllers.text)
+            why = search.unsteady()
+            if why is None:
+                break
         task = search.search()
     task_file = f"tasks/{task.name}.yaml"
     entries = {**source.entries, **_with_poses(draft, task.poses)}

@@ -17,7 +17,8 @@ from manipcli.model.configuration import with_mimics, zero_configuration
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.onboard.closure import Closure, HandShape, guess_closure
-from manipcli.onboard.home import Home, HomeSearch, guess_home
+from manipcli.onboard.from_srdf import StatedParts
+from manipcli.onboard.home import CLEARANCES, Home, HomeSearch, guess_home
 from manipcli.onboard.limits import ProposedLimits, propose_limits
 from manipcli.onboard.parts import Hand, RobotParts, guess_parts
 from manipcli.onboard.shape_points import ShapePoints
@@ -42,6 +43,7 @@ class RobotDraft:
     Attributes:
         robot: with its mount, tool and limits, without groups and poses.
         parts: its arm and hand.
+        arm_name, hand_name: of their groups.
         entries: of the robot file, behind `robot`, `description` and `args`.
         home: (n) the start.
         search: scores of configurations of the arm; None without an arm.
@@ -51,6 +53,8 @@ class RobotDraft:
 
     robot: RobotModel
     parts: RobotParts
+    arm_name: str
+    hand_name: str
     entries: Mapping[str, Entry]
     home: Array
     search: HomeSearch | None
@@ -59,35 +63,40 @@ class RobotDraft:
     notes: tuple[str, ...]
 
 
-def draft_robot(bare: RobotModel, scene: Scene) -> RobotDraft:
+def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = None) -> RobotDraft:
     """Everything about a robot that its description leaves open.
 
     Args:
         bare: the robot of a description, with its root at the world's origin.
         scene: the floor.
+        stated: what an SRDF states; it replaces guesses.
     """
     kinematics = Kinematics(bare)
     points = ShapePoints(kinematics)
     parts = guess_parts(bare, points, kinematics)
-    notes: list[str] = []
+    if stated is not None:
+        parts = stated.merged(parts)
+    names = (stated.arm_name, stated.hand_name) if stated is not None else ("arm", "hand")
+    notes: list[str] = list(stated.notes) if stated is not None else []
     arm = parts.arm.joints if parts.arm else ()
     fingers = parts.hand.joints if parts.hand else ()
     zero = zero_configuration(bare)
-    closure, frame, shape = _hand(bare, parts.hand, kinematics, points, zero, notes)
+    closure, frame, shape = _hand(bare, parts.hand, kinematics, points, zero, notes, stated)
     limits = propose_limits(kinematics, arm, fingers, _lengths(kinematics, points, (*arm, *fingers), zero))
     tool, tool_entry = _tool(parts, frame)
     mount, mount_entry = _mount(kinematics, points, parts, shape, closure, zero)
     robot = replace(bare, tool=tool, X_WB=mount, joints=_limited(bare, limits))
     kinematics = Kinematics(robot)
     opened = np.array(zero) if closure is None or shape is None else np.array(shape.whole(closure.opened))
-    ignore = _within_hand(robot, parts.hand)
+    touching = stated.touching if stated is not None else ()
+    ignore = (*_within_hand(robot, parts.hand), *touching)
     home, search = Home(opened, ""), None
     ignored: tuple[tuple[str, str], ...] = ()
     if parts.arm is not None and tool is not None:
         search = HomeSearch(
             kinematics, scene, arm, tool.link, tool.X_LT, q=opened, ignore=ignore, down=parts.hand is not None
         )
-        found = guess_home(search)
+        found = _stated_home(search, arm, stated, notes) or guess_home(search)
         if found is None:
             home, ignored = _least_touching(search, notes)
         else:
@@ -95,12 +104,14 @@ def draft_robot(bare: RobotModel, scene: Scene) -> RobotDraft:
     entries: dict[str, Entry] = {}
     if mount_entry is not None:
         entries["mount"] = mount_entry
-    entries["groups"] = Entry(_groups(parts))
+    entries["groups"] = Entry(_groups(parts, *names))
+    if touching:
+        entries["collision_ignore"] = Entry([list(pair) for pair in touching], "`disable_collisions` of the SRDF")
     if ignored:
         entries["collision_ignore"] = Entry(
-            [list(pair) for pair in ignored], "they touch in every configuration that was tried", True
+            [list(pair) for pair in (*touching, *ignored)], "they touch in every configuration that was tried", True
         )
-    poses = _poses(robot, parts, home, closure)
+    poses = _poses(robot, parts, home, closure, *names, stated)
     if poses:
         entries["poses"] = Entry(poses)
     if tool_entry is not None:
@@ -108,12 +119,26 @@ def draft_robot(bare: RobotModel, scene: Scene) -> RobotDraft:
     if limits:
         entries["limits"] = Entry(_limit_entries(limits))
     return RobotDraft(
-        replace(robot, collision_ignore=ignored), parts, entries, home.q, search, closure, frame, tuple(notes)
+        replace(robot, collision_ignore=(*touching, *ignored)),
+        parts,
+        *names,
+        entries,
+        home.q,
+        search,
+        closure,
+        frame,
+        tuple(notes),
     )
 
 
 def _hand(
-    robot: RobotModel, hand: Hand | None, kinematics: Kinematics, points: ShapePoints, zero: Array, notes: list[str]
+    robot: RobotModel,
+    hand: Hand | None,
+    kinematics: Kinematics,
+    points: ShapePoints,
+    zero: Array,
+    notes: list[str],
+    stated: StatedParts | None,
 ) -> tuple[Closure | None, ToolFrame | None, HandShape | None]:
     if hand is None:
         return None, None, None
@@ -126,6 +151,8 @@ def _hand(
     if not touching:
         notes.append("the hand has no collision shapes, so that it cannot hold anything")
     closure = guess_closure(shape)
+    if stated is not None and (ends := stated.ends(shape)) is not None:
+        closure = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: widest and narrowest")
     closure = replace(closure, closed=_before_overlap(robot, kinematics, shape, closure))
     return closure, guess_tool_frame(shape, closure, width=BLOCK), shape
 
@@ -233,31 +260,56 @@ def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple: 
     return tuple(found)
 
 
-def _groups(parts: RobotParts) -> dict[str, Entry]:
+def _groups(parts: RobotParts, arm_name: str, hand_name: str) -> dict[str, Entry]:
     found: dict[str, Entry] = {}
     if parts.arm is not None:
         why = parts.arm_evidence
         if parts.others:
             why += f"; not commanded, held by brakes: {listed(parts.others)}"
-        found["arm"] = Entry({"chain": {"base": parts.arm.base, "tip": parts.arm.tip}}, why)
+        found[arm_name] = Entry({"chain": {"base": parts.arm.base, "tip": parts.arm.tip}}, why)
     if parts.hand is not None:
-        found["hand"] = Entry({"joints": list(parts.hand.joints)}, parts.hand_evidence)
+        found[hand_name] = Entry({"joints": list(parts.hand.joints)}, parts.hand_evidence)
     return found
 
 
-def _poses(robot: RobotModel, parts: RobotParts, home: Home, closure: Closure | None) -> dict[str, Entry]:
+def _poses(
+    robot: RobotModel,
+    parts: RobotParts,
+    home: Home,
+    closure: Closure | None,
+    arm_name: str,
+    hand_name: str,
+    stated: StatedParts | None,
+) -> dict[str, Entry]:
     found: dict[str, Entry] = {}
-    hand: dict[str, Plain] = {"hand": "open"} if closure is not None else {}
+    for name, by_group in (stated.poses if stated is not None else {}).items():
+        found[name] = Entry({group: dict(values) for group, values in by_group.items()}, "a state of the SRDF")
+    hand: dict[str, Plain] = {hand_name: "open"} if closure is not None else {}
     if parts.arm is not None:
         arm: list[Plain] = [round(float(home.q[k]), 4) for k in robot.indices(parts.arm.joints)]
-        found["home"] = Entry({"arm": arm, **hand}, home.evidence)
+        found["home"] = Entry({arm_name: arm, **hand}, home.evidence)
     elif hand:
         found["home"] = Entry({**hand})
     if closure is not None:
         rounded = [[round(float(value), 4) for value in values] for values in (closure.opened, closure.closed)]
-        found["open"] = Entry({"hand": [*rounded[0]]}, closure.evidence)
-        found["closed"] = Entry({"hand": [*rounded[1]]})
+        found["open"] = Entry({hand_name: [*rounded[0]]}, closure.evidence)
+        found["closed"] = Entry({hand_name: [*rounded[1]]})
     return found
+
+
+def _stated_home(
+    search: HomeSearch, arm: tuple[str, ...], stated: StatedParts | None, notes: list[str]
+) -> Home | None:
+    """The state of the SRDF with the best score of those that are free; the one called `home` if it is."""
+    states = stated.arm_states(arm) if stated is not None else {}
+    search.keep(CLEARANCES[-1])
+    free = {name: q for name, q in states.items() if search.free(q) and search.within(q)}
+    if "home" in states and "home" not in free:
+        notes.append("the state 'home' of the SRDF is in collision or outside the limits; another home was searched")
+    best = "home" if "home" in free else max(free, key=lambda name: search.score(free[name]), default=None)
+    if best is None or (best != "home" and search.score(free[best]) <= 0.0):
+        return None
+    return Home(search.whole(free[best]), f"the state '{best}' of the SRDF")
 
 
 def _limit_entries(limits: Mapping[str, ProposedLimits]) -> dict[str, Entry]:
