@@ -206,10 +206,15 @@ class TaskSearch:
     def _closes(self) -> Iterator[_Candidate]:
         if self._draft.parts.hand is None:
             return
+        robot, hand = self._draft.robot, self._draft.parts.hand
+        units = {robot.joint(name).unit for name in hand.joints}
+        within: dict[str, Plain] = ({"within": "5 deg"} if "rad" in units else {}) | (
+            {"slide": "3 mm"} if "m" in units else {}
+        )
         entries = {
             **_head("open_close", "The hand closes and opens."),
             "steps": Entry([{"move": {"to": "closed"}}, {"move": {"to": "open"}}]),
-            "expect": Entry([{"at_pose": {"pose": "open", "group": self._draft.hand_name, "within": "5 deg"}}]),
+            "expect": Entry([{"at_pose": {"pose": "open", "group": self._draft.hand_name, **within}}]),
         }
         yield _Candidate("open_close", entries, "the hand closes and opens", {})
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,7 +13,7 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import digits
 from manipcli.core.units import readable
-from manipcli.model.collision import CollisionChecker
+from manipcli.model.collision import CollisionChecker, pairs
 from manipcli.model.configuration import with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.scene.scene import Scene
@@ -20,6 +21,9 @@ from manipcli.scene.scene import Scene
 SAMPLES: Final = 1500
 TRIED: Final = 300
 """Configurations checked for collisions, the best first."""
+LASTING: Final = 0.9
+"""Pairs of links near each other in this share of the configurations are built so."""
+ROBOT: Final = "robot/"
 CENTRAL: Final = 0.8
 """Share of the range of each joint, around its middle, in which a start may be."""
 HALF_TURN: Final = np.pi
@@ -34,10 +38,11 @@ HIGH: Final = 0.15
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Home:
-    """A start configuration: `q` (n), and why."""
+    """A start configuration: `q` (n), why, and `touching`: pairs of links that touch nearly everywhere."""
 
     q: Array
     evidence: str
+    touching: tuple[tuple[str, str], ...] = ()
 
 
 class HomeSearch:
@@ -66,7 +71,7 @@ class HomeSearch:
             down: prefer that the tool's z axis points down, as to pick from a table.
         """
         robot = kinematics.robot
-        self._kinematics, self._link, self._X_LT, self._q, self._down = kinematics, link, X_LT, q, down
+        self._link, self._X_LT, self._q, self._down = link, X_LT, q, down
         self._robot, self._columns = robot, robot.indices(joints)
         ranges = np.array([robot.joint(name).limits.within_soft for name in joints])
         self.lower = np.where(np.isfinite(ranges[:, 0]), ranges[:, 0], -HALF_TURN)
@@ -74,13 +79,23 @@ class HomeSearch:
         self._limited = np.isfinite(ranges).all(axis=1)
         middle = np.where(self._limited, (self.lower + self.upper) / 2.0, 0.0)
         self.middle = np.where((self.lower < -0.1) & (self.upper > 0.1), np.clip(0.0, self.lower, self.upper), middle)
-        self._checker = CollisionChecker(kinematics, scene, ignore=ignore)
+        self._kinematics, self._scene = kinematics, scene
+        self._ignored = tuple(ignore)
+        moved = robot.descendants(robot.joint(joints[0]).child)
+        self._still = [link.name for link in robot.links if link.name not in moved]
+        self.ignore(())
+
+    def ignore(self, pairs: Sequence[tuple[str, str]]) -> None:
+        """From now on these pairs of links may touch, too."""
+        self._ignored += tuple(pairs)
+        self._checker = CollisionChecker(self._kinematics, self._scene, ignore=self._ignored)
         self.keep(CLEARANCES[0])
 
     def keep(self, clearance: float) -> None:
         """From now on parts are apart by this clearance [m]."""
         self.clearance = clearance
-        self.query = self._checker.at(margin=clearance)
+        floor = [pair for body in self._scene.bodies for pair in pairs(self._still, body.name)]
+        self.query = self._checker.at(margin=clearance, ignore=(*floor, *_pairs_of(self._still)))
 
     def whole(self, arm: Array) -> Array:
         """(n) all joints with those of the arm at `arm` (m)."""
@@ -106,6 +121,15 @@ class HomeSearch:
         near = 1.0 / (1.0 + 0.15 * float(np.square(arm - self.middle).sum()))
         return bend * room * pointing * near
 
+    def lasting(self, configurations: Sequence[Array]) -> tuple[tuple[str, str], ...]:
+        """The pairs of links that are near each other in nearly all of the configurations (m)."""
+        counts: Counter[tuple[str, str]] = Counter()
+        for arm in configurations:
+            for hit in self.query.every(self.whole(arm)):
+                if hit.a.startswith(ROBOT) and hit.b.startswith(ROBOT):
+                    counts[hit.a.removeprefix(ROBOT), hit.b.removeprefix(ROBOT)] += 1
+        return tuple(pair for pair, count in counts.items() if count >= LASTING * len(configurations))
+
     def within(self, arm: Array) -> bool:
         """Whether a configuration is inside the limits."""
         return bool(np.all((arm >= self.lower) & (arm <= self.upper)))
@@ -122,17 +146,26 @@ def guess_home(search: HomeSearch, *, seed: int = 0) -> Home | None:
     drawn = [search.middle, *rng.uniform(centre - half, centre + half, (SAMPLES, len(half)))]
     scores = np.array([search.score(arm) for arm in drawn])
     order = np.argsort(-scores, kind="stable")
-    best = None
+    best, lasting = _first_free(search, drawn, scores, order), ()
+    if best is None:
+        lasting = search.lasting([drawn[int(k)] for k in order[:TRIED]])
+        search.ignore(lasting)
+        best = _first_free(search, drawn, scores, order)
+    if best is None:
+        return None
+    best = _tidied(search, np.array(best))
+    return Home(search.whole(best), _evidence(search, best, scores), lasting)
+
+
+def _first_free(search: HomeSearch, drawn: Sequence[Array], scores: Array, order: Array) -> Array | None:
+    """The best configuration without contacts, with the largest clearance for which there is one."""
     for clearance in CLEARANCES:
         search.keep(clearance)
         tried = (drawn[int(k)] for k in order if scores[k] > 0.0)
         best = next((arm for arm in itertools.islice(tried, TRIED) if search.free(arm)), None)
         if best is not None:
-            break
-    if best is None:
-        return None
-    best = _tidied(search, np.array(best))
-    return Home(search.whole(best), _evidence(search, best, scores))
+            return best
+    return None
 
 
 def _tidied(search: HomeSearch, arm: Array) -> Array:
@@ -168,3 +201,8 @@ def _evidence(search: HomeSearch, arm: Array, scores: Array) -> str:
         f"best of {len(scores)} configurations (seed 0): {room}all parts {readable(search.clearance, 'm')} apart, "
         f"smallest singular value of the tool's Jacobian {digits(least)}"
     )
+
+
+def _pairs_of(links: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Pairs of parts of these links."""
+    return tuple((f"{ROBOT}{a}", f"{ROBOT}{b}") for a, b in itertools.combinations(links, 2))

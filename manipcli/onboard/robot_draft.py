@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.core.text import digits, listed
+from manipcli.core.text import listed
 from manipcli.core.units import readable
 from manipcli.model.collision import CollisionChecker
 from manipcli.model.configuration import with_mimics, zero_configuration
@@ -31,6 +31,8 @@ BLOCK: Final = 0.04
 """[m] Edge of the block that a hand is asked to pick."""
 HAND_HEIGHT: Final = 0.1
 """[m] A hand alone is held so high above the floor."""
+ABOVE_FLOOR: Final = 0.006
+"""[m] Links that could move, as wheels, are so high above the floor: more than the clearance of plans."""
 OVERLAP: Final = 1e-3
 """[m] Fingers that close stop before they overlap by more."""
 STEPS: Final = 40
@@ -100,7 +102,7 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
         if found is None:
             home, ignored = _least_touching(search, notes)
         else:
-            home = found
+            home, ignored = found, found.touching
     entries: dict[str, Entry] = {}
     if mount_entry is not None:
         entries["mount"] = mount_entry
@@ -109,7 +111,7 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
         entries["collision_ignore"] = Entry([list(pair) for pair in touching], "`disable_collisions` of the SRDF")
     if ignored:
         entries["collision_ignore"] = Entry(
-            [list(pair) for pair in (*touching, *ignored)], "they touch in every configuration that was tried", True
+            [list(pair) for pair in (*touching, *ignored)], "they touch in nearly every configuration that was tried", True
         )
     poses = _poses(robot, parts, home, closure, *names, stated)
     if poses:
@@ -241,7 +243,9 @@ def _mount(
         first = robot.joint(arm.joints[0]).child if arm is not None else ""
         still = [link.name for link in robot.links if not first or link.name not in robot.descendants(first)]
         low = float(points.at(zero, still)[:, 2].min(initial=0.0))
-        up, why = (-low, "its lowest link is on the floor") if low < -2e-3 else (0.0, "")
+        moving = {name for joint in robot.joints if joint.moves for name in robot.descendants(joint.child)}
+        wheels = float(points.at(zero, [name for name in still if name in moving])[:, 2].min(initial=1.0)) - ABOVE_FLOOR
+        up, why = (-min(low, wheels), "its lowest link is on the floor") if min(low, wheels) < -2e-3 else (0.0, "")
     if up <= 0.0:
         return Transform.identity(), None
     up = round(float(np.ceil(up * 1000.0) / 1000.0), 3)
@@ -327,11 +331,10 @@ def _limit_entries(limits: Mapping[str, ProposedLimits]) -> dict[str, Entry]:
 
 def _least_touching(search: HomeSearch, notes: list[str]) -> tuple[Home, tuple[tuple[str, str], ...]]:
     """The middle of the ranges, and the pairs of links that touch there: nothing better was found."""
-    q = search.whole(search.middle)
-    hits = [hit for hit in search.query.every(q) if hit.a.startswith("robot/") and hit.b.startswith("robot/")]
-    pairs = tuple((hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")) for hit in hits)
+    touching = search.lasting([search.middle])
     notes.append(
-        f"no start free of collision was found; 'home' is the middle of the ranges, where {digits(len(pairs))} pairs of "
-        "links touch: they are under `collision_ignore`"
+        "no start free of collision was found; 'home' is the middle of the ranges: move the robot or its obstacles"
+        + (f"; links that touch there are under `collision_ignore`: {len(touching)} pairs" if touching else "")
     )
-    return Home(q, "the middle of the ranges: no configuration without contacts was found"), pairs
+    why = "the middle of the ranges: no configuration without contacts was found"
+    return Home(search.whole(search.middle), why), touching
