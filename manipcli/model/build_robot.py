@@ -8,12 +8,13 @@ from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, listed
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
 from manipcli.description.expanded import unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.joint import UNSTATED
 from manipcli.description.urdf.link import REGULARISED
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
@@ -196,7 +197,11 @@ class _Descriptions:
                 self._reporter.findings.append(dataclasses.replace(finding, hint=hint or None))
         if parts is not None:
             # Other notes are for the author of a description, not for its users.
-            read = [each for each in parts.findings if each.severity == "warning" or each.code == REGULARISED]
+            read = [
+                each
+                for each in parts.findings
+                if (each.severity == "warning" and each.code != UNSTATED) or each.code == REGULARISED
+            ]
             self._reporter.findings += list(dict.fromkeys(read))
         return parts
 
@@ -296,7 +301,25 @@ def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...])
         )
         hint = f"add it to the robot file: limits: {{{without[0]}: {{acceleration: ...}}}}"
         reporter.note("ROBOT330", message, ("limits",), hint=hint)
+    _unlimited(reporter, [joint for joint in result if joint.independent])
     return tuple(result)
+
+
+def _unlimited(reporter: Reporter, joints: Sequence[Joint]) -> None:
+    """One warning each about all joints without a velocity and without an effort limit, with the lines to add."""
+    slow = [joint for joint in joints if joint.limits.velocity is None]
+    if slow:
+        names = listed([joint.name for joint in slow])
+        lines = ", ".join(f"{j.name}: {{velocity: {'0.1 m/s' if j.unit == 'm' else '1 rad/s'}}}" for j in slow)
+        message = f"no velocity limit for {names}: motions of these joints cannot be planned"
+        hint = f"add the limits to the robot file, such as: limits: {{{lines}}}"
+        reporter.warning("ROBOT331", message, ("limits",), hint=hint)
+    weak = [joint.name for joint in joints if joint.limits.effort is None]
+    if weak:
+        lines = ", ".join(f"{name}: {{effort: ...}}" for name in weak)
+        message = f"no effort limit for {listed(weak)}: the efforts of these joints are not limited"
+        hint = f"add those of the data sheet to the robot file: limits: {{{lines}}}"
+        reporter.warning("ROBOT332", message, ("limits",), hint=hint)
 
 
 def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> JointLimits:
