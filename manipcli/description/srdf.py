@@ -111,9 +111,7 @@ def _groups(root: Element, findings: list[Diagnostic]) -> Iterator[SrdfGroup]:
         chain = element.first("chain")
         yield SrdfGroup(
             _needed(element, "name", findings),
-            None
-            if chain is None
-            else (_needed(chain, "base_link", findings), _needed(chain, "tip_link", findings)),
+            None if chain is None else (_needed(chain, "base_link", findings), _needed(chain, "tip_link", findings)),
             tuple(_needed(joint, "name", findings) for joint in element.all("joint")),
             tuple(_needed(link, "name", findings) for link in element.all("link")),
             tuple(_needed(group, "name", findings) for group in element.all("group")),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
 
@@ -100,14 +100,14 @@ class HandShape:
         """(3,) in P: the joint at which a finger begins."""
         first = next(joint.child for joint in self.robot.joints if joint.child in links and joint.moves)
         q = self.whole(fingers)
-        return np.asarray((self._kinematics.forward(q, self.hand.palm).inverse() @ self._kinematics.forward(q, first)).p)
+        return np.asarray(
+            (self._kinematics.forward(q, self.hand.palm).inverse() @ self._kinematics.forward(q, first)).p
+        )
 
     def last_axis(self, links: tuple[str, ...], fingers: Array) -> Array:
         """(3,) in P: the axis of the last joint of a finger that moves."""
         below = {joint.child for joint in self.robot.joints if joint.child in links and joint.moves}
-        last = next(
-            joint for joint in reversed(self.robot.joints) if joint.child in below
-        )
+        last = next(joint for joint in reversed(self.robot.joints) if joint.child in below)
         q = self.whole(fingers)
         X_PL = self._kinematics.forward(q, self.hand.palm).inverse() @ self._kinematics.forward(q, last.child)
         return np.asarray(X_PL.R @ last.axis)
@@ -149,7 +149,7 @@ class HandShape:
         X_PW = self._kinematics.forward(q, self.hand.palm).inverse()
         first = [joint.child for joint in self.robot.joints if joint.moves and joint.parent == self.hand.palm]
         first = first or [branch[0] for branch in self.hand.branches]
-        return np.mean([(X_PW @ self._kinematics.forward(q, link)).p for link in first], axis=0)
+        return np.asarray(np.mean([(X_PW @ self._kinematics.forward(q, link)).p for link in first], axis=0))
 
 
 def guess_closure(shape: HandShape) -> Closure:
@@ -187,9 +187,31 @@ def _ends(shape: HandShape, rest: Array, lower: Array, upper: Array) -> Closure:
     opened = np.where(idle, rest, np.where(upwards, lower, upper))
     closed = np.where(idle, rest, np.where(upwards, upper, lower))
     out = _outward(shape, fingers, opened, (opened + closed) / 2.0)
+    return Closure(opened, closed, out, fingers, _evidence(shape, fingers, opened, closed))
+
+
+def knuckles_only(shape: HandShape, closure: Closure) -> Closure | None:
+    """The same hand closed by the first joint of each finger that closes it, the others open; None if that is the same.
+
+    Fingers that bend at all their joints curl above a small object; those that bend at their knuckles pinch it.
+    """
+    robot, joints = shape.robot, shape.hand.joints
+    closing = {name for name, a, b in zip(joints, closure.opened, closure.closed, strict=True) if a != b}
+    below = {
+        name
+        for name in closing
+        for other in closing - {name}
+        if robot.joint(name).child in robot.descendants(robot.joint(other).child)
+    }
+    if not below:
+        return None
+    closed = np.where([name in below for name in joints], closure.opened, closure.closed)
+    return replace(closure, closed=closed, evidence=_evidence(shape, closure.fingers, closure.opened, closed))
+
+
+def _evidence(shape: HandShape, fingers: tuple[tuple[str, ...], ...], opened: Array, closed: Array) -> str:
     wide, narrow = (tip_distance(shape, fingers, positions) for positions in (opened, closed))
-    evidence = f"the finger tips are {readable(wide, 'm')} apart when open, {readable(narrow, 'm')} when closed"
-    return Closure(opened, closed, out, fingers, evidence)
+    return f"the finger tips are {readable(wide, 'm')} apart when open, {readable(narrow, 'm')} when closed"
 
 
 def _spreads(shape: HandShape, rest: Array, positions: Array) -> npt.NDArray[np.bool_]:
@@ -199,7 +221,7 @@ def _spreads(shape: HandShape, rest: Array, positions: Array) -> npt.NDArray[np.
 
 
 def _facing(shape: HandShape, rest: Array, lower: Array, upper: Array) -> Array:
-    """(m) Rest, with the joints that spread the fingers where the tips are much farther apart, if there is such a place.
+    """(m) Rest, with the joints that spread the fingers where the tips are much farther apart, if that exists.
 
     Fingers that point to the same side at rest then face each other.
     """

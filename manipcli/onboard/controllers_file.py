@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from manipcli.core.errors import InvalidInput
-from manipcli.onboard.writer import Entry, written
-from manipcli.spec.source.tree import Plain
+from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.text import did_you_mean, listed
+from manipcli.model.robot import RobotModel
+from manipcli.onboard.writer import Entry, Value, written
+from manipcli.spec.load import load_controllers, read_bytes
+from manipcli.task.vocabulary import controllers_spec
 from manipcli.tuning.propose_gains import Tuning, Wish, tune
 
 PERIOD: Final = 0.001
@@ -34,6 +37,35 @@ _HEAD: Final = (
     "yaml-language-server: $schema=schemas/controllers.json",
     "Written by `manipcli init --robot`; `manipcli tune robot.yaml controllers.yaml` proposes other gains.",
 )
+
+
+def given_controllers(path: Path, robot: RobotModel) -> WrittenControllers:
+    """A file of the user, of ours or of ROS, unchanged.
+
+    Raises:
+        InvalidInput: it is invalid, or names joints that the robot does not have.
+    """
+    file = load_controllers(path, model=controllers_spec())
+    known = robot.joint_names
+    findings = [
+        Diagnostic(
+            "INIT001",
+            f"controller '{name}': joint '{joint}' is not in the robot",
+            file.place("controllers", name, "joints", k),
+            did_you_mean(joint, known, kind="joints"),
+        )
+        for name, spec in file.spec.controllers.items()
+        for k, joint in enumerate(spec.joints)
+        if joint not in known
+    ]
+    if findings:
+        raise InvalidInput(findings)
+    commanded = {joint for spec in file.spec.controllers.values() for joint in spec.joints}
+    notes = [f"controllers.yaml is a copy of {path}"]
+    left = [joint.name for joint in robot.joints if joint.independent and joint.name not in commanded]
+    if left:
+        notes.append(f"no controller of it moves {listed(left)}")
+    return WrittenControllers(read_bytes(path).decode("utf-8", "replace"), {}, tuple(notes))
 
 
 class ControllersGuess:
@@ -124,26 +156,29 @@ def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | 
 
 
 def _gripper(joints: tuple[str, ...], tuning: Tuning | None, position: str | None) -> dict[str, Entry]:
-    control = {"command_interface": Entry("position", f"by effort: {position}", True)} if position is not None else _gains(joints, tuning)
+    control = (
+        {"command_interface": Entry("position", f"by effort: {position}", True)}
+        if position is not None
+        else _gains(joints, tuning)
+    )
     return {"type": Entry("gripper"), "joints": Entry(list(joints)), **control}
 
 
 def _gains(joints: tuple[str, ...], tuning: Tuning | None) -> dict[str, Entry]:
     if tuning is None:
-        gains: dict[str, Plain] = {name: {"p": 1.0, "d": 0.1} for name in joints}
+        gains: dict[str, Value] = {name: {"p": 1.0, "d": 0.1} for name in joints}
         return {"gains": Entry(gains)}
     by_joint = {tuned.joint: tuned for tuned in tuning.joints}
     rows: dict[str, Entry] = {}
     for name in joints:
         tuned = by_joint[name]
-        row: dict[str, Plain] = {"p": tuned.p, "d": tuned.d}
+        row: dict[str, Value] = {"p": tuned.p, "d": tuned.d}
         if tuned.i:
             row |= {"i": tuned.i, "i_clamp": tuned.i_clamp}
         rows[name] = Entry(row)
     limited = {tuned.limited_by for tuned in (by_joint[name] for name in joints)} - {""}
-    why = f"by `tune`: {tuning.wish.bandwidth:g} Hz, damping {tuning.wish.damping:g}, at the largest inertia of each joint"
+    wish = tuning.wish
+    why = f"by `tune`: {wish.bandwidth:g} Hz, damping {wish.damping:g}, at the largest inertia of each joint"
     if limited:
         why += f"; some are limited by: {', '.join(sorted(limited))}"
     return {"gains": Entry(rows, why)}
-
-

@@ -15,12 +15,12 @@ from manipcli.core.errors import InvalidInput, NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
-from manipcli.onboard.home import HomeSearch
 from manipcli.model.kinematics import Kinematics
+from manipcli.onboard.home import HomeSearch
 from manipcli.onboard.reachable import Spots, reachable_spots
 from manipcli.onboard.robot_draft import BLOCK, RobotDraft
-from manipcli.onboard.writer import Entry, written
-from manipcli.spec.source.tree import Plain
+from manipcli.onboard.writer import Entry, Value, written
+from manipcli.task.load_task import LoadOptions
 
 MOST_PLANS: Final = 10
 MOST_RUNS: Final = 3
@@ -83,7 +83,7 @@ class TaskSearch:
             on_progress: receives what is being tried.
         """
         self._folder, self._draft, self._write_robot = folder, draft, write_robot
-        self._options: pipeline.LoadOptions = {"package_path": package_path, "allow_outside": allow_outside}
+        self._options: LoadOptions = {"package_path": package_path, "allow_outside": allow_outside}
         self._progress = on_progress
         self._causes: list[str] = []
 
@@ -171,9 +171,7 @@ class TaskSearch:
             )
             return
         assert draft.search is not None
-        spots = reachable_spots(
-            Kinematics(draft.robot), draft.search, arm.joints, draft.home, tool_height=edge / 2
-        )
+        spots = reachable_spots(Kinematics(draft.robot), draft.search, arm.joints, draft.home, tool_height=edge / 2)
         if not spots:
             self._causes.append("no place was found that the tool reaches from the top or from the side")
         for one in spots:
@@ -185,11 +183,14 @@ class TaskSearch:
             return
         columns = draft.robot.indices(draft.parts.arm.joints)
         others = _elsewhere(draft.search, draft.home[columns])
-        hand: dict[str, Plain] = {draft.hand_name: "open"} if draft.parts.hand else {}
+        hand: dict[str, Value] = {draft.hand_name: "open"} if draft.parts.hand else {}
         for a, b in itertools.islice(zip(others[::2], others[1::2], strict=False), MOVES):
             poses = {
                 name: Entry({draft.arm_name: [round(float(value), 3) for value in arm], **hand}, why)
-                for name, arm, why in (("first", a, "for the first task: free, and inside the limits"), ("second", b, ""))
+                for name, arm, why in (
+                    ("first", a, "for the first task: free, and inside the limits"),
+                    ("second", b, ""),
+                )
             }
             names = ["first", "second", "home"]
             entries = {
@@ -208,9 +209,11 @@ class TaskSearch:
             return
         robot, hand = self._draft.robot, self._draft.parts.hand
         units = {robot.joint(name).unit for name in hand.joints}
-        within: dict[str, Plain] = ({"within": "5 deg"} if "rad" in units else {}) | (
-            {"slide": "3 mm"} if "m" in units else {}
-        )
+        within: dict[str, Value] = {}
+        if "rad" in units:
+            within["within"] = "5 deg"
+        if "m" in units:
+            within["slide"] = "3 mm"
         entries = {
             **_head("open_close", "The hand closes and opens."),
             "steps": Entry([{"move": {"to": "closed"}}, {"move": {"to": "open"}}]),
@@ -269,9 +272,7 @@ def _pick(spots: Spots, edge: float) -> _Candidate:
                 {"move": {"to": "home"}},
             ]
         ),
-        "expect": Entry(
-            [{"near": {"object": "block", "to": [gx, gy, round(h + edge / 2, 4)], "within": "1.5 cm"}}]
-        ),
+        "expect": Entry([{"near": {"object": "block", "to": [gx, gy, round(h + edge / 2, 4)], "within": "1.5 cm"}}]),
     }
     does = f"a block of {readable(edge, 'm')} is picked from the {spots.approach} and placed on the {support}"
     return _Candidate("pick_place", entries, does, {})

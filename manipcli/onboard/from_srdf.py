@@ -122,9 +122,7 @@ class _Reader:
     def chosen(self) -> tuple[SrdfGroup | None, SrdfGroup | None]:
         """The groups of the hand and of the arm."""
         srdf = self._srdf
-        effectors = sorted(
-            srdf.end_effectors, key=lambda each: -len(self._joints(srdf.group(each.parent_group)))
-        )
+        effectors = sorted(srdf.end_effectors, key=lambda each: -len(self._joints(srdf.group(each.parent_group))))
         for effector in effectors:
             hand = srdf.group(effector.group)
             if hand is not None and self._joints(hand):
@@ -167,7 +165,7 @@ class _Reader:
                 found.add(self._above[name].name)
         if group.chain is not None:
             base, tip = group.chain
-            if all([self._known(name, self._link_names, "link", group.place) for name in (base, tip)]):
+            if all(self._known(name, self._link_names, "link", group.place) for name in (base, tip)):
                 found |= {joint.name for joint in self._between(base, tip, group)}
         for name in group.groups:
             found |= set(self._joints(self._srdf.group(name)) if name != group.name else ())

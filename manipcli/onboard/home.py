@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import digits
@@ -146,7 +147,8 @@ def guess_home(search: HomeSearch, *, seed: int = 0) -> Home | None:
     drawn = [search.middle, *rng.uniform(centre - half, centre + half, (SAMPLES, len(half)))]
     scores = np.array([search.score(arm) for arm in drawn])
     order = np.argsort(-scores, kind="stable")
-    best, lasting = _first_free(search, drawn, scores, order), ()
+    lasting: tuple[tuple[str, str], ...] = ()
+    best = _first_free(search, drawn, scores, order)
     if best is None:
         lasting = search.lasting([drawn[int(k)] for k in order[:TRIED]])
         search.ignore(lasting)
@@ -157,7 +159,7 @@ def guess_home(search: HomeSearch, *, seed: int = 0) -> Home | None:
     return Home(search.whole(best), _evidence(search, best, scores), lasting)
 
 
-def _first_free(search: HomeSearch, drawn: Sequence[Array], scores: Array, order: Array) -> Array | None:
+def _first_free(search: HomeSearch, drawn: Sequence[Array], scores: Array, order: npt.NDArray[np.intp]) -> Array | None:
     """The best configuration without contacts, with the largest clearance for which there is one."""
     for clearance in CLEARANCES:
         search.keep(clearance)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from manipcli.description.srdf import read_srdf
-from manipcli.onboard.controllers_file import ControllersGuess
+from manipcli.onboard.controllers_file import ControllersGuess, WrittenControllers, given_controllers
 from manipcli.onboard.first_task import TaskSearch
 from manipcli.onboard.from_srdf import stated_parts
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
 from manipcli.onboard.source import read_source
 from manipcli.onboard.summary import summary
-from manipcli.onboard.writer import Entry, checks, written
+from manipcli.onboard.writer import Entry, block, checks, written
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.spec.load import load_task_text
@@ -83,6 +83,7 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         stated = stated_parts(source.robot, srdf)
     draft = draft_robot(source.robot, floor_scene(), stated)
     head = _head(request)
+    given = given_controllers(request.controllers, source.robot) if request.controllers is not None else None
 
     with TemporaryDirectory(prefix="manipcli-") as scratch:
         folder = Path(scratch)
@@ -92,15 +93,7 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
             (folder / "robot.yaml").write_text(written(entries, head=head))
 
         write_robot({})
-        on_progress("tuning gains")
         parts = draft.parts
-        guess = ControllersGuess(
-            folder / "robot.yaml",
-            parts.arm.joints if parts.arm else (),
-            parts.hand.joints if parts.hand else (),
-            package_path=request.package_path,
-            allow_outside=request.allow_outside,
-        )
         search = TaskSearch(
             folder,
             draft,
@@ -109,9 +102,21 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
             allow_outside=request.allow_outside,
             on_progress=on_progress,
         )
+        variants: Iterable[Callable[[str], WrittenControllers]]
+        if given is not None:
+            variants = [lambda _: given]
+        else:
+            on_progress("tuning gains")
+            variants = ControllersGuess(
+                folder / "robot.yaml",
+                parts.arm.joints if parts.arm else (),
+                parts.hand.joints if parts.hand else (),
+                package_path=request.package_path,
+                allow_outside=request.allow_outside,
+            ).variants()
         why: str | None = ""
-        for variant in guess.variants():
-            controllers = variant(why)
+        for variant in variants:
+            controllers = variant(why or "")
             (folder / "controllers.yaml").write_text(controllers.text)
             why = search.unsteady()
             if why is None:
@@ -153,9 +158,7 @@ def _with_poses(draft: RobotDraft, poses: Mapping[str, Entry]) -> dict[str, Entr
     """The entries of the draft, with further poses."""
     entries = dict(draft.entries)
     if poses:
-        own = entries["poses"].value
-        assert isinstance(own, dict)
-        entries["poses"] = Entry({**own, **poses})
+        entries["poses"] = Entry({**block(entries["poses"]), **poses})
     return entries
 
 
@@ -169,10 +172,7 @@ def _found(draft: RobotDraft) -> list[str]:
         found.append(f"open and closed: {draft.closure.evidence}")
     if draft.frame is not None:
         found.append(f"tool: in '{draft.frame.link}', {draft.frame.evidence}")
-    for pose in ("home",):
-        poses = draft.entries.get("poses")
-        if poses is not None and isinstance(poses.value, dict) and pose in poses.value:
-            entry = poses.value[pose]
-            if isinstance(entry, Entry) and entry.why:
-                found.append(f"{pose}: {entry.why}")
+    home = block(draft.entries["poses"]).get("home") if "poses" in draft.entries else None
+    if home is not None and home.why:
+        found.append(f"home: {home.why}")
     return found

@@ -8,6 +8,7 @@ not matter, except between frames at the same place.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -167,7 +168,7 @@ class _Tree:
     def _length(self, chain: tuple[Joint, ...]) -> float:
         """[m] of a chain: the sum of the distances between its joints."""
         places = [self._kinematics.forward(self._zero, joint.child).p for joint in chain]
-        return float(sum(np.linalg.norm(b - a) for a, b in zip(places, places[1:], strict=False)))
+        return float(sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(places)))
 
     def _as_hand(self, branches: tuple[Joint, ...], chain: tuple[Joint, ...]) -> tuple[Hand | None, str]:
         below = [sorted(self._robot.descendants(joint.child)) for joint in branches]
@@ -237,4 +238,3 @@ class _Tree:
             return far, any(word in link for word in _TOOLS)
 
         return max(bare, key=order)
-

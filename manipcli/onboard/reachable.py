@@ -1,9 +1,8 @@
-"""Where a hand can pick and place: places on the floor or on a desk that the arm reaches with the tool the right way."""
+"""Where a hand can pick and place: on the floor or on a desk that the arm reaches with the tool the right way."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -51,7 +50,13 @@ class Spots:
 
 
 def reachable_spots(
-    kinematics: Kinematics, search: HomeSearch, joints: tuple[str, ...], home: Array, *, tool_height: float, seed: int = 0
+    kinematics: Kinematics,
+    search: HomeSearch,
+    joints: tuple[str, ...],
+    home: Array,
+    *,
+    tool_height: float,
+    seed: int = 0,
 ) -> list[Spots]:
     """Candidates, the most dexterous first; those from the top before those from the side.
 
@@ -81,7 +86,7 @@ def reachable_spots(
         own = [
             spots
             for h, r in grid[:EXAMINED]
-            if (spots := reach.spots(open_, h, r, front, axis, tool_height, approach)) is not None  # type: ignore[arg-type]
+            if (spots := reach.spots(open_, h, r, front, axis, tool_height, approach)) is not None
         ]
         found += sorted(own, key=lambda spots: -spots.score)
     return found
@@ -100,7 +105,9 @@ class _Reach:
             aside = float(np.radians(degrees))
             if 2.0 * r * np.sin(aside) < LEAST_APART:
                 continue
-            places = [(float(axis[0] + r * np.cos(a)), float(axis[1] + r * np.sin(a))) for a in (front - aside, front + aside)]
+            places = [
+                (float(axis[0] + r * np.cos(a)), float(axis[1] + r * np.sin(a))) for a in (front - aside, front + aside)
+            ]
             scores = []
             for (x, y), a in zip(places, (front - aside, front + aside), strict=True):
                 for z in (h + up, h + up + ABOVE):

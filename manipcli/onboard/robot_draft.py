@@ -12,20 +12,20 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import listed
 from manipcli.core.units import readable
+from manipcli.description.elements import Joint
 from manipcli.model.collision import CollisionChecker
 from manipcli.model.configuration import with_mimics, zero_configuration
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel, Tool
-from manipcli.onboard.closure import Closure, HandShape, guess_closure
+from manipcli.onboard.closure import Closure, HandShape, guess_closure, knuckles_only
 from manipcli.onboard.from_srdf import StatedParts
 from manipcli.onboard.home import CLEARANCES, Home, HomeSearch, guess_home
 from manipcli.onboard.limits import ProposedLimits, propose_limits
 from manipcli.onboard.parts import Hand, RobotParts, guess_parts
 from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.tool_frame import ToolFrame, guess_tool_frame
-from manipcli.onboard.writer import Entry
+from manipcli.onboard.writer import Entry, Value
 from manipcli.scene.scene import Scene
-from manipcli.spec.source.tree import Plain
 
 BLOCK: Final = 0.04
 """[m] Edge of the block that a hand is asked to pick."""
@@ -111,7 +111,9 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
         entries["collision_ignore"] = Entry([list(pair) for pair in touching], "`disable_collisions` of the SRDF")
     if ignored:
         entries["collision_ignore"] = Entry(
-            [list(pair) for pair in (*touching, *ignored)], "they touch in nearly every configuration that was tried", True
+            [list(pair) for pair in (*touching, *ignored)],
+            "they touch in nearly every configuration that was tried",
+            True,
         )
     poses = _poses(robot, parts, home, closure, *names, stated)
     if poses:
@@ -146,7 +148,7 @@ def _hand(
         return None, None, None
     shape = HandShape(hand, kinematics, points, zero)
     links = [link for branch in hand.branches for link in branch]
-    bare = [link for link in points.missing(links)]
+    bare = points.missing(links)
     if len(bare) == len(links):
         notes.append("the hand has no shapes at all: its poses and the tool are guessed from its frames alone")
     touching = [link for link in links if robot.link(link).collisions]
@@ -154,9 +156,18 @@ def _hand(
         notes.append("the hand has no collision shapes, so that it cannot hold anything")
     closure = guess_closure(shape)
     if stated is not None and (ends := stated.ends(shape)) is not None:
-        closure = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: widest and narrowest")
-    closure = replace(closure, closed=_before_overlap(robot, kinematics, shape, closure))
-    return closure, guess_tool_frame(shape, closure, width=BLOCK), shape
+        stops = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: widest and narrowest")
+        options: list[Closure | None] = [stops]
+    else:
+        options = [closure, knuckles_only(shape, closure)]
+    found = []
+    for option in filter(None, options):
+        stopped = replace(option, closed=_before_overlap(robot, kinematics, shape, option))
+        found.append((stopped, guess_tool_frame(shape, stopped, width=BLOCK)))
+    closure, frame = max(
+        found, key=lambda pair: (pair[1].narrowest < BLOCK, float(pair[1].X_PT.p @ pair[1].X_PT.R[:, 2]))
+    )
+    return closure, frame, shape
 
 
 def _before_overlap(robot: RobotModel, kinematics: Kinematics, shape: HandShape, closure: Closure) -> Array:
@@ -212,7 +223,7 @@ def _lengths(kinematics: Kinematics, points: ShapePoints, joints: Sequence[str],
 
 def _tool(parts: RobotParts, frame: ToolFrame | None) -> tuple[Tool | None, Entry | None]:
     if frame is not None:
-        pose: dict[str, Plain] = {"xyz": [float(value) + 0.0 for value in frame.X_PT.p]}
+        pose: dict[str, Value] = {"xyz": [float(value) + 0.0 for value in frame.X_PT.p]}
         rpy = [round(float(value), 5) + 0.0 for value in frame.X_PT.rpy]
         if any(rpy):
             pose["rpy"] = [*rpy]
@@ -236,7 +247,11 @@ def _mount(
     robot = kinematics.robot
     arm = parts.arm
     if arm is None and shape is not None and closure is not None:
-        every = [shape.whole(closure.opened), shape.whole((closure.opened + closure.closed) / 2), shape.whole(closure.closed)]
+        every = [
+            shape.whole(closure.opened),
+            shape.whole((closure.opened + closure.closed) / 2),
+            shape.whole(closure.closed),
+        ]
         low = min(float(points.at(q, [link.name for link in robot.links])[:, 2].min(initial=0.0)) for q in every)
         up, why = HAND_HEIGHT - low, "the hand alone is held above the floor"
     else:
@@ -249,18 +264,20 @@ def _mount(
     if up <= 0.0:
         return Transform.identity(), None
     up = round(float(np.ceil(up * 1000.0) / 1000.0), 3)
-    return Transform.of(xyz=(0.0, 0.0, up)), Entry({"xyz": [0.0, 0.0, up]}, f"{why}: {readable(up, 'm')} above the root")
+    return Transform.of(xyz=(0.0, 0.0, up)), Entry(
+        {"xyz": [0.0, 0.0, up]}, f"{why}: {readable(up, 'm')} above the root"
+    )
 
 
-def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple:  # type: ignore[type-arg]
+def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple[Joint, ...]:
     """The joints with the proposed limits."""
     found = []
     for joint in robot.joints:
         own = limits.get(joint.name)
         if own is not None:
-            stated = {key: value for key, value in own.spec.model_dump(exclude_unset=True).items()}
-            joint = replace(joint, limits=replace(joint.limits, **stated))
-        found.append(joint)
+            found.append(replace(joint, limits=replace(joint.limits, **own.spec.model_dump(exclude_unset=True))))
+        else:
+            found.append(joint)
     return tuple(found)
 
 
@@ -288,9 +305,9 @@ def _poses(
     found: dict[str, Entry] = {}
     for name, by_group in (stated.poses if stated is not None else {}).items():
         found[name] = Entry({group: dict(values) for group, values in by_group.items()}, "a state of the SRDF")
-    hand: dict[str, Plain] = {hand_name: "open"} if closure is not None else {}
+    hand: dict[str, Value] = {hand_name: "open"} if closure is not None else {}
     if parts.arm is not None:
-        arm: list[Plain] = [round(float(home.q[k]), 4) for k in robot.indices(parts.arm.joints)]
+        arm: list[float] = [round(float(home.q[k]), 4) for k in robot.indices(parts.arm.joints)]
         found["home"] = Entry({arm_name: arm, **hand}, home.evidence)
     elif hand:
         found["home"] = Entry({**hand})
@@ -301,9 +318,7 @@ def _poses(
     return found
 
 
-def _stated_home(
-    search: HomeSearch, arm: tuple[str, ...], stated: StatedParts | None, notes: list[str]
-) -> Home | None:
+def _stated_home(search: HomeSearch, arm: tuple[str, ...], stated: StatedParts | None, notes: list[str]) -> Home | None:
     """The state of the SRDF with the best score of those that are free; the one called `home` if it is."""
     states = stated.arm_states(arm) if stated is not None else {}
     search.keep(CLEARANCES[-1])
@@ -320,7 +335,7 @@ def _limit_entries(limits: Mapping[str, ProposedLimits]) -> dict[str, Entry]:
     found: dict[str, Entry] = {}
     before = ""
     for name, own in limits.items():
-        row: dict[str, Plain] = dict(own.spec.model_dump(exclude_unset=True))
+        row: dict[str, Value] = dict(own.spec.model_dump(exclude_unset=True))
         why = own.evidence
         if own.missing:
             why = f"{listed(own.missing)} missing in the description or unusable; {why}"

@@ -36,7 +36,9 @@ class ShapePoints:
     def at(self, q: Array, links: Iterable[str], X_FW: Transform | None = None) -> Array:
         """(k, 3) [m] points of several links at `q` (n), in the world or in frame F."""
         X = Transform.identity() if X_FW is None else X_FW
-        found = [X.apply(self._kinematics.forward(q, link).apply(self.of(link))) for link in links if len(self.of(link))]
+        found = [
+            X.apply(self._kinematics.forward(q, link).apply(self.of(link))) for link in links if len(self.of(link))
+        ]
         return np.vstack(found) if found else np.zeros((0, 3))
 
     def missing(self, links: Iterable[str]) -> tuple[str, ...]:
@@ -59,15 +61,15 @@ def _geometry_points(geometry: Geometry) -> Array:
 def _points(shape: Shape) -> Array:
     match shape:
         case Box(size=size):
-            return np.array(np.meshgrid(*[(-edge / 2, 0.0, edge / 2) for edge in size])).reshape(3, -1).T
+            return np.asarray(np.array(np.meshgrid(*[(-edge / 2, 0.0, edge / 2) for edge in size])).reshape(3, -1).T)
         case Sphere(radius=radius):
             return radius * _sphere()
         case Cylinder(radius=radius, length=length):
             turn = np.linspace(0.0, 2 * np.pi, AROUND, endpoint=False)
             ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.zeros(AROUND)])
-            return np.vstack([ring + [0.0, 0.0, z] for z in (-length / 2, 0.0, length / 2)])
+            return np.asarray(np.vstack([ring + np.array([0.0, 0.0, z]) for z in (-length / 2, 0.0, length / 2)]))
         case Mesh(part=part, scale=scale) if part is not None:
-            return np.array(part.points) * np.array(scale)
+            return np.asarray(np.array(part.points) * np.array(scale))
         case Mesh(path=path, scale=scale):
             try:
                 mesh = read_mesh(path)

@@ -16,7 +16,7 @@ from manipcli.description.urdf.urdf import Parts
 from manipcli.model.build_robot import build_robot
 from manipcli.model.inertials import massless_bodies
 from manipcli.model.robot import RobotModel
-from manipcli.onboard.writer import Entry
+from manipcli.onboard.writer import Entry, plain
 from manipcli.spec.load import read_bytes
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Plain
@@ -80,7 +80,7 @@ def read_source(
             "robot": name,
             "description": str(path),
             "args": dict(arguments),
-            **{key: entry.value for key, entry in mended.items()},
+            **{key: plain(entry) for key, entry in mended.items()},
         }
     )
     robot, findings = build_robot(
@@ -161,19 +161,24 @@ def _mended(parts: Parts) -> tuple[dict[str, Entry], list[str]]:
         lacking = list(dict.fromkeys((*unusable, *massless)))
         why = f"missing or impossible in the description: {listed(lacking, most=6)}; from the volume of their shapes"
         found["inertials"] = Entry("estimate", f"{why}, as heavy as water", True)
-        notes.append(f"{number_of(len(lacking), 'inertial')} are estimated; `manipcli check robot.yaml` shows the table")
+        notes.append(
+            f"{number_of(len(lacking), 'inertial')} are estimated; `manipcli check robot.yaml` shows the table"
+        )
     missing = [link for link in parts.links if link.missing]
     if missing:
         rows: dict[str, Plain] = {link.name: "from_visual" if link.visuals else "none" for link in missing}
         bare = [name for name, how in rows.items() if how == "none"]
         why = "collision meshes that are not found are replaced by the visual shapes"
         if bare:
-            why += f", or by none: {listed(bare)} have no contacts"
+            why += f", or by none: {listed(bare)} without contacts"
         found["collision"] = Entry(rows, why, True)
-        lost = sorted({finding.message.partition("'")[2].partition("'")[0] for link in missing for finding in link.missing})
-        notes.append(f"{number_of(len(lost), 'mesh')} not found: {listed(lost, most=6)}")
+        lost = sorted(
+            {finding.message.partition("'")[2].partition("'")[0] for link in missing for finding in link.missing}
+        )
+        notes.append(f"{len(lost)} of its meshes are not found: {listed(lost, most=6)}")
         if bare:
             notes.append(
-                f"{number_of(len(bare), 'link')} without any shape: planning and physics do not see {listed(bare, most=6)}"
+                f"{number_of(len(bare), 'link')} without any shape, which planning and physics do not see: "
+                f"{listed(bare, most=6)}"
             )
     return found, notes

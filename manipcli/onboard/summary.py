@@ -29,4 +29,8 @@ def summary(
         yield ""
         yield from (f"note: {note}" for note in (*notes, *task.notes))
     yield ""
-    yield f"{PASS} first task: {task.does}; its run passed" if task.passed else f"{FAIL} first task: {task.does}; no run passed"
+    yield (
+        f"{PASS} first task: {task.does}; its run passed"
+        if task.passed
+        else f"{FAIL} first task: {task.does}; no run passed"
+    )

@@ -13,8 +13,8 @@ from manipcli.onboard.closure import SLAB, STEPS, Closure, HandShape
 
 INSIDE: Final = 0.012
 """[m] The frame is so far inside the finger tips."""
-SNAP: Final = np.cos(np.radians(15.0))
-"""Axes nearer than 15 deg to an axis of the palm are that axis."""
+SNAP: Final = np.cos(np.radians(20.0))
+"""Axes nearer than 20 deg to an axis of the palm are that axis."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

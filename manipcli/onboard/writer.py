@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 from manipcli.spec.resolved import inline
 from manipcli.spec.source.tree import Plain
@@ -15,11 +15,14 @@ CHECK: Final = "CHECK: "
 """Begins the comment of a value that is only plausible."""
 
 
+Value: TypeAlias = "str | int | float | bool | Sequence[Value] | Mapping[str, Value | Entry] | None"
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
     """A value with the evidence for it; `check`: it is only plausible, and the user should look at it."""
 
-    value: Plain | Mapping[str, Entry]
+    value: Value
     why: str = ""
     check: bool = False
 
@@ -38,13 +41,27 @@ def checks(entries: Mapping[str, Entry], path: str = "") -> list[tuple[str, str]
         where = f"{path}.{key}" if path else key
         if entry.check:
             found.append((where, entry.why))
-        if isinstance(entry.value, Mapping) and _nested(entry.value):
-            found += checks(entry.value, where)  # type: ignore[arg-type]
+        found += checks(block(entry), where)
     return found
 
 
-def _nested(value: object) -> bool:
-    return isinstance(value, Mapping) and any(isinstance(each, Entry) for each in value.values())
+def block(entry: Entry) -> dict[str, Entry]:
+    """The entries inside an entry; {} if it is a plain value."""
+    value = entry.value
+    if not isinstance(value, Mapping):
+        return {}
+    return {key: each for key, each in value.items() if isinstance(each, Entry)}
+
+
+def plain(value: Value | Entry) -> Plain:
+    """The value without its comments."""
+    if isinstance(value, Entry):
+        return plain(value.value)
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(each) for each in value]
+    return value
 
 
 def _lines(entries: Mapping[str, Entry], indent: str) -> list[str]:
@@ -53,13 +70,12 @@ def _lines(entries: Mapping[str, Entry], indent: str) -> list[str]:
         if entry.why:
             text = f"{CHECK if entry.check else ''}{entry.why}"
             lines += [f"{indent}# {line}" for line in textwrap.wrap(text, WIDTH - len(indent) - 2)]
-        value = entry.value
-        if _nested(value):
-            lines.append(f"{indent}{inline(key)}:")
-            lines += _lines(value, f"{indent}  ")  # type: ignore[arg-type]
-        elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
+        inside, value = block(entry), plain(entry)
+        if inside:
+            lines += [f"{indent}{inline(key)}:", *_lines(inside, f"{indent}  ")]
+        elif isinstance(value, list) and any(isinstance(each, dict | list) for each in value):
             lines.append(f"{indent}{inline(key)}:")
             lines += [f"{indent}  - {inline(each)}" for each in value]
         else:
-            lines.append(f"{indent}{inline(key)}: {inline(value)}")  # type: ignore[arg-type]
+            lines.append(f"{indent}{inline(key)}: {inline(value)}")
     return lines

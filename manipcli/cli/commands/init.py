@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -12,6 +13,9 @@ from manipcli.cli import console
 from manipcli.cli.new_project import enter, notes, refuse_conflicts, write_files
 from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+
+if TYPE_CHECKING:
+    from manipcli.cli.own_wheel import Installation
 
 TEMPLATES: Final = Path(__file__).parents[1] / "project"
 COMMON: Final = {
@@ -27,7 +31,11 @@ EXAMPLE: Final = {
 }
 """Those of the example."""
 FILES: Final = COMMON | EXAMPLE
-SCHEMAS: Final = {f"schemas/{kind}.json": kind for kind in ("task", "robot", "controllers")}
+SCHEMAS: Final[dict[str, Literal["task", "robot", "controllers"]]] = {
+    "schemas/task.json": "task",
+    "schemas/robot.json": "robot",
+    "schemas/controllers.json": "controllers",
+}
 NO_ROBOT: Final = "it belongs to --robot"
 
 
@@ -36,9 +44,7 @@ def init(
     *,
     robot: Annotated[
         str | None,
-        typer.Option(
-            "--robot", metavar="FILE", help="Set up this robot: a URDF or xacro file, or package://NAME/...."
-        ),
+        typer.Option("--robot", metavar="FILE", help="Set up this robot: a URDF or xacro file, or package://NAME/...."),
     ] = None,
     arg: Annotated[
         list[str] | None,
@@ -50,7 +56,9 @@ def init(
     ] = None,
     controllers: Annotated[
         Path | None,
-        typer.Option("--controllers", metavar="FILE", help="Use this controllers file (also of ROS) instead of a guess."),
+        typer.Option(
+            "--controllers", metavar="FILE", help="Use this controllers file (also of ROS) instead of a guess."
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     package_path: PackagePath = None,
@@ -67,7 +75,7 @@ def init(
         for word, value in (("--arg", arg), ("--srdf", srdf), ("--controllers", controllers)):
             if value:
                 raise InvalidInput([Diagnostic("USE089", f"{word} has no effect: {NO_ROBOT}", hint="add --robot FILE")])
-        write_files(folder, _common(folder) | _example() | _schemas(), force=force)
+        write_files(folder, _common(folder) | _example() | _schemas() | _wheel(), force=force)
         for note in notes(folder):
             console.talk(f"note: {note}")
         console.talk(f"next: {enter(folder)}manipcli test")
@@ -89,7 +97,8 @@ def init(
     if live:
         console.redraw("")
     own = {name: text.encode() for name, text in made.files.items()}
-    write_files(folder, _common(folder, robot="robot.yaml", task=made.task_file) | own | _schemas(), force=force)
+    common = _common(folder, robot="robot.yaml", task=made.task_file)
+    write_files(folder, common | own | _schemas() | _wheel(), force=force)
     console.result("")
     for line in made.summary:
         console.result(line)
@@ -103,11 +112,13 @@ def init(
 def _common(folder: Path, *, robot: str = "robots/panda.yaml", task: str = "tasks/pick_place.yaml") -> dict[str, bytes]:
     """README, .gitignore and workflow."""
     name = (Path(os.path.realpath(folder)).name or "tasks").encode("utf-8", "replace")
+    found = _installation()
     words = {
-        b"PROJECT": name,
+        b"INSTALL": found.requirement.encode() if found is not None else b"manipcli",
         b"CONTROLLERS": robot.replace("robot", "controllers", 1).encode(),
         b"ROBOT": robot.encode(),
         b"TASK": Path(task).stem.encode(),
+        b"PROJECT": name,
     }
     files = {}
     for path, template in COMMON.items():
@@ -116,6 +127,19 @@ def _common(folder: Path, *, robot: str = "robots/panda.yaml", task: str = "task
             data = data.replace(word, value)
         files[path] = data
     return files
+
+
+@cache
+def _installation() -> Installation | None:
+    from manipcli.cli.own_wheel import installation
+
+    return installation()
+
+
+def _wheel() -> dict[str, bytes]:
+    """The wheel that the workflow installs, if it needs one."""
+    found = _installation()
+    return {} if found is None or found.wheel is None else dict([found.wheel])
 
 
 def _example() -> dict[str, bytes]:
