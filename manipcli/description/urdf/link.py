@@ -23,6 +23,7 @@ ROUNDING = 1e-6
 """Relative error of a principal moment that is only rounding: such an inertia is made regular, not refused."""
 IMPOSSIBLE: Final = "URDF011"
 REGULARISED: Final = "URDF038"
+MISSING_VISUAL: Final = "URDF033"
 UNUSABLE_MESH: Final = ("URDF013", "URDF200", "URDF210")
 """Codes of errors about a collision mesh: missing, unusable, flat."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")
@@ -134,11 +135,11 @@ def _plausible(reader: Reader, inertia: Array, name: str, element: Element) -> A
         )
         reader.report(IMPOSSIBLE, message, element.place, hint="compute it from the shape and the mass of the link")
         return None
-    if principal[0] > 0.0:
+    least = ROUNDING * largest
+    if principal[0] >= least * (1.0 - 1e-9):
         return inertia
     # The least moment of a thin rod is rounded to 0; as little as rounding is added.
     message = f"link '{name}': inertia is singular by rounding (principal moments {shown} kg m2)"
-    least = ROUNDING * largest
     reader.report(
         REGULARISED, f"{message}; {least:.2g} kg m2 is used for the least one", element.place, severity="note"
     )
@@ -231,7 +232,7 @@ def _mesh(reader: Reader, element: Element, tag: str, packages: Packages) -> Mes
             reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=hint)
         else:
             message = f"visual mesh, ignored: {error.message}"
-            reader.report("URDF033", message, element.place, hint=error.hint, severity="warning")
+            reader.report(MISSING_VISUAL, message, element.place, hint=error.hint, severity="warning")
         return None
     if tag == "collision" and packages.reads and not _usable_mesh(reader, element, uri, packages):
         return None
