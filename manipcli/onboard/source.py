@@ -139,7 +139,7 @@ def _placed(description: str, path: Path, outer: Mapping[str, Path], folder: Pat
     portable = Packages(path).portable(path)
     if relative.startswith("..") and portable.startswith("package://"):
         try:
-            if Packages(folder / "robot.yaml").resolve(portable) == path:
+            if Packages(None).resolve(portable) == path:
                 relative = portable  # an installed package: the same on another machine
         except NotFound:
             pass

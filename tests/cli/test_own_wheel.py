@@ -15,7 +15,7 @@ import pytest
 from manipcli.cli import own_wheel
 
 
-class _Installed(metadata.Distribution):
+class _Installed:
     """A distribution with these texts."""
 
     def __init__(self, **texts: str) -> None:
@@ -23,9 +23,6 @@ class _Installed(metadata.Distribution):
 
     def read_text(self, filename: str) -> str | None:
         return self._texts.get(filename.removesuffix(".json"))
-
-    def locate_file(self, path: object) -> object:  # type: ignore[override]
-        raise NotImplementedError
 
 
 def installed(monkeypatch: pytest.MonkeyPatch, **texts: str) -> own_wheel.Installation:

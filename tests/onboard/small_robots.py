@@ -31,7 +31,7 @@ def arm(names: Sequence[str], *, limits: str = 'velocity="2" effort="80"', inert
 def gripper(palm: str, *, reversed_: bool = False, names: Sequence[str] = ("left", "right")) -> list[str]:
     """Two fingers along x of the palm that slide along y; a positive position opens them, if not `reversed_`.
 
-    The inner faces of the tips are `OPENING` apart when open, and meet when closed; their ends are at x = 0.02 + FINGER.
+    The inner faces of the tips are `OPENING` apart when open, and meet when closed; they end at x = 0.02 + FINGER.
     """
     found = []
     for name, side in zip(names, (1.0, -1.0), strict=True):

@@ -15,11 +15,11 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.onboard.closure import HandShape, guess_closure
 from manipcli.onboard.limits import propose_limits
+from manipcli.onboard.onboard import floor_scene
 from manipcli.onboard.parts import RobotParts, guess_parts
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
 from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.tool_frame import INSIDE, ToolFrame, guess_tool_frame
-from manipcli.onboard.onboard import floor_scene
 from manipcli.spec.robot import RobotSpec
 from tests.onboard import small_robots as small
 
@@ -112,7 +112,9 @@ def test_home_is_free_and_inside_the_limits(whole: RobotDraft) -> None:
     assert tool is not None
     X_WT = Kinematics(whole.robot).forward(whole.home, tool.link) @ tool.X_LT
     assert X_WT.p[2] > 0.1
-    J = Kinematics(whole.robot).jacobian(whole.home, tool.link, tool.X_LT)[:, whole.robot.indices(whole.parts.arm.joints)]
+    J = Kinematics(whole.robot).jacobian(whole.home, tool.link, tool.X_LT)[
+        :, whole.robot.indices(whole.parts.arm.joints)
+    ]
     assert np.linalg.svd(J, compute_uv=False)[-1] > 0.02  # not near a singularity
 
 
