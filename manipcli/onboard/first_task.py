@@ -172,10 +172,12 @@ class TaskSearch:
             return
         assert draft.search is not None
         spots = reachable_spots(Kinematics(draft.robot), draft.search, arm.joints, draft.home, tool_height=edge / 2)
-        if not spots:
-            self._causes.append("no place was found that the tool reaches from the top or from the side")
+        count = 0
         for one in spots:
+            count += 1
             yield _pick(one, edge)
+        if not count:
+            self._causes.append("no place was found that the tool reaches from the top or from the side")
 
     def _moves(self) -> Iterator[_Candidate]:
         draft = self._draft

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -28,7 +29,11 @@ FLOOR_BONUS: Final = 2.0
 EXAMINED: Final = 60
 """Places examined at most for each approach, spread over heights and distances."""
 
+BATCH: Final = 15
+"""Places that are examined before the best of them are tried."""
+
 Approach = Literal["top", "side"]
+APPROACHES: Final[tuple[Approach, ...]] = ("top", "side")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +62,8 @@ def reachable_spots(
     *,
     tool_height: float,
     seed: int = 0,
-) -> list[Spots]:
-    """Candidates, the most dexterous first; those from the top before those from the side.
+) -> Iterator[Spots]:
+    """Candidates, the more dexterous of each batch first; those from the top before those from the side.
 
     Args:
         kinematics: of the robot, with its tool.
@@ -79,17 +84,17 @@ def reachable_spots(
     far = _farthest(solver, search, home, axis)
     heights = [0.0, *np.arange(STEP, axis[2] + 0.7 * far, STEP).tolist()]
     radii = np.arange(max(0.15, 0.2 * far), far, STEP / 2 if far < 0.6 else STEP).tolist()
-    found: list[Spots] = []
-    for approach in ("top", "side"):
+    grid = sorted(itertools.product(heights, radii), key=lambda cell: _oddness(cell, axis, far))
+    grid = [(h, r) for h, r in grid if np.hypot(r, h + tool_height - axis[2]) < far][:EXAMINED]
+    for approach in APPROACHES:
         open_ = solver.leaving("spin" if approach == "top" else "nothing")
-        grid = sorted(itertools.product(heights, radii), key=lambda cell: _oddness(cell, axis, far))
-        own = [
-            spots
-            for h, r in grid[:EXAMINED]
-            if (spots := reach.spots(open_, h, r, front, axis, tool_height, approach)) is not None
-        ]
-        found += sorted(own, key=lambda spots: -spots.score)
-    return found
+        for start in range(0, len(grid), BATCH):
+            own = [
+                spots
+                for h, r in grid[start : start + BATCH]
+                if (spots := reach.spots(open_, h, r, front, axis, tool_height, approach)) is not None
+            ]
+            yield from sorted(own, key=lambda spots: -spots.score)
 
 
 class _Reach:
