@@ -92,8 +92,8 @@ class TaskSearch:
         self._causes.clear()
         candidate = self._waits()
         self._progress("holding still: a run")
-        if self._plans(candidate) and self._passes(candidate):
-            return None
+        if not self._plans(candidate) or self._passes(candidate):
+            return None  # a task without a plan is not the fault of controllers
         return self._causes[-1]
 
     def search(self) -> FirstTask:
@@ -104,6 +104,7 @@ class TaskSearch:
             ("picking and placing a block", self._picks()),
             ("moving between poses", self._moves()),
             ("opening and closing the hand", self._closes()),
+            ("holding still", iter((self._waits(),))),
         ):
             self._causes.clear()
             runs = plans = 0
@@ -124,9 +125,7 @@ class TaskSearch:
             if plans or self._causes:
                 cause = max(self._causes, key=self._causes.count) if self._causes else "unknown"
                 notes.append(f"{kind} failed in {number_of(plans, 'attempt')} ({number_of(runs, 'run')}): {cause}")
-        if last is None:
-            last = self._waits()
-            notes.append("no motion was found that could be tried; the task only waits")
+        assert last is not None
         return FirstTask(last.name, last.entries, last.poses, last.does, False, tuple(notes))
 
     def _path(self, candidate: _Candidate) -> Path:

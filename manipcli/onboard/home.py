@@ -11,12 +11,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.geometry import Array, Transform
+from manipcli.core.geometry import Array
 from manipcli.core.text import digits
 from manipcli.core.units import readable
 from manipcli.model.collision import CollisionChecker, pairs
 from manipcli.model.configuration import with_mimics
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
 
 SAMPLES: Final = 1500
@@ -34,7 +35,7 @@ CLEARANCES: Final = (0.02, 0.01, 0.005)
 TIDY: Final = 0.85
 """A rounder configuration is used if its score is at least this share of the best."""
 HIGH: Final = 0.15
-"""[m] The tool is at least so high above the floor."""
+"""[m] The tool is at least so high above the floor, or half as high as at zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +52,9 @@ class HomeSearch:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        robot: RobotModel,
         scene: Scene,
         joints: tuple[str, ...],
-        link: str,
-        X_LT: Transform,
         *,
         q: Array,
         ignore: tuple[tuple[str, str], ...] = (),
@@ -63,16 +62,16 @@ class HomeSearch:
     ) -> None:
         """
         Args:
-            kinematics: of the robot.
+            robot: with its tool.
             scene: its floor is an obstacle.
             joints: of the arm.
-            link, X_LT: the tool frame.
             q: (n) all joints; those of the arm are replaced.
             ignore: pairs of links that may touch.
             down: prefer that the tool's z axis points down, as to pick from a table.
         """
-        robot = kinematics.robot
-        self._link, self._X_LT, self._q, self._down = link, X_LT, q, down
+        assert robot.tool is not None
+        kinematics, link = Kinematics(robot), robot.tool.link
+        self._link, self._X_LT, self._q, self._down = link, robot.tool.X_LT, q, down
         self._robot, self._columns = robot, robot.indices(joints)
         ranges = np.array([robot.joint(name).limits.within_soft for name in joints])
         self.lower = np.where(np.isfinite(ranges[:, 0]), ranges[:, 0], -HALF_TURN)
@@ -84,6 +83,7 @@ class HomeSearch:
         self._ignored = tuple(ignore)
         moved = robot.descendants(robot.joint(joints[0]).child)
         self._still = [link.name for link in robot.links if link.name not in moved]
+        self._highest = 0.5 * max(float(kinematics.forward(q, link).p[2]), 0.0)
         self.ignore(())
 
     def ignore(self, pairs: Sequence[tuple[str, str]]) -> None:
@@ -108,13 +108,11 @@ class HomeSearch:
         """Manipulability, times the least margin to a limit, times the direction of the tool; 0 on the floor."""
         q = self.whole(arm)
         R, p, J = self._kinematics.pose_and_jacobian(q, self._link, self._X_LT)
-        if p[2] < HIGH:
+        if p[2] < min(HIGH, self._highest):
             return 0.0
         reduced = J[:, self._columns]
-        if len(self._columns) < 6:
-            reduced = reduced[:3] if len(self._columns) >= 3 else reduced[: len(self._columns)]
-        singular = np.linalg.svd(reduced, compute_uv=False)
-        bend = float(singular[-1] / max(singular[0], 1e-9))
+        singular = np.linalg.svd(reduced[:3] if len(self._columns) < 6 else reduced, compute_uv=False)
+        bend = max(1e-3, float(singular[-1] / max(singular[0], 1e-9))) if len(self._columns) >= 3 else 1.0
         half = (self.upper - self.lower) / 2.0
         inside = np.where(self._limited, 1.0 - np.abs(arm - (self.lower + self.upper) / 2.0) / half, 1.0)
         room = float(np.clip(inside.min() / 0.3, 0.0, 1.0))

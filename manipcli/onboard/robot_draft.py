@@ -10,8 +10,6 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.core.text import listed
-from manipcli.core.units import readable
 from manipcli.description.elements import Joint
 from manipcli.model.collision import CollisionChecker
 from manipcli.model.configuration import with_mimics, zero_configuration
@@ -21,7 +19,9 @@ from manipcli.onboard.closure import Closure, HandShape, guess_closure, knuckles
 from manipcli.onboard.from_srdf import StatedParts
 from manipcli.onboard.home import CLEARANCES, Home, HomeSearch, guess_home
 from manipcli.onboard.limits import ProposedLimits, propose_limits
+from manipcli.onboard.mount import guess_mount, hung_up
 from manipcli.onboard.parts import Hand, RobotParts, guess_parts
+from manipcli.onboard.robot_entries import group_entries, limit_entries, pose_entries
 from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.tool_frame import ToolFrame, guess_tool_frame
 from manipcli.onboard.writer import Entry, Value
@@ -29,10 +29,6 @@ from manipcli.scene.scene import Scene
 
 BLOCK: Final = 0.04
 """[m] Edge of the block that a hand is asked to pick."""
-HAND_HEIGHT: Final = 0.1
-"""[m] A hand alone is held so high above the floor."""
-ABOVE_FLOOR: Final = 0.006
-"""[m] Links that could move, as wheels, are so high above the floor: more than the clearance of plans."""
 OVERLAP: Final = 1e-3
 """[m] Fingers that close stop before they overlap by more."""
 STEPS: Final = 40
@@ -86,19 +82,21 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
     closure, frame, shape = _hand(bare, parts.hand, kinematics, points, zero, notes, stated)
     limits = propose_limits(kinematics, arm, fingers, _lengths(kinematics, points, (*arm, *fingers), zero))
     tool, tool_entry = _tool(parts, frame)
-    mount, mount_entry = _mount(kinematics, points, parts, shape, closure, zero)
+    mount, mount_entry = guess_mount(kinematics, points, parts, shape, closure, zero)
     robot = replace(bare, tool=tool, X_WB=mount, joints=_limited(bare, limits))
-    kinematics = Kinematics(robot)
     opened = np.array(zero) if closure is None or shape is None else np.array(shape.whole(closure.opened))
     touching = stated.touching if stated is not None else ()
     ignore = (*_within_hand(robot, parts.hand), *touching)
     home, search = Home(opened, ""), None
     ignored: tuple[tuple[str, str], ...] = ()
-    if parts.arm is not None and tool is not None:
-        search = HomeSearch(
-            kinematics, scene, arm, tool.link, tool.X_LT, q=opened, ignore=ignore, down=parts.hand is not None
-        )
+    if parts.arm is not None:
+        search = HomeSearch(robot, scene, arm, q=opened, ignore=ignore, down=parts.hand is not None)
         found = _stated_home(search, arm, stated, notes) or guess_home(search)
+        if found is None:
+            mount, mount_entry = hung_up(Kinematics(robot), points, opened, search.whole(search.middle))
+            robot = replace(robot, X_WB=mount)
+            search = HomeSearch(robot, scene, arm, q=opened, ignore=ignore, down=parts.hand is not None)
+            found = guess_home(search)
         if found is None:
             home, ignored = _least_touching(search, notes)
         else:
@@ -106,7 +104,7 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
     entries: dict[str, Entry] = {}
     if mount_entry is not None:
         entries["mount"] = mount_entry
-    entries["groups"] = Entry(_groups(parts, *names))
+    entries["groups"] = Entry(group_entries(parts, *names))
     if touching:
         entries["collision_ignore"] = Entry([list(pair) for pair in touching], "`disable_collisions` of the SRDF")
     if ignored:
@@ -115,13 +113,13 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
             "they touch in nearly every configuration that was tried",
             True,
         )
-    poses = _poses(robot, parts, home, closure, *names, stated)
+    poses = pose_entries(robot, parts, home, closure, *names, stated)
     if poses:
         entries["poses"] = Entry(poses)
     if tool_entry is not None:
         entries["tool"] = tool_entry
     if limits:
-        entries["limits"] = Entry(_limit_entries(limits))
+        entries["limits"] = Entry(limit_entries(limits))
     return RobotDraft(
         replace(robot, collision_ignore=(*touching, *ignored)),
         parts,
@@ -235,40 +233,6 @@ def _tool(parts: RobotParts, frame: ToolFrame | None) -> tuple[Tool | None, Entr
     return None, None
 
 
-def _mount(
-    kinematics: Kinematics,
-    points: ShapePoints,
-    parts: RobotParts,
-    shape: HandShape | None,
-    closure: Closure | None,
-    zero: Array,
-) -> tuple[Transform, Entry | None]:
-    """X_WB above the floor: of a hand alone, and of a robot whose lowest point is below its root."""
-    robot = kinematics.robot
-    arm = parts.arm
-    if arm is None and shape is not None and closure is not None:
-        every = [
-            shape.whole(closure.opened),
-            shape.whole((closure.opened + closure.closed) / 2),
-            shape.whole(closure.closed),
-        ]
-        low = min(float(points.at(q, [link.name for link in robot.links])[:, 2].min(initial=0.0)) for q in every)
-        up, why = HAND_HEIGHT - low, "the hand alone is held above the floor"
-    else:
-        first = robot.joint(arm.joints[0]).child if arm is not None else ""
-        still = [link.name for link in robot.links if not first or link.name not in robot.descendants(first)]
-        low = float(points.at(zero, still)[:, 2].min(initial=0.0))
-        moving = {name for joint in robot.joints if joint.moves for name in robot.descendants(joint.child)}
-        wheels = float(points.at(zero, [name for name in still if name in moving])[:, 2].min(initial=1.0)) - ABOVE_FLOOR
-        up, why = (-min(low, wheels), "its lowest link is on the floor") if min(low, wheels) < -2e-3 else (0.0, "")
-    if up <= 0.0:
-        return Transform.identity(), None
-    up = round(float(np.ceil(up * 1000.0) / 1000.0), 3)
-    return Transform.of(xyz=(0.0, 0.0, up)), Entry(
-        {"xyz": [0.0, 0.0, up]}, f"{why}: {readable(up, 'm')} above the root"
-    )
-
-
 def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple[Joint, ...]:
     """The joints with the proposed limits."""
     found = []
@@ -279,43 +243,6 @@ def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple[J
         else:
             found.append(joint)
     return tuple(found)
-
-
-def _groups(parts: RobotParts, arm_name: str, hand_name: str) -> dict[str, Entry]:
-    found: dict[str, Entry] = {}
-    if parts.arm is not None:
-        why = parts.arm_evidence
-        if parts.others:
-            why += f"; not commanded, held by brakes: {listed(parts.others)}"
-        found[arm_name] = Entry({"chain": {"base": parts.arm.base, "tip": parts.arm.tip}}, why)
-    if parts.hand is not None:
-        found[hand_name] = Entry({"joints": list(parts.hand.joints)}, parts.hand_evidence)
-    return found
-
-
-def _poses(
-    robot: RobotModel,
-    parts: RobotParts,
-    home: Home,
-    closure: Closure | None,
-    arm_name: str,
-    hand_name: str,
-    stated: StatedParts | None,
-) -> dict[str, Entry]:
-    found: dict[str, Entry] = {}
-    for name, by_group in (stated.poses if stated is not None else {}).items():
-        found[name] = Entry({group: dict(values) for group, values in by_group.items()}, "a state of the SRDF")
-    hand: dict[str, Value] = {hand_name: "open"} if closure is not None else {}
-    if parts.arm is not None:
-        arm: list[float] = [round(float(home.q[k]), 4) for k in robot.indices(parts.arm.joints)]
-        found["home"] = Entry({arm_name: arm, **hand}, home.evidence)
-    elif hand:
-        found["home"] = Entry({**hand})
-    if closure is not None:
-        rounded = [[round(float(value), 4) for value in values] for values in (closure.opened, closure.closed)]
-        found["open"] = Entry({hand_name: [*rounded[0]]}, closure.evidence)
-        found["closed"] = Entry({hand_name: [*rounded[1]]})
-    return found
 
 
 def _stated_home(search: HomeSearch, arm: tuple[str, ...], stated: StatedParts | None, notes: list[str]) -> Home | None:
@@ -329,19 +256,6 @@ def _stated_home(search: HomeSearch, arm: tuple[str, ...], stated: StatedParts |
     if best is None or (best != "home" and search.score(free[best]) <= 0.0):
         return None
     return Home(search.whole(free[best]), f"the state '{best}' of the SRDF")
-
-
-def _limit_entries(limits: Mapping[str, ProposedLimits]) -> dict[str, Entry]:
-    found: dict[str, Entry] = {}
-    before = ""
-    for name, own in limits.items():
-        row: dict[str, Value] = dict(own.spec.model_dump(exclude_unset=True))
-        why = own.evidence
-        if own.missing:
-            why = f"{listed(own.missing)} missing in the description or unusable; {why}"
-        found[name] = Entry(row, "" if why == before else why, bool(own.missing))
-        before = why
-    return found
 
 
 def _least_touching(search: HomeSearch, notes: list[str]) -> tuple[Home, tuple[tuple[str, str], ...]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed, number_of
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
@@ -72,6 +72,9 @@ def read_source(
     parts = examination.parts
     if parts is None:
         raise InvalidInput(examination.findings)
+    if parts.root and not any(joint.independent for joint in parts.joints):
+        message = f"no joint of '{path.name}' moves: there is nothing to command"
+        raise InvalidInput([Diagnostic("INIT002", message, Place(str(path), 0, 0))])
     name = parts.name if path.name.partition(".")[0] in GENERIC and parts.name else path.name.partition(".")[0]
     mended, notes = _mended(parts)
     outer = _outer_packages(path, packages, allow_outside)
