@@ -13,6 +13,10 @@ from manipcli.onboard.closure import SLAB, STEPS, Closure, HandShape
 
 INSIDE: Final = 0.012
 """[m] The frame is so far inside the finger tips."""
+BESIDE: Final = 0.006
+"""[m] A fixed jaw is so far from the object before the other closes: more than the clearance of plans."""
+PAST: Final = 0.005
+"""[m] The frame is at most so far beyond the tip of the shorter finger."""
 SNAP: Final = np.cos(np.radians(20.0))
 """Axes nearer than 20 deg to an axis of the palm are that axis."""
 
@@ -42,7 +46,8 @@ def guess_tool_frame(shape: HandShape, closure: Closure, *, width: float) -> Too
     shares = np.linspace(0.0, 1.0, STEPS + 1)
     between = [_between(shape, closure, share, R) for share in shares]
     gaps = np.array([gap for gap, _ in between])
-    wanted = min(width, 0.6 * float(gaps.max()))
+    room = 2.0 * BESIDE if shape.hand.fixed else 0.0
+    wanted = min(width + room, 0.6 * float(gaps.max()) + room)
     k = int(np.argmin(np.abs(gaps - wanted)))
     p = R @ between[k][1]
     snapped = "along axes of the palm" if np.allclose(np.abs(R).max(axis=0), 1.0) else "not along axes of the palm"
@@ -103,8 +108,8 @@ def _between(shape: HandShape, closure: Closure, share: float, R: Array) -> tupl
         top = every[every[:, 2] >= every[:, 2].max() - SLAB]
         return 0.0, np.array([*top[:, :2].mean(axis=0), every[:, 2].max() - INSIDE])
     low, high = (np.vstack(side) for side in sides)
-    end = min(float(low[:, 2].max()), float(high[:, 2].max()))
-    low, high = (side[side[:, 2] >= end - SLAB] for side in (low, high))
+    short, long = sorted((float(low[:, 2].max()), float(high[:, 2].max())))
+    low, high = (side[side[:, 2] >= short - SLAB] for side in (low, high))
     inner = float(low[:, 1].max()), float(high[:, 1].min())
     x = (float(low[:, 0].mean()) + float(high[:, 0].mean())) / 2.0
-    return inner[1] - inner[0], np.array([x, (inner[0] + inner[1]) / 2.0, end - INSIDE])
+    return inner[1] - inner[0], np.array([x, (inner[0] + inner[1]) / 2.0, min(long - INSIDE, short + PAST)])

@@ -28,6 +28,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     parts = (small.arm(LINKS), small.palm("p", parent="l6"), small.gripper("p"))
     Path("whole.urdf").write_text(small.robot(*parts))
     Path("bare.urdf").write_text(small.robot(small.arm(LINKS, limits='velocity="0" effort="0"', inertials=False)))
+    Path("still.urdf").write_text(small.robot(small.palm("p")))
     Path("hand.urdf").write_text(small.robot(small.palm("p"), small.gripper("p")))
     joints = "".join(f'<joint name="{name}" value="{value}"/>' for name, value in READY.items())
     Path("whole.srdf").write_text(SRDF.format(joints=joints))
@@ -83,6 +84,7 @@ def test_a_hand_alone_opens_and_closes(folder: Path) -> None:
         (["--robot", "hand.urdf", "--srdf", "whole.srdf"], "SRDF005", "link 'l0' is not in the robot"),
         (["--robot", "whole.urdf", "--controllers", "other.yaml"], "INIT001", "did you mean 'j_l1'?"),
         (["--robot", "whole.urdf", "--arg", "a=b"], "USE045", "expected NAME:=VALUE"),
+        (["--robot", "still.urdf"], "INIT002", "no joint of 'still.urdf' moves"),
         (["--srdf", "whole.srdf"], "USE089", "--srdf has no effect"),
     ],
 )

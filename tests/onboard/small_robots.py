@@ -45,6 +45,24 @@ def gripper(palm: str, *, reversed_: bool = False, names: Sequence[str] = ("left
     return found
 
 
+def one_jaw(palm: str) -> list[str]:
+    """A fixed jaw along x of the link `palm`, which it is, and one that turns about z away from it."""
+    return [
+        _link(palm, "0.05 -0.015 0", "0.1 0.01 0.03", True),
+        _link("jaw", "0.035 -0.02 0", "0.07 0.01 0.03", True),
+        f'<joint name="turn" type="revolute"><parent link="{palm}"/><child link="jaw"/><origin xyz="0.03 0.02 0"/>'
+        '<axis xyz="0 0 1"/><limit lower="0" upper="1.6" velocity="3" effort="3"/></joint>',
+    ]
+
+
+def fixed(parent: str, child: str) -> list[str]:
+    """A fixed joint at the end of a link of the arm."""
+    return [
+        f'<joint name="to_{child}" type="fixed"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{LINK} 0 0"/></joint>'
+    ]
+
+
 def robot(*elements: Sequence[str]) -> str:
     """The description of these elements."""
     return f'<robot name="small">{"".join(each for some in elements for each in some)}</robot>'
@@ -52,13 +70,7 @@ def robot(*elements: Sequence[str]) -> str:
 
 def palm(name: str, *, parent: str | None = None) -> list[str]:
     """A box that carries fingers, fixed at the end of a link."""
-    found = [_link(name, "0 0 0", "0.03 0.1 0.04", True)]
-    if parent is not None:
-        found.append(
-            f'<joint name="to_{name}" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
-            f'<origin xyz="{LINK} 0 0"/></joint>'
-        )
-    return found
+    return [_link(name, "0 0 0", "0.03 0.1 0.04", True), *([] if parent is None else fixed(parent, name))]
 
 
 def _link(name: str, centre: str, size: str, inertial: bool) -> str:

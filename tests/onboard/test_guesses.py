@@ -93,6 +93,21 @@ def test_open_is_where_the_fingers_are_apart(tmp_path: Path, reversed_: bool) ->
     assert draft.closure.closed == pytest.approx([closed, closed], abs=2e-3)
 
 
+def test_a_last_joint_beside_which_its_parent_goes_on_is_a_jaw(tmp_path: Path) -> None:
+    robot = built(tmp_path, small.robot(small.arm(LINKS), small.fixed("l6", "p"), small.one_jaw("p")))
+    draft = draft_robot(robot, floor_scene())
+    hand, closure, frame = draft.parts.hand, draft.closure, draft.frame
+    assert hand is not None
+    assert closure is not None
+    assert frame is not None
+    assert (hand.palm, hand.joints, "p" in hand.fixed) == ("p", ("turn",), True)
+    assert (float(closure.opened[0]), float(closure.closed[0])) == (1.6, 0.0)
+    assert frame.X_PT.R[:, 2] == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
+    assert np.abs(frame.X_PT.R[:, 1]) == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
+    # In front of the fixed jaw, whose face is at y = -0.01, by half the block and its distance.
+    assert frame.X_PT.p[1] == pytest.approx(-0.01 + 0.02 + 0.006, abs=2e-3)
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> RobotDraft:
     """An arm with a hand, whose description has no velocities and efforts of the arm."""
