@@ -121,6 +121,11 @@ class Packages:
         self._below: dict[str, Path] | None = None
         self._meant: dict[Path, str | None] = {}
 
+    @property
+    def found(self) -> Mapping[str, Path]:
+        """The packages that were asked for so far, by name."""
+        return dict(self._found)
+
     def root(self, name: str) -> Path:
         """The folder of package `name`.
 
