@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from manipcli.description.expanded import unread_description
+from manipcli.description.srdf import read_srdf
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.record.definition import Array as ArrayType
@@ -205,6 +206,19 @@ def test_the_srdf_has_what_srdfdom_parses_and_the_robot_has(picked: Path) -> Non
     assert {*disabled.values()} >= {"Adjacent", "Never"}
 
 
+def test_the_srdf_reads_back_as_the_robot(picked: Path) -> None:
+    robot = load_task(picked / "task.yaml", allow_outside=True).robot
+    read = read_srdf(picked / "out/robot.srdf")
+    arm, hand = (read.group(name) for name in ("arm", "hand"))
+    assert arm is not None and hand is not None
+    assert (arm.chain, hand.joints) == (("panda_link0", "panda_link8"), robot.group("hand").joints)
+    for pose in robot.poses:
+        states = [state.positions for state in read.states if state.name == pose.name]
+        found = {joint: value for state in states for joint, value in state.items()}
+        assert found == dict(zip(pose.joints, pose.positions, strict=True))
+    assert [effector.parent_link for effector in read.end_effectors] == ["panda_link8"]
+
+
 def test_the_urdf_is_the_robot_with_the_interfaces_that_its_controllers_claim(picked: Path) -> None:
     task = load_task(picked / "task.yaml", allow_outside=True)
     text = (picked / "out/robot.urdf").read_bytes()
@@ -280,6 +294,9 @@ def test_controllers_that_ros_lacks_get_trajectories_and_are_named(tmp_path: Pat
     assert "ros2 control switch_controllers --strict --activate spare --deactivate arm\n" in script
     assert "/spare/follow_joint_trajectory" in script
     assert "sleep 0.500" in script
+    (tmp_path / "task.yaml").write_text(yaml.safe_dump(WRIST | {"steps": WRIST["steps"][:2]}, sort_keys=False))
+    ran = call_cli("export", "task.yaml", "--allow-outside", "--ros2", "out", "--force", cwd=tmp_path)
+    assert "goals has other files, which the script does not send: 04.01_goal_follow.yaml" in ran.err
 
 
 def test_a_robot_is_exported_with_its_controllers(tmp_path: Path, call_cli: RunCli) -> None:

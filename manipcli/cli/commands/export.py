@@ -10,7 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Seed
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
-from manipcli.core.text import number_of
+from manipcli.core.text import listed, number_of
 
 
 def export(
@@ -58,6 +58,9 @@ def export(
     goals = sum(name.startswith("goals/") for name in files)
     if goals:
         console.talk(f"written: {ros2 / 'goals'}, {number_of(goals, 'goal')}")
+    old = sorted(path.name for path in (ros2 / "goals").glob("*.yaml") if f"goals/{path.name}" not in files)
+    if old:
+        notes += (f"{ros2 / 'goals'} has other files, which the script does not send: {listed(old, most=3)}",)
     for note in notes:
         console.talk(f"note: {note}")
     return ExitCode.PASSED
