@@ -255,6 +255,18 @@ def test_a_place_in_a_region_keeps_away_from_what_stands_there(bench: Make) -> N
     assert "post" in refusal.parts
 
 
+def test_a_region_off_its_support_is_refused_at_once(bench: Make) -> None:
+    panda = held_block(bench)
+    off = {**REGION, "region": {"box": {"centre": [1.5, 0.2], "size": ["20 cm", "30 cm"]}}}
+    refusal = panda.refused("place", off)
+    assert refusal.loc == ("region",)
+    assert refusal.cause.startswith("no place in the region is on 'table': [1.5, 0.2] m is outside 'table'")
+    assert refusal.hint == "`region` is in the world frame; 'table' offers 0.6 m x 0.8 m about its centre"
+    half = {**REGION, "region": {"box": {"centre": [0.45, 0.42], "size": ["10 cm", "20 cm"]}}}
+    panda.do("place", half)  # its centre is beside the table
+    assert panda.body("block").p[1] < 0.4
+
+
 def test_a_region_in_a_tray_is_not_crowded_by_the_table_under_its_thin_floor(bench: Make) -> None:
     """The table is 5 mm below the block, nearer than the 10 mm beside it, but no wall of the tray is."""
     tray = "  tray: {tray: {size: [0.3, 0.3, 0.02], wall: 5 mm}, rests_on: table, at: [0.5, 0.2], fixed: true}\n"
