@@ -350,7 +350,7 @@ class MotionBuilder:
         query, end = self._query(), self._with(limits.names, target)
         with self._labelled(label):
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
-        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
+        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals, end)
         self._accept(label, free, grip)
         if free is not straight and (search := self._planner.searching()) is not None:
             self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)
