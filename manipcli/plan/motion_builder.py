@@ -1,7 +1,4 @@
-"""Builder of a step's motions: each method adds one that starts where the last ended.
-
-Every motion is timed, verified against the limits and free of collisions.
-"""
+"""Builder of a step's motions, each from the end of the last: timed, within the limits and free of collisions."""
 
 from __future__ import annotations
 
@@ -207,14 +204,15 @@ class MotionBuilder:
         """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         self.along(label, rotated(self._planner.tool_pose(self._now), axis, angle), speed=speed)
 
-    def back(self, label: str) -> None:
+    def back(self, label: str, *, emptied: bool) -> None:
         """Repeat the last trajectory backwards.
 
-        Limits are symmetric and the path was free forwards: only torques are checked, as friction acts the other way.
+        Limits are symmetric and the path was free forwards: torques are checked, as friction acts the other way, and
+        collisions only if what is held was `emptied` since: its contents then lie elsewhere.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
         trajectory = timed.reversed_motion(self._planner, self._now, label, done)
-        self._accept(label, trajectory, None)
+        (self._add if emptied else self._accept)(label, trajectory, None)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
         """Follow given points from the end of the last motion, sampled at every control tick and at their end.
