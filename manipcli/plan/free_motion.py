@@ -138,7 +138,7 @@ def refusing(
 
     def refuse(q: Array) -> object | None:
         if any(np.abs(q - other).max() < BRANCH for other in avoid):
-            return "the arm has the configuration of a candidate that was tried before"
+            return "it has the configuration of a candidate that was tried before"
         hit = query.check(q)
         if hit is not None or not free:
             return None if hit is None else planner.in_the_way(hit)
