@@ -15,6 +15,7 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
+from manipcli.plan.blind_grasp import blindly_closed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
 from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
@@ -234,7 +235,7 @@ class MotionBuilder:
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
         """Close the hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
-        The fingers are predicted to stop where the first link of each touches the body.
+        The fingers are predicted to stop where the first link of each touches the body, or any if it is not known.
 
         Args:
             posture: named.
@@ -250,9 +251,10 @@ class MotionBuilder:
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
+        before, duration = self._now, grip_time(planner, self._now, grip)
         if body is None:
-            self._accept(CLOSING, None, grip)
-            self._now = replace(self._now, closed=True)
+            self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)
+            self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=self._allowed))
             return
         query = planner.grasping(self._now, body)
         closed, touched = closed_on(planner.robot, query, self._now.position, grip.joints, grip.target)
@@ -270,8 +272,7 @@ class MotionBuilder:
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
         allowed = self._allowed | planner.hand_contacts(body)
-        duration = grip_time(planner, self._now, grip)
-        self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed))
+        self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=allowed))
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
