@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from manipcli.core.text import number_of, shorten
 from manipcli.spec.base import Model, problem
+from manipcli.spec.holding import HoldingSpec
 from manipcli.spec.quantity import (
     JointAcceleration,
     JointEffort,
@@ -234,6 +235,10 @@ class ToolSpec(Model):
 
     link: str = Field(description="The link that carries the tool.")
     pose: PoseSpec = Field(PoseSpec(), description="Pose of the tool frame in the link. Default: identity.")
+    holding: HoldingSpec = Field(
+        HoldingSpec(), description="What holds a grasped object: contact and friction, a suction cup, or a weld. "
+        "Default friction."
+    )
 
 
 class RobotSpec(Model):
