@@ -34,6 +34,22 @@ def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], 
     return tuple(tuple(finger) for finger in found.values())
 
 
+def handless(robot: RobotModel, posture: str) -> bool:
+    """Whether the robot holds without fingers: by suction, or by a weld without this pose of a hand."""
+    holding = robot.holding
+    if holding is None or holding.kind == "suction":
+        return holding is not None
+    return posture in ("open", "closed") and posture not in {pose.name for pose in robot.poses}
+
+
+def posture_values(robot: RobotModel, name: str) -> dict[str, float]:
+    """The joint values of a pose of the hand; none for a robot that holds without fingers."""
+    if handless(robot, name):
+        return {}
+    pose = robot.pose(name)
+    return dict(zip(pose.joints, pose.positions, strict=True))
+
+
 def closing_speed(robot: RobotModel, joints: Sequence[str], stated: float | None) -> float:
     """Speed of a hand's references [rad/s or m/s]: as stated, else at most the least velocity limit of its joints."""
     if stated is not None:
@@ -107,6 +123,20 @@ def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequenc
         own = {f"robot/{link}" for link in moved_links(robot, [joints[j] for j in finger])}
         found += sorted((hit.distance, link) for hit in hits for link in {hit.a, hit.b} & own)[:1]
     return min(found)[1] if found and len(found) >= min(2, len(parts)) else None
+
+
+def refuse_pressing(
+    robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequence[str], held: str, posture: str
+) -> None:
+    """Refuse to let go of the body `held` with a hand that still holds it at `q` (n), in its pose `posture`.
+
+    Raises:
+        NotPlannable: names the deepest part.
+    """
+    still = pressing(robot, query, q, joints)
+    if still is not None:
+        message = f"'{still}' still presses on '{held}' with the hand in its pose '{posture}'"
+        raise NotPlannable(message, hint="set a pose in which the hand is open: `posture: POSE`")
 
 
 def closed_hand(joint: str, carried: Carried | None) -> NotPlannable:

@@ -76,6 +76,8 @@ class Motion:
         switch: of controllers, before anything else; None for no switch.
         begins: the state in which it begins, for reports; None where nothing moves.
         allowed: pairs of parts that may touch in it, besides the hand and what it holds.
+        takes: the object that is attached to the tool at its end, for robots with a `holding`.
+        lets_go: what is attached to the tool is freed at its beginning.
     """
 
     label: str
@@ -87,6 +89,18 @@ class Motion:
     switch: Switch | None = None
     begins: PlanningState | None = None
     allowed: frozenset[Pair] = frozenset()
+    takes: str | None = None
+    lets_go: bool = False
+
+    @property
+    def closes(self) -> bool:
+        """Whether the hand closes on something."""
+        return self.takes is not None or (self.grip is not None and self.grip.force is not None)
+
+    @property
+    def opens(self) -> bool:
+        """Whether the hand moves without closing on something, or frees an object."""
+        return not self.closes and (self.lets_go or self.grip is not None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,9 @@ from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_an
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
+from manipcli.plan.attachment import attached, freed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
-from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
+from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values, refuse_pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
@@ -27,7 +28,7 @@ from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, joint_path, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
-from manipcli.plan.prediction import carried_along, put, spilled
+from manipcli.plan.prediction import carried_along, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.trajectory_sampling import resampled
@@ -67,10 +68,6 @@ class MotionBuilder:
         other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
-
-    def with_body(self, name: str, X_WO: Transform) -> PlanningState:
-        """The present state with one body moved to `X_WO`."""
-        return put(self._planner, self._now, {name: X_WO})
 
     def let_go(self, posture: str) -> PlanningState:
         """The present state with the hand at a pose and empty; collisions are not checked."""
@@ -203,11 +200,8 @@ class MotionBuilder:
         """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         X_WT = self._planner.tool_pose(self._now)
         count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
-        poses = [
-            Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
-            for k in range(count + 1)
-        ]
-        self.along(label, poses, speed=speed)
+        turned = [matrix_from_axis_angle(axis, k / count * angle) for k in range(count + 1)]
+        self.along(label, [Transform.of(xyz=X_WT.p, R=R @ X_WT.R) for R in turned], speed=speed)
 
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
@@ -251,6 +245,9 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and does not touch it.
         """
         planner = self._planner
+        if handless(planner.robot, posture):
+            motion, self._now = attached(planner, self._now, body, self._allowed)
+            return self._motions.append(motion)
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
@@ -275,7 +272,8 @@ class MotionBuilder:
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
         allowed = self._allowed | planner.hand_contacts(body)
         duration = grip_time(planner, self._now, grip)
-        self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed))
+        takes = None if planner.robot.holding is None else body
+        self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed, takes=takes))
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
@@ -287,6 +285,9 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, it collides with something else than the object, or it
                 `must_arrive` at a pose that still presses on the object.
         """
+        if handless(self._planner.robot, posture):
+            motion, self._now = freed(self._now)
+            return self._motions.append(motion)
         grip = self._grip(self._posture(posture))
         if grip is None:
             raise no_gripper(posture)
@@ -294,16 +295,15 @@ class MotionBuilder:
         if self._now.carried is not None:
             held = self._now.carried.body
             there = self._with(grip.joints, grip.target)
-            query = self._planner.grasping(self._now, held)
-            still = pressing(self._planner.robot, query, there, grip.joints) if must_arrive else None
-            if still is not None:
-                message = f"'{still}' still presses on '{held}' with the hand in its pose '{posture}'"
-                raise NotPlannable(message, hint="set a pose in which the hand is open: `posture: POSE`")
+            if must_arrive:
+                query = self._planner.grasping(self._now, held)
+                refuse_pressing(self._planner.robot, query, there, grip.joints, held, posture)
             allowed |= self._planner.hand_contacts(held)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
         self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
+        self._motions[-1] = replace(self._motions[-1], lets_go=self._planner.robot.holding is not None)
 
     def dwell(self, label: str, duration: float) -> None:
         """Hold still for `duration` [s], and until the step's `until` holds."""
@@ -335,8 +335,7 @@ class MotionBuilder:
         return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
-        pose = self._planner.robot.pose(name)
-        return dict(zip(pose.joints, pose.positions, strict=True))
+        return posture_values(self._planner.robot, name)
 
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)

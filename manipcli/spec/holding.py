@@ -18,8 +18,8 @@ class SuctionSpec(Model):
     force: Annotated[Force, Field(gt=0)] = Field(description="Pull along the axis at which it breaks [N], above 0.")
     torque: Annotated[Torque, Field(gt=0)] | None = Field(
         None,
-        description="Torque about the tool frame at which it breaks [N m], above 0. Default: `force` times 10 mm, as of "
-        "a cup with a diameter of 20 mm.",
+        description="Torque about the tool frame at which it breaks [N m], above 0. Default: `force` times 10 mm, as "
+        "of a cup with a diameter of 20 mm.",
     )
     reach: Annotated[Length, Field(gt=0, le=0.05)] = Field(
         0.002, description="Largest gap between the tool frame and the surface when it grips [m]. Default 2 mm."

@@ -236,8 +236,8 @@ class ToolSpec(Model):
     link: str = Field(description="The link that carries the tool.")
     pose: PoseSpec = Field(PoseSpec(), description="Pose of the tool frame in the link. Default: identity.")
     holding: HoldingSpec = Field(
-        HoldingSpec(), description="What holds a grasped object: contact and friction, a suction cup, or a weld. "
-        "Default friction."
+        HoldingSpec(),
+        description="What holds a grasped object: contact and friction, a suction cup, or a weld. Default friction.",
     )
 
 

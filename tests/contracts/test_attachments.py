@@ -13,7 +13,7 @@ from manipcli.model.robot import RobotModel, Tool
 from manipcli.scene.scene import Body
 from manipcli.shapes.primitives import Box
 from manipcli.simulate.engine import EngineMember
-from tests.contracts.test_engines import G, STEP, Opens, body, inertial, joint, opens, robot, run, scene, with_physics
+from tests.contracts.test_engines import STEP, G, Opens, body, inertial, joint, opens, robot, run, scene, with_physics
 
 __all__ = ["opens"]  # a fixture
 
@@ -36,7 +36,7 @@ def brick(mass: float = 2.0) -> Body:
 
 def expected(model: RobotModel, force: Array, centre: Array, q: Array) -> Array:
     """(6) The wrench of the tool on a body whose force (3,) acts at its `centre`, in the tool frame."""
-    X_WT = Transform.of(xyz=(0.0, 0.0, 1.0) + q) @ X_LT
+    X_WT = Transform.of(xyz=(0.0, 0.0, 1.0, *q)) @ X_LT
     return np.concatenate((X_WT.R.T @ force, X_WT.R.T @ np.cross(centre - X_WT.p, force)))
 
 
