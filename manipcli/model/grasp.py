@@ -4,8 +4,8 @@
 - *pinched*: at least two links press, each with at least `GRIP_FORCE`. Used by the conditions `grasped` and
   `slip` and by the end of `release`; needs contacts only.
 - *carried*: a link presses, or it is attached to the tool, and the object has followed at least `FOLLOWS` of the
-  hand's motion, since the hand closed and since the step began. Used by every step that ends with an object in the hand, and by re-planning;
-  needs contacts and poses.
+  hand's motion, since the hand closed and since the step began. Used by every step that ends with an object in the
+  hand, and by re-planning; needs contacts and poses.
 
 The condition `slip` and the grasp intervals of a report build on `pressing`: `slip` measures how far a pinched object
 moved in the hand, an interval is the time in which an object is pressed and has no other support.
