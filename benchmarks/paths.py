@@ -98,7 +98,7 @@ def measure(problem: Problem, tally: Tally, ompl: tuple[ModuleType, ModuleType] 
     search = PathSearch.of(RrtConnectSpec(), np.random.default_rng(problem.number))
     began = clock()
     try:
-        motion = around(planner, search, state, query, problem.goal[columns][None], limits, None)
+        motion = around(planner, search, state, query, problem.goal[columns][None], limits, None, "move")
     except NotPlannable as refusal:
         print(f"{problem.kind} {problem.number}: {refusal}")
         return

@@ -115,6 +115,12 @@ are projected onto the constraints. `tool_speed`, `tool_acceleration` and `slosh
 fastest one that keeps them. Every control tick of the final motion is checked; a refusal names the constraint, the
 amount and the time.
 
+The run deviates from the plan by what the controllers leave, and what slips in the hand. So paths that the planner
+chooses keep a reserve: 1 deg of `upright`, at most a fifth of it, and 2 mm of `above` and `inside`; half of the margin
+where start or end leave less. Where only a path without the reserve exists, or the step states the path (`path:`), it
+is accepted. `tool_speed`, `tool_acceleration` and `slosh` have no reserve. To check the run, expect it:
+`always: {upright: {object: cup, within: 10 deg}}`.
+
 `slosh` bounds the apparent gravity g - a at the contents (their mean centre of mass; the centre of an empty
 container), a the acceleration there. A liquid's surface at rest in the container keeps this angle to the rim. Waves
 are not modelled.

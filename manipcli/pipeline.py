@@ -40,7 +40,7 @@ from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata
 from manipcli.task.controller_rows import controllers_of
 from manipcli.task.load_task import LoadOptions, load_task
 from manipcli.task.load_view import load_sight
-from manipcli.task.plan_task import Plan, plan_task, refused
+from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
 from manipcli.task.task import Task
 from manipcli.task.variants import overrides_of, simulation_of
 from manipcli.task.vocabulary import meanings
@@ -63,6 +63,7 @@ __all__ = [
     "schema",
     "self_collisions",
     "simulation_of",
+    "unplanned",
     "verify_log",
     "words",
 ]

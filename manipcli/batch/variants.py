@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from manipcli.batch.job import Job, Settings
-from manipcli.core.errors import InvalidInput, Place
+from manipcli.core.errors import Place
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.agreement import Agreement, compare
 from manipcli.judge.measured_run import MeasuredRun, engine_override
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.agreement.disagreement import message, summary
 from manipcli.report.run_report import RunReport
-from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Trouble, troubles_of
+from manipcli.report.suite.suite import Case, CaseReport, CaseWord, Trouble
 
 
 def in_engine(case: Case, path: Path, settings: Settings) -> Job:
@@ -64,13 +64,7 @@ def agreement_report(job: Job, runs: Sequence[CaseReport]) -> CaseReport:
     if lacking:
         text = "not compared: " + ", ".join(f"'{run.case.name}' {_word(run.outcome)}" for run in lacking)
         return CaseReport(job.case, "error", 0.0, job.command(), text, troubles=(Trouble(text, _task(job)),))
-    try:
-        agreement = compare([run.measured for run in runs if run.measured is not None])
-    except InvalidInput as invalid:
-        troubles = troubles_of(invalid.findings)
-        return CaseReport(
-            job.case, "invalid", 0.0, job.command(), "`agree:` is invalid", findings=invalid.findings, troubles=troubles
-        )
+    agreement = compare([run.measured for run in runs if run.measured is not None])
     troubles = tuple(Trouble(message(found), found.place) for found in agreement.disagreements)
     report = CaseReport(
         job.case,
@@ -79,6 +73,7 @@ def agreement_report(job: Job, runs: Sequence[CaseReport]) -> CaseReport:
         job.command(),
         summary(agreement),
         troubles=troubles,
+        warnings=agreement.warnings,
         agreement=agreement,
     )
     return _with_page(job, report, agreement, runs)

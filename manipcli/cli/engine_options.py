@@ -37,6 +37,10 @@ def engine_names(word: str | None, *, check_step: bool, overrides: Sequence[str]
 
     known = pipeline.words("engines")
     names = tuple(name.strip() for name in word.split(","))
+    if not all(names):
+        what = "an engine has no name" if any(names) else "no engine"
+        hint = f"name the engines with a comma in between, such as --engines {','.join(known[:2])}"
+        raise InvalidInput([_finding(word or "''", what, hint)])
     findings = [
         _finding(word, f"unknown engine '{name}'", did_you_mean(name, known, kind="engines"))
         for name in dict.fromkeys(names)

@@ -70,6 +70,11 @@ def scopes(spec: ConditionSpec, seam: Seams) -> dict[Scope, str]:
     return found
 
 
+def units_of(spec: ConditionSpec, seam: Seams) -> tuple[str, ...]:
+    """The SI units that its margin can have, without duplicates."""
+    return tuple(dict.fromkeys(unit for leaf in leaves(spec) for unit in seam[leaf.name].units))
+
+
 def leaves(spec: ConditionSpec) -> Iterator[ConditionSpec]:
     """The conditions in it, without combinations."""
     if not spec.combines:

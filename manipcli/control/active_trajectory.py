@@ -111,62 +111,6 @@ class ActiveTrajectory:
         return ActiveTrajectory(self.rest, tuple(kept))
 
 
-def decelerating(row: Array, times: Array) -> ActiveTrajectory:
-    """From a moving `row` (4, n) to rest, at constant deceleration: q = q0 + v0 (t - t^2 / (2 T)), v = v0 (1 - t / T).
-
-    It ends at q0 + v0 T / 2.
-
-    Args:
-        row: the reference now.
-        times: (n) T [s] of each joint; 0 stops it at once.
-    """
-    velocity = row[VELOCITY]
-    active = ActiveTrajectory.hold(row[POSITION], row[EFFORT])
-    for time in np.unique(times[times > INSTANT]):
-        columns = np.flatnonzero(times == time)
-        begin, rate = row[POSITION, columns], velocity[columns]
-        active = active.with_part(
-            _part(columns, float(time), (begin, begin + 0.5 * rate * time), (rate, 0.0 * rate), None, row[EFFORT])
-        )
-    return active
-
-
-def stopping_in(row: Array, duration: float) -> ActiveTrajectory:
-    """From a moving `row` (4, n) to rest in `duration` T [s], as ROS 1 stops.
-
-    The curve is the first half of the quintic that reverses the joint within 2 T, from (q0, v0, 0) to (q0, -v0, 0): it
-    ends at q0 + 5/8 v0 T.
-    """
-    n = row.shape[1]
-    position, velocity, still = row[POSITION], row[VELOCITY], np.zeros(n)
-    round_trip = JointTrajectory.of_arrays(
-        [str(k) for k in range(n)], [0.0, 2.0 * duration], [position, position], [velocity, -velocity], [still, still]
-    )
-    middle, _, bend = round_trip.sample(duration)
-    part = _part(np.arange(n), duration, (position, middle), (velocity, still), (still, bend), row[EFFORT])
-    return ActiveTrajectory.hold(position, row[EFFORT]).with_part(part)
-
-
-def _part(
-    columns: npt.NDArray[np.intp],
-    duration: float,
-    positions: Sequence[Array],
-    velocities: Sequence[Array],
-    accelerations: Sequence[Array] | None,
-    effort: Array,
-) -> Part:
-    """A part of two points, with a constant effort."""
-    names = [str(k) for k in columns]
-    efforts = np.tile(effort[columns], (2, 1))
-    return Part(
-        columns,
-        JointTrajectory.of_arrays(
-            names, [0.0, duration], np.array(positions), np.array(velocities), accelerations, efforts
-        ),
-        0.0,
-    )
-
-
 ON_TICK: Final = 1e-3
 """A time within this tolerance, in periods, of a sampled tick counts as that tick."""
 BLOCK: Final = 32

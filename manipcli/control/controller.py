@@ -21,6 +21,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import ControllerSpec, Interface, Role
 
 if TYPE_CHECKING:
+    from manipcli.control.stopping import StopPlanner
     from manipcli.model.kinematics import Kinematics
 
 FeedForward = Literal["none", "gravity", "inverse_dynamics"]
@@ -162,11 +163,15 @@ S = TypeVar("S", bound=ControllerSpec)
 
 @dataclass(frozen=True, slots=True)
 class BuildContext:
-    """Context for building controllers: the robot, its kinematics (computed on first use), and the ROS version."""
+    """Context for building controllers: the robot, its kinematics (computed on first use), and the ROS version.
+
+    `stop_planner`: plans stops without `compat`; None: they have a constant deceleration.
+    """
 
     robot: RobotModel
     kinematics: Callable[[], Kinematics]
     compat: Compat | None
+    stop_planner: StopPlanner | None = None
 
 
 @dataclass(frozen=True, slots=True)

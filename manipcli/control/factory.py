@@ -11,6 +11,7 @@ from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.lifecycle import ticks_between
 from manipcli.control.manager import ControllerManager
+from manipcli.control.stopping import StopPlanner
 from manipcli.core.errors import Diagnostic, InvalidArgument, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, listed
 from manipcli.description.transmission import Compat
@@ -35,6 +36,7 @@ def build_controllers(
     *,
     kinematics: Kinematics | None = None,
     compat: Compat | None = None,
+    stop_planner: StopPlanner | None = None,
 ) -> ControllerManager:
     """The controllers of a file, for a robot: loaded, configured, and activated where the file has `active: true`.
 
@@ -45,6 +47,7 @@ def build_controllers(
         place: of values, for findings.
         kinematics: of the robot, for those that need its dynamics; None: made when needed.
         compat: the rules where ROS 1 and 2 differ; None: the safer rule of each.
+        stop_planner: plans stops without `compat`; None: they have a constant deceleration.
 
     Raises:
         InvalidInput: `controller_findings` has errors.
@@ -52,7 +55,7 @@ def build_controllers(
     errors = [f for f in controller_findings(spec, robot, period, place) if f.severity == "error"]
     if errors:
         raise InvalidInput(errors)
-    context = BuildContext(robot, kinematics=cache(lambda: kinematics or Kinematics(robot)), compat=compat)
+    context = BuildContext(robot, cache(lambda: kinematics or Kinematics(robot)), compat, stop_planner)
     built = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
     wanted = any(controller.feed_forward != "none" for controller in built.values())
     manager = ControllerManager(

@@ -12,9 +12,10 @@ import numpy as np
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
-from manipcli.control.active_trajectory import POSITION, ActiveTrajectory, Reference
+from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
 from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.stopping import Stopping, StopPlanner
 from manipcli.control.tracking_error import TrackingError
 from manipcli.control.trajectory_goal import (
     Acceptance,
@@ -43,7 +44,8 @@ class JointTrajectoryController:
     succeeds at or after its end, when all joints are inside their goal tolerances at the same tick; it is aborted when
     a joint exceeds its path tolerance before (also at its first tick), or is outside its goal tolerance `goal_time`
     after the end. After a success the last position is held at rest; after a cancel the reference is brought to rest
-    and held: all joints on their straight path, or each by itself if a position limit is near.
+    and held: all joints on their straight path, or each by itself if a position limit is near. After an abort the stop
+    begins at the measured position, from the measured velocity.
 
     Where ROS 1 and 2 differ, `compat` chooses; without it the safer rule applies:
 
@@ -51,7 +53,10 @@ class JointTrajectoryController:
         what                        None                     ros1                    ros2
         ==========================  =======================  ======================  ========================
         integral of the PID         acts one step late       acts at once            acts one step late
-        after an abort              hold measured position   trajectory continues    hold measured position
+        a stop                      within acceleration,     constant deceleration   constant deceleration
+                                    jerk limits
+        after an abort              stop from measured       trajectory continues    hold measured position
+                                    motion
         goal_time: 0                no grace                 no grace                unlimited
         a preempted goal            aborted, INVALID_GOAL    canceled                aborted, INVALID_GOAL
         ==========================  =======================  ======================  ========================
@@ -79,6 +84,7 @@ class JointTrajectoryController:
         stop_trajectory_duration: [s] of the stop after a cancel; 0: by deceleration.
         speed_scaling: initial trajectory seconds per second.
         positions_upsampling: points with only positions get the velocities of a spline.
+        stop_planner: plans stops without `compat`; None: they have a constant deceleration. See `stopping.py`.
 
     Attributes:
         notes: arguments that have no effect, and why.
@@ -115,6 +121,7 @@ class JointTrajectoryController:
         stop_trajectory_duration: float = 0.0,
         speed_scaling: float = 1.0,
         positions_upsampling: bool = False,
+        stop_planner: StopPlanner | None = None,
     ) -> None:
         self.name = name
         self.joints = distinct(name, joints)
@@ -139,12 +146,12 @@ class JointTrajectoryController:
             allow_partial_joints_goal, allow_nonzero_velocity_at_trajectory_end,
             allow_integration_in_goal_trajectories, efforts="effort" in self.interfaces,
         )  # fmt: skip
-        deceleration, together = Transitions.decelerations(self._facts, self._constraints)
         self._transitions = Transitions(
             facts=self._facts, replaces=allow_trajectory_replacement, from_desired=interpolate_from_desired_state,
-            smooth=positions_upsampling, interpolation=interpolation_method, stop_duration=stop_trajectory_duration,
-            deceleration=deceleration, together=together,
+            smooth=positions_upsampling, interpolation=interpolation_method,
         )  # fmt: skip
+        planner = stop_planner if compat is None else None
+        self._stopping = Stopping.of(self._facts, self._constraints, stop_trajectory_duration, planner)
         self._default_tolerances = Tolerances.of(self.joints, self._constraints, patient=compat == "ros2")
         self.notes: tuple[str, ...] = ()
         self._timeout = cmd_timeout if cmd_timeout > self._constraints.goal_time else np.inf
@@ -299,7 +306,10 @@ class JointTrajectoryController:
             return
         self._forget()
         if then == "hold measured" and self._compat != "ros1":
-            self._reference.hold(ActiveTrajectory.hold(measured.position), time=time)
+            row = ActiveTrajectory.hold(measured.position).rest
+            if self._compat is None:
+                row[VELOCITY] = measured.velocity
+            self._come_to_rest(row, time, self._period)
             self._tracking.update(measured, self._bound)
 
     def _forget(self) -> None:
@@ -317,7 +327,7 @@ class JointTrajectoryController:
         if self._next is not None:
             self._begin(self._next, time, period, measured)
         elif self._stop:
-            self._come_to_rest(time, period)
+            self._come_to_rest(self._reference.row(time), time, period)
         self._next, self._stop = None, False
 
     def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
@@ -330,7 +340,7 @@ class JointTrajectoryController:
         broken = outside_limits(samples[:, POSITION], self._facts, period)
         if broken is not None:
             goal.handle.end("aborted", ErrorCode.INVALID_GOAL, f"controller '{self.name}': {broken}", time)
-            self._come_to_rest(time, period)
+            self._come_to_rest(self._reference.row(time), time, period)
             return
         goal.begin = later
         self._goal = goal
@@ -338,8 +348,8 @@ class JointTrajectoryController:
         reference.follow(active, samples, time=time, period=period, speed=self._speed)
         reference.advance(time, period)
 
-    def _come_to_rest(self, time: float, period: float) -> None:
-        active = self._transitions.to_rest(self._reference, time)
+    def _come_to_rest(self, row: Array, time: float, period: float) -> None:
+        active = self._stopping.to_rest(row, period)
         if active.parts:
             self._reference.follow(active, active.ticks(period), time=time, period=period)
             self._reference.advance(time, period)

@@ -35,6 +35,7 @@ class JointFacts:
     upper: Array
     velocity: Array
     acceleration: Array
+    jerk: Array
     continuous: Array
     wraps: bool
 
@@ -53,6 +54,7 @@ class JointFacts:
             upper=limit_array(limit.upper for limit in limits),
             velocity=limit_array(limit.velocity for limit in limits),
             acceleration=limit_array(limit.acceleration for limit in limits),
+            jerk=limit_array(limit.jerk for limit in limits),
             continuous=continuous,
             wraps=bool(continuous.any()),
         )
@@ -66,7 +68,7 @@ class JointFacts:
             joints=joints,
             units=tuple(self.units[i] for i in k),
             lower=self.lower[k], upper=self.upper[k], velocity=self.velocity[k], acceleration=self.acceleration[k],
-            continuous=self.continuous[k], wraps=bool(self.continuous[k].any()),
+            jerk=self.jerk[k], continuous=self.continuous[k], wraps=bool(self.continuous[k].any()),
         )  # fmt: skip
 
 

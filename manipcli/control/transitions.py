@@ -1,4 +1,4 @@
-"""Transitions of a trajectory controller: from the present reference to a new goal, and to rest."""
+"""Transitions of a trajectory controller from the present reference to a new goal; `stopping.py` has those to rest."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from manipcli.control.active_trajectory import (
     Columns,
     Part,
     Reference,
-    decelerating,
-    stopping_in,
 )
 from manipcli.control.trajectory_goal import (
     POSITION_SLACK,
@@ -28,35 +26,17 @@ from manipcli.control.trajectory_goal import (
 )
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import Interpolation, JointTrajectory, TrajectoryPoint
-from manipcli.spec.controllers import ConstraintsSpec
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transitions:
-    """Settings of one controller for transitions; see `JointTrajectoryController` for the first five.
-
-    Attributes:
-        deceleration: (n) of each joint; infinite: it stops at once.
-        together: whether all joints stop at the same time, on their straight path, if their limits allow it.
-    """
+    """Settings of one controller for transitions to new goals; see `JointTrajectoryController`."""
 
     facts: JointFacts
     replaces: bool
     from_desired: bool
     smooth: bool
     interpolation: Interpolation
-    stop_duration: float
-    deceleration: Array
-    together: bool
-
-    @staticmethod
-    def decelerations(facts: JointFacts, constraints: ConstraintsSpec) -> tuple[Array, bool]:
-        """`deceleration` and `together`."""
-        if not constraints.decelerate_on_cancel:
-            return np.full(len(facts.joints), np.inf), True
-        own = {joint: constraint.max_deceleration_on_cancel for joint, constraint in constraints.joints.items()}
-        chosen = [own.get(joint, 0.0) or limit for joint, limit in zip(facts.joints, facts.acceleration, strict=True)]
-        return np.array(chosen), not any(own.values())
 
     def to_goal(
         self,
@@ -142,33 +122,6 @@ class Transitions:
         if (excess > POSITION_SLACK).any():
             j = int(excess.argmax())
             raise too_fast(facts, j, float(nearest[j]) / duration, f"on the path to point {k}")
-
-    def to_rest(self, reference: Reference, time: float) -> ActiveTrajectory:
-        """The active trajectory from `time` [s] on, until it rests; in seconds of real time.
-
-        If that exceeds a position limit of a joint, each joint stops by itself: within the time given by its own
-        deceleration, or by the stop duration, but before its limit, even with a larger deceleration.
-        """
-        now = reference.row(time)
-        if self.stop_duration > 0.0:
-            own = np.full(now.shape[1], self.stop_duration)
-            active = stopping_in(now, self.stop_duration)
-        else:
-            own = np.abs(now[VELOCITY]) / self.deceleration
-            common = np.where(np.isfinite(self.deceleration), own.max(), 0.0)
-            active = decelerating(now, common if self.together else own)
-        room = self._room(now)
-        distances = np.abs(active.sample(np.array([active.end]))[0, POSITION] - now[POSITION])
-        if (distances <= room + POSITION_SLACK).all():
-            return active
-        rate = np.abs(now[VELOCITY])
-        latest = np.divide(2.0 * room, rate, out=np.zeros_like(rate), where=rate > 0.0)
-        return decelerating(now, np.minimum(own, latest))
-
-    def _room(self, row: Array) -> Array:
-        """(n) distance of each joint to its limit in its direction of motion; 0 beyond the limit."""
-        ahead = np.where(row[VELOCITY] > 0.0, self.facts.upper - row[POSITION], row[POSITION] - self.facts.lower)
-        return np.asarray(np.maximum(ahead, 0.0))
 
     def _columns(self, names: Sequence[str]) -> Columns:
         joints = self.facts.joints

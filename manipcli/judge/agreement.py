@@ -7,17 +7,27 @@ are the same: a verdict that changes with the step is an artefact of the integra
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
-from manipcli.core.errors import Place
+from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.judge.compared_numbers import Kind, Row, by_name, margin_of, rows_of
 from manipcli.judge.measured_run import MeasuredRun, Number
 from manipcli.judge.verdict import StepOutcome
+from manipcli.spec.source.tree import dotted
 
-Cause = Literal["engines", "step"]
-"""`engines`: the runs of different engines differ; `step`: the run at half the step has another outcome."""
+Cause = Literal["engines", "step", "limit"]
+"""`engines`: the runs of different engines differ; `step`: the run at half the step has another outcome; `limit`: a
+limit of `agree:` has another unit than its margin, which only the runs show."""
+LIMITS: Final[Mapping[Kind, str]] = {
+    "duration": "duration",
+    "step_duration": "duration",
+    "slip": "slip",
+    "grasp_force": "force",
+    "contact_force": "contact_force",
+}
+"""The fields of `agree:` that limit numbers other than margins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +35,12 @@ class Disagreement:
     """One thing in which two runs differ.
 
     Attributes:
-        cause: whether engines or steps disagree.
+        cause: what disagrees.
         kind: `verdict`, `step`, `expectation`: its outcome; else the number.
         name: of the step, the expectation, the body; "" for the whole task.
         runs: names of the two runs.
         outcomes: in the two runs; empty for a number.
-        texts: the reason of each outcome, "" without one.
+        texts: the reason of each outcome, "" without one; for `limit`, why it cannot be used.
         values: numbers of the two runs; None where there are none.
         allowed: the allowed difference of a number; None without a limit.
         place: in the task file.
@@ -68,6 +78,11 @@ class Agreement:
         return done or any(each.outcome != "not_evaluated" for verdict in verdicts for each in verdict.expectations)
 
     @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """Limits of `agree:` without effect: fewer than two engines have the number; empty for a single engine."""
+        return tuple(_ineffective(self)) if self.judged and len(self.engines) > 1 else ()
+
+    @property
     def engines(self) -> tuple[MeasuredRun, ...]:
         """The runs at the step of the task, one per engine."""
         return tuple(run for run in self.runs if not run.variant.half_step)
@@ -78,9 +93,6 @@ def compare(runs: Sequence[MeasuredRun]) -> Agreement:
 
     Args:
         runs: at least two; one per engine at the step of the task, each optionally with a run at half the step.
-
-    Raises:
-        InvalidInput: `agree:` gives a margin an amount in another unit.
     """
     whole = [run for run in runs if not run.variant.half_step]
     halved = {run.variant.engine: run for run in runs if run.variant.half_step}
@@ -91,8 +103,9 @@ def compare(runs: Sequence[MeasuredRun]) -> Agreement:
     found += [
         _beyond(row, runs, _place(first, row))
         for row in rows
-        if not row.agrees and not (row.kind == "margin" and row.name in flipped)
+        if not row.agrees and not row.misfit and not (row.kind == "margin" and row.name in flipped)
     ]
+    found += [_unusable(row, whole) for row in rows if row.misfit]
     for run in whole:
         if run.variant.engine in halved:
             found += _flips("step", run, halved[run.variant.engine])
@@ -147,6 +160,38 @@ def _beyond(row: Row, runs: Sequence[MeasuredRun], place: Place | None) -> Disag
     return Disagreement("engines", row.kind, row.name, names, values=values, allowed=row.allowed, place=place)
 
 
+def _unusable(row: Row, runs: Sequence[MeasuredRun]) -> Disagreement:
+    """A limit in another unit: the margins are not compared, so the runs do not agree."""
+    place = runs[0].places.get(("agree", "margins", row.name))
+    names = (runs[0].name, runs[1].name)
+    return Disagreement("limit", row.kind, row.name, names, texts=(row.misfit,), place=place)
+
+
+def _ineffective(agreement: Agreement) -> Iterator[Diagnostic]:
+    """A warning for each limit that no number was compared with."""
+    agree, places = agreement.runs[0].agree, agreement.runs[0].places
+    compared = {(row.kind, row.name) for row in agreement.rows if row.difference is not None}
+    kinds = {kind for kind, _ in compared}
+    limits: list[tuple[Loc, bool, str]] = [
+        (("agree", "margins", name), ("margin", name) in compared, f"a margin of '{name}'") for name in agree.margins
+    ]
+    if agree.margin is not None:
+        limits.append((("agree", "margin"), "margin" in kinds, "a margin"))
+    if agree.duration is not None:
+        limits.append((("agree", "duration"), "duration" in kinds, "a duration"))
+    of_kinds: tuple[tuple[Kind, str], ...] = (
+        ("slip", "a slip in the hand"), ("grasp_force", "a grasp"), ("contact_force", "a contact"),
+    )  # fmt: skip
+    for kind, what in of_kinds:
+        key = LIMITS[kind]
+        if getattr(agree, key) is not None:
+            limits.append((("agree", key), kind in kinds, what))
+    for loc, used, what in limits:
+        if not used:
+            message = f"{dotted(loc)} has no effect: fewer than two engines have {what}"
+            yield Diagnostic("TASK248", message, places.get(loc), severity="warning")
+
+
 def _place(run: MeasuredRun, row: Row) -> Place | None:
     """Where the expectation or step of a number is written; the limit of a grasp, else the task."""
     if row.kind == "margin":
@@ -154,7 +199,7 @@ def _place(run: MeasuredRun, row: Row) -> Place | None:
         return _of_expectation(run, names.index(row.name)) if row.name in names else None
     if row.kind == "step_duration":
         return _of_step(run, row.name)
-    key = {"slip": "slip", "grasp_force": "force"}.get(row.kind, "duration")
+    key = LIMITS.get(row.kind, "duration")
     return run.places.get(("agree", key), run.places.get(("task",)))
 
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, TypeVar
 
-from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.units import NUMBER, parse_unit
 from manipcli.judge.measured_run import MeasuredRun, Number
 from manipcli.judge.measures.floors import share_of
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
-from manipcli.spec.agree import amount_of
+from manipcli.spec.agree import AgreeSpec, amount_of
 
 T = TypeVar("T")
 Kind = Literal["margin", "duration", "step_duration", "slip", "rotation", "grasp_force", "contact_force"]
@@ -31,6 +30,7 @@ class Row:
         difference: between the largest and the smallest value of the engines, in `unit`; None with fewer than two
             values; infinite where their units differ (another part of a condition decides).
         allowed: limit of the difference in its unit; None: any.
+        misfit: why the limit of the task cannot be used: its unit is not that of the number; "" where it can.
     """
 
     kind: Kind
@@ -39,6 +39,7 @@ class Row:
     outcomes: tuple[str, ...] = ()
     difference: float | None = None
     allowed: float | None = None
+    misfit: str = ""
 
     @property
     def unit(self) -> str:
@@ -48,6 +49,8 @@ class Row:
     @property
     def agrees(self) -> bool:
         """Whether the difference is allowed; a number that a run does not have is not compared."""
+        if self.misfit:
+            return False
         return self.allowed is None or self.difference is None or self.difference <= self.allowed
 
 
@@ -59,7 +62,8 @@ def rows_of(runs: Sequence[MeasuredRun]) -> Iterator[Row]:
         found = [expectations.get(name) for expectations in judged]
         margins = [None if expectation is None else margin_of(expectation) for expectation in found]
         outcomes = tuple("" if expectation is None else expectation.outcome for expectation in found)
-        yield _row("margin", name, margins, runs, partial(_margin_limit, runs[0], name), outcomes)
+        row = _row("margin", name, margins, runs, partial(_margin_limit, agree, name), outcomes)
+        yield row if row.difference is None else replace(row, misfit=_misfit(agree, name, row.unit))
     ran = [run if run.log is not None or run.verdict.simulated_time > 0.0 else None for run in runs]
     durations = [None if run is None else Number(run.verdict.simulated_time, "s") for run in ran]
     yield _row("duration", "", durations, runs, _share(agree.duration))
@@ -76,8 +80,9 @@ def rows_of(runs: Sequence[MeasuredRun]) -> Iterator[Row]:
         yield _row("rotation", name, rotations, runs, _share(None))
         forces = [_number(None if grasp is None else grasp.force, "N") for grasp in mine]
         yield _row("grasp_force", name, forces, runs, _share(agree.force))
+    limit = _share(agree.contact_force)
     for name in _names([run.forces for run in runs]):
-        yield _row("contact_force", name, [_number(run.forces.get(name), "N") for run in runs], runs, _share(None))
+        yield _row("contact_force", name, [_number(run.forces.get(name), "N") for run in runs], runs, limit)
 
 
 Limit = Callable[[float, str], float | None]
@@ -88,20 +93,26 @@ def _share(share: float | None) -> Limit:
     return lambda size, unit: None if share is None else share_of(share, size, unit)
 
 
-def _margin_limit(run: MeasuredRun, name: str, size: float, unit: str) -> float | None:
-    """The allowed difference of a margin."""
-    agree = run.agree
+def _margin_limit(agree: AgreeSpec, name: str, size: float, unit: str) -> float | None:
+    """The allowed difference of a margin; None also for an amount in another unit."""
     amount = agree.margins.get(name)
     if amount is None or isinstance(amount, float | int):
         return amount if amount is not None else _share(agree.margin)(size, unit)
     quantity = amount_of(amount)
     if quantity.dimension == NUMBER:
         return share_of(quantity.value, size, unit)
-    if quantity.dimension != (parse_unit(unit).dimension if unit else NUMBER):
-        message = f"agree.margins.{name}: '{amount}' is {quantity.dimension.name}; the margin is in {unit or 'no unit'}"
-        place = run.places.get(("agree", "margins", name))
-        raise InvalidInput([Diagnostic("TASK246", message, place, hint="write an amount in this unit, or a share")])
-    return quantity.value
+    return None if _misfit(agree, name, unit) else quantity.value
+
+
+def _misfit(agree: AgreeSpec, name: str, unit: str) -> str:
+    """Why the amount for this margin cannot be used; "" if it can. For a condition whose margin can have several units,
+    only the run shows which: the others are refused with the task."""
+    amount = agree.margins.get(name)
+    quantity = amount_of(amount) if isinstance(amount, str) else None
+    if quantity is None or quantity.dimension in (NUMBER, parse_unit(unit).dimension if unit else NUMBER):
+        return ""
+    where = f"in {unit}" if unit else "without a unit"
+    return f"agree.margins.{name}: '{amount}' is {quantity.dimension.name}; the margin is {where}"
 
 
 def _row(

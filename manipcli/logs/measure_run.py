@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from manipcli.core.errors import Loc, Place
+from manipcli.judge.agreement import LIMITS
 from manipcli.judge.measured_run import GraspNumbers, MeasuredRun, Variant
 from manipcli.judge.measures.grasp_intervals import GraspFacts, GraspMeter, find_grasps
 from manipcli.judge.measures.step_measures import step_measures
@@ -80,7 +81,8 @@ def _places(task: Located[TaskSpec]) -> dict[Loc, Place]:
     """`MeasuredRun.places`; `("judged", k)` is the k-th of expectations and watches."""
     spec = task.spec
     keys: list[Loc] = [("task",), *(("steps", k) for k in range(len(spec.steps)))]
-    keys += [("agree", key) for key in ("duration", "slip", "force") if getattr(spec.agree, key) is not None]
+    limits = ("margin", *dict.fromkeys(LIMITS.values()))
+    keys += [("agree", key) for key in limits if getattr(spec.agree, key) is not None]
     keys += [("agree", "margins", name) for name in spec.agree.margins]
     judged: list[Loc] = [("judged", k) for k in range(len(spec.judged_at))]
     places = zip((*keys, *judged), (*keys, *spec.judged_at), strict=True)

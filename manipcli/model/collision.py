@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.collision_pairs import Part, checked_pairs, margins_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.motion_bound import MotionBound, Mover
 from manipcli.model.self_collision import lasting_overlaps
@@ -32,7 +33,6 @@ from manipcli.shapes.proximity import bounding_ball, coal_shape
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from manipcli.shapes.proximity import CollisionGeometry
 
 RESOLUTION = 0.01  # rad or m: largest joint motion between two checked positions of a trajectory
 _LIGHTEST = 0.05  # weight of a pair that moves little
@@ -88,14 +88,14 @@ class CollisionChecker:
         self.scene = scene
         self._kinematics = kinematics
         self._bodies = {body.name: [(g.X_LS, coal_shape(g.shape)) for g in body.geometries] for body in scene.bodies}
-        self._links: list[_Part] = []
+        self._links: list[Part] = []
         model = kinematics.model
         for link in kinematics.robot.links:
             frame = model.frames[model.getFrameId(link.name)]
             for g in link.collisions:
                 placement = frame.placement * _se3(g.X_LS)
                 self._links.append(
-                    _Part(f"robot/{link.name}", "link", frame.parentJoint, placement, coal_shape(g.shape))
+                    Part(f"robot/{link.name}", "link", frame.parentJoint, placement, coal_shape(g.shape))
                 )
         self._near = _neighbours(model)
         self._ignored = {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in ignore}
@@ -141,7 +141,7 @@ class CollisionChecker:
                 frame = model.frames[model.getFrameId(held[body].link)]
                 role = "carried"
                 joint, X_JO = frame.parentJoint, frame.placement * _se3(held[body].X_LO)
-            parts += [_Part(body, role, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
+            parts += [Part(body, role, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
         allowed = self._ignored | {frozenset(pair) for pair in ignore}
         if carried is not None:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
@@ -162,7 +162,7 @@ class CollisionQuery:
     def __init__(
         self,
         kinematics: Kinematics,
-        parts: Sequence[_Part],
+        parts: Sequence[Part],
         near: frozenset[tuple[int, int]],
         allowed: set[frozenset[str]],
         margin: float,
@@ -177,6 +177,7 @@ class CollisionQuery:
         self.margin = margin
         self._own_margins = margins
         self._inflated: dict[tuple[float, ...], InflatedQuery] = {}
+        self._nearer: dict[float, CollisionQuery] = {}
         self._parts = tuple(parts)
         self._made = (kinematics, self._parts, near, allowed)
         self._only = only
@@ -186,24 +187,34 @@ class CollisionQuery:
             self._geometry.addGeometryObject(
                 pin.GeometryObject(f"{part.name}#{k}", part.joint, part.placement, part.shape)
             )
-        carried = [k for k, part in enumerate(parts) if part.role == "carried"]
-        for i, a in enumerate(parts):
-            # Pairs of scene bodies are never checked, and skipped early because there can be many.
-            for j in [k for k in carried if k > i] if a.role == "scene" else range(i + 1, len(parts)):
-                b = parts[j]
-                if only is not None and only not in (a.name, b.name):
-                    continue
-                if _may_meet(a, b, near) and frozenset((a.name, b.name)) not in allowed:
-                    self._geometry.addCollisionPair(pin.CollisionPair(i, j))
+        self._pairs = checked_pairs(parts, kinematics.model, near, allowed, only)
+        self._geometry.setCollisionPairs(self._pairs)
         self._data = kinematics.model.createData()
         self._state = pin.GeometryData(self._geometry)
-        for pair, request in zip(self._geometry.collisionPairs, self._state.collisionRequests, strict=True):
-            own = frozenset((self._names[pair.first], self._names[pair.second])) if margins else frozenset()
-            request.security_margin = margins.get(own, margin)
+        for request in self._state.collisionRequests:
             request.enable_contact = True
-        self._broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            kinematics.model, self._geometry, self._state
+        self._margins = margins_of(self._names, margin, margins)
+        self._kept: object = None  # the broad phase whose margins the requests have
+        self._broad = self._managed(self._margins)
+
+    def _managed(self, margins: Array) -> object:
+        """A broad phase of the pairs with these margins (parts, parts)."""
+        self._state.setSecurityMargins(self._geometry, margins, True, False)
+        self._kept = self._pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._kinematics.model, self._geometry, self._state
         )
+        return self._kept
+
+    def _require(self, broad: object, margins: Array) -> None:
+        """Sets the margins with which `broad` was made."""
+        if self._kept is not broad:
+            self._state.setSecurityMargins(self._geometry, margins, True, False)
+            self._kept = broad
+
+    def _touches(self, q: Array, broad: object, margins: Array) -> bool:
+        """Whether any parts touch at `q` with the margins that `broad` was made with."""
+        self._require(broad, margins)
+        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, broad, q, True))
 
     @property
     def shapes(self) -> tuple[pin.GeometryModel, Sequence[str]]:
@@ -227,13 +238,13 @@ class CollisionQuery:
 
     def touches(self, q: npt.ArrayLike) -> bool:
         """Whether any parts touch at `q` (n); faster than `check`."""
-        q = np.asarray(q, dtype=np.float64)
-        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, self._broad, q, True))
+        return self._touches(np.asarray(q, dtype=np.float64), self._broad, self._margins)
 
     def every(self, q: npt.ArrayLike) -> tuple[CollisionHit, ...]:
         """Every touching pair of parts at `q` (n) with its deepest contact, sorted by name."""
         pin, geometry = self._pin, self._geometry
         q = np.asarray(q, dtype=np.float64)
+        self._require(self._broad, self._margins)
         pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, q, False)
         deepest: dict[Pair, float] = {}
         for pair, result in zip(geometry.collisionPairs, self._state.collisionResults, strict=True):
@@ -250,8 +261,10 @@ class CollisionQuery:
 
     def nearer(self, share: float) -> CollisionQuery:
         """The same query with this share of every margin."""
-        margins = {pair: share * margin for pair, margin in self._own_margins.items()}
-        return CollisionQuery(*self._made, share * self.margin, margins=margins, only=self._only)
+        if share not in self._nearer:
+            margins = {pair: share * margin for pair, margin in self._own_margins.items()}
+            self._nearer[share] = CollisionQuery(*self._made, share * self.margin, margins=margins, only=self._only)
+        return self._nearer[share]
 
     def inflated(self, levels: Sequence[float]) -> InflatedQuery:
         """The same query with larger margins [m]; see `InflatedQuery`."""
@@ -304,81 +317,49 @@ class InflatedQuery:
         levels: Sequence[float],
     ) -> None:
         self._query = query
-        self._pin, self._kinematics, self._geometry = query._pin, query._kinematics, query._geometry
-        parts, kinematics, geometry = query._parts, query._kinematics, query._geometry
-        self._data = kinematics.model.createData()
-        moves = _moves(kinematics.model)
-        movers: dict[tuple[int, int], int] = {}
-        columns: dict[tuple[int, ...], int] = {}
-        self._column: list[int] = []  # of every pair
-        for pair in geometry.collisionPairs:
-            i, j = pair.first, pair.second
-            a, b = parts[i].joint, parts[j].joint
-            rows = []
-            if moves[a][b]:
-                rows.append(movers.setdefault((i, b), len(movers)))
-            if moves[b][a]:
-                rows.append(movers.setdefault((j, a), len(movers)))
-            self._column.append(columns.setdefault(tuple(rows), len(columns)))
-        self.bound = MotionBound(kinematics, [_mover(parts[k], seen_from) for k, seen_from in movers])
+        parts, moves = query._parts, _moves(query._kinematics.model)
+        i, j = np.nonzero(query._pairs)
+        joint = np.array([part.joint for part in parts], dtype=np.intp)
+        # A mover is a part, seen from a joint; of a pair, each part that moves as seen from the other is one.
+        seen = np.concatenate((i * len(moves) + joint[j], j * len(moves) + joint[i]))
+        moving = np.concatenate((moves[joint[i], joint[j]], moves[joint[j], joint[i]]))
+        movers, rows = np.unique(np.where(moving, seen, -1), return_inverse=True)
+        first, second = np.sort(rows.reshape(2, -1), axis=0)
+        columns, column = np.unique(first * len(movers) + second, return_inverse=True)
         self.summed = np.zeros((len(movers), len(columns)))
-        for key, column in columns.items():
-            self.summed[list(key), column] = 1.0
+        for k in divmod(columns, max(1, len(movers))):
+            self.summed[k, np.arange(len(columns))] = 1.0
+        self.summed = self.summed[movers >= 0]
+        balls = [bounding_ball(part.shape) for part in parts]
+        self.bound = MotionBound(
+            query._kinematics, [_mover(parts, balls, *divmod(int(mover), len(moves))) for mover in movers[movers >= 0]]
+        )
         reach = self.bound.reach.sum(axis=1) @ self.summed
         self.weights = np.maximum(reach / max(1e-9, float(reach.max(initial=0.0))), _LIGHTEST)
-        self._margins = [c * self.weights for c in levels]
-        self._levels: list[tuple[pin.GeometryData, object] | None] = [None] * len(levels)
+        weights = np.zeros((len(parts), len(parts)))
+        weights[i, j] = self.weights[column]
+        self._margins = [query._margins + c * weights for c in levels]
+        self._broad: list[object] = [query._broad, *([None] * (len(levels) - 1))]
 
     def touches(self, q: Array, level: int) -> bool:
         """Whether any parts are closer than their margin of this level."""
-        if level == 0:
-            return self._query.touches(q)
-        made = self._levels[level]
-        if made is None:
-            made = self._levels[level] = self._make(self._margins[level])
-        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, made[1], q, True))
-
-    def _make(self, margins: Array) -> tuple[pin.GeometryData, object]:
-        pin = self._pin
-        state = pin.GeometryData(self._geometry)
-        own = self._query._state.collisionRequests
-        for request, least, column in zip(state.collisionRequests, own, self._column, strict=True):
-            request.security_margin = least.security_margin + float(margins[column])
-        broad = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(self._kinematics.model, self._geometry, state)
-        return state, broad
+        query, margins = self._query, self._margins[level]
+        if self._broad[level] is None:
+            self._broad[level] = query._managed(margins)
+        return query._touches(q, self._broad[level], margins)
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """A shape of a link or of a body; `placement` is in the frame of `joint` (0: the world)."""
-
-    name: str
-    role: Literal["link", "carried", "scene"]
-    joint: int
-    placement: pin.SE3
-    shape: CollisionGeometry
-
-
-def _moves(model: pin.Model) -> list[list[bool]]:
+def _moves(model: pin.Model) -> npt.NDArray[np.bool_]:
     """[a][b]: whether some joint moves what is fixed to joint a relative to what is fixed to b (0: the world)."""
     chains: list[set[int]] = [set()]
     for k in range(1, model.njoints):
         chains.append({*chains[model.parents[k]], k})
-    return [[not a <= b for b in chains] for a in chains]
+    return np.array([[not a <= b for b in chains] for a in chains], dtype=bool)
 
 
-def _mover(part: _Part, seen_from: int) -> Mover:
-    centre, radius = bounding_ball(part.shape)
-    return Mover(part.joint, seen_from, part.placement.act(centre), radius)
-
-
-def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:
-    """Whether two parts can move relative to each other through more than one joint."""
-    if a.role == b.role == "link":
-        return a.joint != b.joint and (a.joint, b.joint) not in near
-    if a.role == b.role:
-        return False
-    return a.joint != b.joint or "link" not in (a.role, b.role)
+def _mover(parts: Sequence[Part], balls: Sequence[tuple[Array, float]], k: int, seen_from: int) -> Mover:
+    centre, radius = balls[k]
+    return Mover(parts[k].joint, seen_from, parts[k].placement.act(centre), radius)
 
 
 def _neighbours(model: pin.Model) -> frozenset[tuple[int, int]]:

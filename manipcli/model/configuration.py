@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,14 @@ def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
             leader = position[..., robot.joint_names.index(joint.mimic.joint)]
             position[..., k] = joint.mimic.multiplier * leader + joint.mimic.offset
     return frozen(position)
+
+
+def with_joints(robot: RobotModel, rest: Array, names: Sequence[str], values: npt.ArrayLike) -> Array:
+    """(..., n) the positions `rest` (n) of all joints, with those of some joints at `values` (..., m)."""
+    values = np.asarray(values, dtype=np.float64)
+    position = np.tile(rest, (*values.shape[:-1], 1))
+    position[..., robot.indices(tuple(names))] = values
+    return position
 
 
 def zero_configuration(robot: RobotModel) -> Array:

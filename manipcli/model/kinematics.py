@@ -61,6 +61,7 @@ class Kinematics:
             self._holders[link.name] = parent
         model.armature = reflected_inertia(robot)
         self._data = model.createData()
+        self._aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
     @property
     def model(self) -> pinocchio.Model:
@@ -93,19 +94,20 @@ class Kinematics:
         # computeFrameJacobian would not update the placements of the joints.
         pin.computeJointJacobians(model, data, q)
         X = pin.updateFramePlacement(model, data, frame)
-        found = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        J: Array = np.array(found).reshape(6, -1)  # for a single joint Pinocchio returns a vector
-        R, p = np.array(X.rotation), np.array(X.translation)
-        if offset is not None:
-            arm = R @ offset.p
-            x, y, z = arm.tolist()
-            wx, wy, wz = J[3:]
-            # v_T = v_L + w x arm
-            J[0] += wy * z - wz * y
-            J[1] += wz * x - wx * z
-            J[2] += wx * y - wy * x
-            R, p = R @ offset.R, p + arm
-        return R, p, J
+        J: Array = pin.getFrameJacobian(model, data, frame, self._aligned)
+        if J.ndim == 1:  # of a single joint
+            J = J.reshape(6, -1)
+        R, p = X.rotation, X.translation
+        if offset is None:
+            return np.array(R), np.array(p), J
+        arm = R @ offset.p
+        x, y, z = arm.tolist()
+        wx, wy, wz = J[3:]
+        # v_T = v_L + w x arm
+        J[0] += wy * z - wz * y
+        J[1] += wz * x - wx * z
+        J[2] += wx * y - wy * x
+        return R @ offset.R, p + arm, J
 
     def point_velocity(self, q: Array, v: Array, link: str, offset: Transform | None = None) -> Array:
         """v_WT (3,) [m/s] of the origin of frame T in the world; T is L, or at `offset` X_LT in L."""

@@ -68,10 +68,8 @@ class MotionBound:
         seen = [self._above[m.seen_from - 1] if m.seen_from else np.zeros(n, dtype=bool) for m in movers]
         own = self._above[[mover.joint - 1 for mover in movers]] if len(movers) else np.zeros((0, n), dtype=bool)
         self._between = (own & ~np.array(seen, dtype=bool).reshape(-1, n)).astype(np.float64)  # (P, n)
-        whose = dict(zip(self._ball.tolist(), movers, strict=True))
-        self.reach = (
-            self._between * np.array([self._reach(whose[k]) for k in range(len(whose))]).reshape(-1, n)[self._ball]
-        )
+        radii = np.array([radius for _, _, radius in balls])
+        self.reach = self._between * self._reach(radii)[self._ball]
         """(P, n) the largest distance [m] of each mover from each axis that moves it; 1 for a prismatic joint."""
         # Joints are ordered from the base outwards along every branch: the outer one of a pair has the greater index.
         inner = np.triu((self._between * self._revolute)[:, :, None] * self.reach[:, None, :])
@@ -121,23 +119,26 @@ class MotionBound:
                 R[:, j] = R[:, before] @ R[:, j]
         return R, p
 
-    def _reach(self, mover: Mover) -> Array:
-        """(n) see `reach`; 0 for joints that do not move it."""
-        far = np.zeros(len(self._before))
-        k = mover.joint - 1
-        # The mover lies in the ball of radius `ball` about `centre`, a point in the frame of joint k.
-        centre, ball = np.array(mover.centre), mover.radius
-        while k >= 0:
+    def _reach(self, radii: Array) -> Array:
+        """(balls, n) see `reach`; 0 for joints that do not move the ball."""
+        far = np.zeros((len(radii), len(self._before)))
+        # Each ball's positions so far lie in the ball of radius `ball` about `centre`, a point in the frame of `at`.
+        centre, ball, at = self._centre[..., 0].copy(), np.array(radii), self._joint.copy()
+        for k in range(len(self._before) - 1, -1, -1):
+            there = at == k
             axis = self._axes[k]
-            across = centre - axis * (axis @ centre)
-            far[k] = float(np.linalg.norm(across)) + ball if self._revolute[k] else 1.0
+            on_axis = (centre[there] @ axis)[:, None] * axis
+            across = np.linalg.norm(centre[there] - on_axis, axis=1)
             if self._revolute[k]:
                 # Rotation about the axis: the ball about the centre's foot on the axis holds every position.
-                centre, ball = axis * (axis @ centre), ball + float(np.linalg.norm(across))
+                far[there, k] = across + ball[there]
+                centre[there] = on_axis
+                ball[there] += across
             else:
-                ball += self._travel[k]
-            centre = self._rest(k) @ centre + self._offsets[k]
-            k = self._before[k]
+                far[there, k] = 1.0
+                ball[there] += self._travel[k]
+            centre[there] = centre[there] @ self._rest(k).T + self._offsets[k]
+            at[there] = self._before[k]
         return far
 
     def _rest(self, k: int) -> Array:

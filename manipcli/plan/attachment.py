@@ -1,16 +1,23 @@
-"""Motions of a robot that holds by an attachment without fingers: a suction cup grips, or lets go."""
+"""Attachments in planning: a suction cup grips or lets go; the forces on an object that an attachment holds."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
+
+import numpy as np
 
 from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
 from manipcli.model.collision import Carried
 from manipcli.model.holding import surface
 from manipcli.plan.motion import CLOSING, Motion, PlanningState
 from manipcli.plan.planner import Pairs, Planner
 
-ATTACHING = 0.1
+MOST: Final = 1e3
+"""Largest ratio to the weight that is computed."""
+HALVINGS: Final = 40
+ATTACHING: Final = 0.1
 """[s] Time that a suction cup takes to grip or to let go."""
 
 
@@ -37,3 +44,40 @@ def attached(planner: Planner, state: PlanningState, body: str | None, allowed: 
 def freed(state: PlanningState) -> tuple[Motion, PlanningState]:
     """The motion that frees what is attached to the tool, and the state after it."""
     return Motion("open", None, None, ATTACHING, begins=state, lets_go=True), replace(state, carried=None, closed=False)
+
+
+class AttachedForce:
+    """The forces on an object that the attachment of the tool holds.
+
+    Args:
+        planner, state: the robot with the object.
+        centre: (3,) [m] the object's centre of mass in the world.
+        mu: coefficient of friction.
+    """
+
+    def __init__(self, planner: Planner, state: PlanningState, centre: Array, mu: float) -> None:
+        assert planner.robot.holding is not None
+        X_WT = planner.tool_pose(state)
+        self._holding, self._mu, self._R_TW = planner.robot.holding, mu, X_WT.R.T
+        self._arm = self._R_TW @ (centre - X_WT.p)
+
+    def most(self, force: Array, *, beside: Array | None = None) -> float:
+        """The largest s, at most `MOST`, for which s `force` (3,) [N] and `beside` (3,) [N] are held.
+
+        What is held is convex, so that bisection finds it.
+        """
+        extra = np.zeros(3) if beside is None else beside
+        low, high = 0.0, MOST
+        if not self._holds(extra):
+            return 0.0
+        if self._holds(high * force + extra):
+            return MOST
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._holds(middle * force + extra) else (low, middle)
+        return low
+
+    def _holds(self, force: Array) -> bool:
+        """Whether the tool can resist a force (3,) [N] at the centre of mass."""
+        f = -self._R_TW @ force
+        return self._holding.load(np.concatenate((f, np.cross(self._arm, f))), self._mu).share <= 1.0

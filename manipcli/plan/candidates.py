@@ -35,11 +35,14 @@ class Candidate:
         plan: its plan; raises NotPlannable.
         name: in reports; "" for the only way.
         grasp: R_WT (3, 3) of the tool when the hand closes; None for a step that does not grasp.
+        look: why `plan` surely raises, found much sooner than by it; None if it may have a plan. The reason that is
+            reported is that of `plan`.
     """
 
     plan: Callable[[], StepPlan]
     name: str = ""
     grasp: Array | None = None
+    look: Callable[[], NotPlannable | None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +67,10 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """A candidate, its plan, the candidates that were refused before it, and its `index` among
-    all; 0 for one of `Candidates.further`."""
+    """A candidate, its plan, and its `index` among all; 0 for one of `Candidates.further`."""
 
     candidate: Candidate
     plan: StepPlan
-    dropped: tuple[Dropped, ...] = ()
     index: int = 0
 
 
@@ -100,7 +101,7 @@ class Attempts:
     def __init__(self, candidates: Candidates, exclude: Iterable[Array] = (), *, prefer: int = 0) -> None:
         self.decides = candidates.decides
         self.excluded = [*exclude]
-        self.dropped: list[Dropped] = []
+        self._refused: list[tuple[Candidate, NotPlannable | None]] = []  # None: at a look
         self._candidates = candidates
         self._options: Iterator[tuple[int, Candidate]] = _preferring(enumerate(candidates.options), prefer)
 
@@ -113,15 +114,34 @@ class Attempts:
         for index, candidate in self._options:
             if candidate.grasp is not None and any(alike(candidate.grasp, R_WT) for R_WT in self.excluded):
                 continue
+            # A look costs part of a plan: the first candidate often has one.
+            if self._refused and candidate.look() is not None:
+                self._refused.append((candidate, None))
+                continue
             try:
-                return Chosen(candidate, candidate.plan(), tuple(self.dropped), index)
+                return Chosen(candidate, candidate.plan(), index)
             except NotPlannable as refusal:
-                self.dropped.append(Dropped(candidate.name, refusal))
+                self._refused.append((candidate, refusal))
         further = self._candidates.further()
         if further is None:
             raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
-        self._candidates, self._options, self.dropped = further, zip(itertools.repeat(0), further.options), []
+        self._candidates, self._options, self._refused = further, zip(itertools.repeat(0), further.options), []
         return self.take()
+
+    @property
+    def dropped(self) -> tuple[Dropped, ...]:
+        """The refused candidates; those that were refused at a look are planned for their reason."""
+        self._refused = [(each, _reason(each) if refusal is None else refusal) for each, refusal in self._refused]
+        return tuple(Dropped(each.name, refusal) for each, refusal in self._refused if refusal is not None)
+
+
+def _reason(candidate: Candidate) -> NotPlannable | None:
+    """The refusal by its plan of a candidate that a look refused."""
+    try:
+        candidate.plan()
+    except NotPlannable as refusal:
+        return refusal
+    return candidate.look()
 
 
 def _preferring(options: Iterator[tuple[int, Candidate]], index: int) -> Iterator[tuple[int, Candidate]]:

@@ -12,8 +12,9 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import CollisionQuery
+from manipcli.model.configuration import with_joints
 from manipcli.plan.inverse_kinematics import Open
-from manipcli.plan.keep import Kept, refuse_unkept
+from manipcli.plan.keep import Kept, refuse_unkept, reserving
 from manipcli.plan.kept_path import kept_paths
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk, timed_line
@@ -54,6 +55,26 @@ def straight_motion(
         NotPlannable: no such motion keeps the limits and constraints.
     """
     keeps = applying(keeps_of(planner, state, label), end)
+    reserved = reserving(keeps, state.position, end)
+    if reserved != keeps:
+        try:
+            return _straight(planner, state, label, limits, end, reserved, query=query, line=line)
+        except NotPlannable:
+            pass  # the run may then exceed the constraint by its tracking error
+    return _straight(planner, state, label, limits, end, keeps, query=query, line=line)
+
+
+def _straight(
+    planner: Planner,
+    state: PlanningState,
+    label: str,
+    limits: MotionLimits,
+    end: Array,
+    keeps: tuple[Kept, ...],
+    *,
+    query: CollisionQuery,
+    line: Transform | None,
+) -> JointTrajectory:
     refusal: NotPlannable | None = None
     for points in kept_paths(planner, state, query, limits.names, end, keeps, line):
         try:
@@ -102,8 +123,7 @@ def smooth_motion(
     Raises:
         NotPlannable: it exceeds a limit or violates a constraint.
     """
-    end = np.array(state.position)
-    end[planner.robot.indices(limits.names)] = points[-1]
+    end = with_joints(planner.robot, state.position, limits.names, points[-1])
     return _smooth(planner, state, limits, points, applying(keeps_of(planner, state, label), end))
 
 
@@ -144,6 +164,4 @@ def _refuse(planner: Planner, state: PlanningState, keeps: tuple[Kept, ...], tra
 
 
 def _end(planner: Planner, state: PlanningState, trajectory: JointTrajectory) -> Array:
-    end = np.array(state.position)
-    end[planner.robot.indices(trajectory.names)] = trajectory.positions[-1]
-    return end
+    return with_joints(planner.robot, state.position, trajectory.names, trajectory.positions[-1])

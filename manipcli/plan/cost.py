@@ -19,7 +19,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.clearance import least_distance
-from manipcli.model.configuration import position_limits, with_mimics
+from manipcli.model.configuration import position_limits, with_joints, with_mimics
 from manipcli.plan.grasp_margin import grasp_margin
 from manipcli.plan.motion import Motion, StepPlan
 from manipcli.plan.planner import Planner
@@ -65,10 +65,11 @@ def step_cost(planner: Planner, plan: StepPlan) -> StepCost:
     near, limit, singular = ROOM, LIMIT_ROOM, SINGULAR
     for motion in plan.motions:
         positions = _sampled(planner, motion)
-        if not positions:
+        if positions is None:
             continue
-        limit = min(limit, _to_limit(planner, positions))
-        singular = min(singular, *(planner.solver.least_singular_value(q) for q in positions))
+        limit = min(limit, _to_limit(planner, motion, positions))
+        if planner.robot.tool is not None:
+            singular = min(singular, *(planner.solver.least_singular_value(q) for q in positions))
         if motion.label in FREE:
             near = min(near, _clearance(planner, motion, positions))
     margin = grasp_margin(planner, plan)
@@ -81,32 +82,29 @@ def step_cost(planner: Planner, plan: StepPlan) -> StepCost:
     )
 
 
-def _sampled(planner: Planner, motion: Motion) -> list[Array]:
-    """(n) positions of all joints in a motion of the arm; empty for any other motion."""
-    if motion.trajectory is None or motion.begins is None:
-        return []
-    chosen = np.unique(np.linspace(0, len(motion.trajectory.times) - 1, SAMPLES).round().astype(int))
-    columns = planner.robot.indices(motion.trajectory.names)
-    positions = []
-    for row in motion.trajectory.positions[chosen]:
-        q = np.array(motion.begins.position)
-        q[columns] = row
-        positions.append(np.array(with_mimics(planner.robot, q)))
-    return positions
+def _sampled(planner: Planner, motion: Motion) -> Array | None:
+    """(k, n) positions of all joints in a motion of the arm; None for any other motion."""
+    trajectory = motion.trajectory
+    if trajectory is None or motion.begins is None:
+        return None
+    chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, SAMPLES).round().astype(int))
+    q = with_joints(planner.robot, motion.begins.position, trajectory.names, trajectory.positions[chosen])
+    return with_mimics(planner.robot, q)
 
 
-def _clearance(planner: Planner, motion: Motion, positions: list[Array]) -> float:
+def _clearance(planner: Planner, motion: Motion, positions: Array) -> float:
     """[m] Least distance of the robot, and of what it holds, from everything it must not touch."""
     assert motion.begins is not None  # of a motion with positions
-    found = least_distance(planner.query(motion.begins, motion.allowed), np.array(positions))
+    found = least_distance(planner.query(motion.begins, motion.allowed), positions)
     return ROOM if found is None else found[1].distance
 
 
-def _to_limit(planner: Planner, positions: list[Array]) -> float:
-    """Least distance of a joint of the arm from its limits, as a share of its range; inf without limits."""
-    solver = planner.solver
-    lower, upper = position_limits(planner.robot.joint(name) for name in solver.joints)
+def _to_limit(planner: Planner, motion: Motion, positions: Array) -> float:
+    """Least distance of a joint that moves from its limits, as a share of its range; inf without limits."""
+    assert motion.trajectory is not None  # of a motion with positions
+    names = motion.trajectory.names
+    lower, upper = position_limits(planner.robot.joint(name) for name in names)
     width = upper - lower
-    arm = np.array(positions)[:, list(solver.columns)]
+    arm = positions[:, planner.robot.indices(names)]
     share = np.minimum(arm - lower, upper - arm)[:, np.isfinite(width)] / width[np.isfinite(width)]
     return max(0.0, float(share.min())) if share.size else np.inf

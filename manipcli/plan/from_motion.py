@@ -6,6 +6,9 @@ acceleration. A state beyond a limit is first brought back within it, as fast as
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
@@ -14,19 +17,50 @@ from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
 
+if TYPE_CHECKING:
+    import ruckig
 
-def stopped(q: Array, v: Array, a: Array, limits: MotionLimits, *, period: float) -> JointTrajectory:
-    """The quickest stop of each joint from position, velocity and acceleration (n): where they come to rest is open.
+_STRAIGHT = 1e-6  # share of the acceleration limits
+
+
+def stopped(
+    names: Sequence[str],
+    state: tuple[Array, Array, Array],
+    *,
+    acceleration: Array,
+    jerk: Array,
+    period: float,
+    together: bool,
+) -> JointTrajectory:
+    """The quickest stop of `names` (n) from a state of motion: where they come to rest is open.
 
     Args:
-        q, v, a: in the order of `limits.names`.
-        limits: acceleration, and jerk where finite.
+        state: position, velocity and acceleration (n).
+        acceleration, jerk: (n) limits; a jerk may be infinite.
         period: control period [s]; one point per tick, and the last at rest.
+        together: the joints stop at the same time, on a straight line where velocity and acceleration are along it.
 
     Raises:
         NotPlannable: Ruckig finds none, or it takes longer than `LONGEST`.
     """
-    return _motion(q, v, a, None, limits, period)
+    import ruckig
+
+    q, v, a = state
+    along = _along(v, a, acceleration) if together else None
+    if along is not None:  # Ruckig's own synchronisation leaves the line where another joint's limit is the tighter one
+        speeds = np.abs(v[v != 0.0])
+        one = (np.zeros(1), np.ones(1), np.array([along]))
+        least = [np.min(limit[v != 0.0] / speeds, keepdims=True) for limit in (acceleration, jerk)]
+        line = stopped(("s",), one, acceleration=least[0], jerk=least[1], period=period, together=False)
+        assert line.velocities is not None and line.accelerations is not None
+        return JointTrajectory.of_arrays(
+            names, line.times, frozen(q + line.positions * v), frozen(line.velocities * v),
+            frozen(line.accelerations * v),
+        )  # fmt: skip
+    problem = ruckig.InputParameter(len(names))
+    problem.control_interface = ruckig.ControlInterface.Velocity
+    problem.synchronization = ruckig.Synchronization.Time if together else ruckig.Synchronization.No
+    return _motion(problem, names, state, acceleration, jerk, period)
 
 
 def redirected(q: Array, v: Array, a: Array, goal: Array, limits: MotionLimits, *, period: float) -> JointTrajectory:
@@ -42,26 +76,40 @@ def redirected(q: Array, v: Array, a: Array, goal: Array, limits: MotionLimits, 
     Raises:
         NotPlannable: Ruckig finds none, or it takes longer than `LONGEST`.
     """
-    return _motion(q, v, a, goal, limits, period)
-
-
-def _motion(q: Array, v: Array, a: Array, goal: Array | None, limits: MotionLimits, period: float) -> JointTrajectory:
     import ruckig
 
-    n = len(q)
-    problem = ruckig.InputParameter(n)
-    problem.current_position, problem.current_velocity = q.tolist(), v.tolist()
-    problem.current_acceleration = a.tolist()
-    problem.target_velocity = problem.target_acceleration = [0.0] * n
-    problem.max_velocity = limits.velocity.tolist()
-    problem.max_acceleration, problem.max_jerk = limits.acceleration.tolist(), limits.jerk.tolist()
-    if goal is None:
-        problem.control_interface = ruckig.ControlInterface.Velocity
-        problem.synchronization = ruckig.Synchronization.No
-    else:
-        problem.target_position = goal.tolist()
-    profile = ruckig.Trajectory(n)
-    result = ruckig.Ruckig(n).calculate(problem, profile)
+    problem = ruckig.InputParameter(len(q))
+    problem.target_position, problem.max_velocity = goal.tolist(), limits.velocity.tolist()
+    return _motion(problem, limits.names, (q, v, a), limits.acceleration, limits.jerk, period, goal)
+
+
+def _along(v: Array, a: Array, limit: Array) -> float | None:
+    """k where a = k v within rounding; else None. `limit` (n) of the acceleration."""
+    k = float(a @ v) / max(float(v @ v), 1e-12)
+    return k if bool((np.abs(a - k * v) <= _STRAIGHT * limit).all()) and v.any() else None
+
+
+def _motion(
+    problem: ruckig.InputParameter,
+    names: Sequence[str],
+    state: tuple[Array, Array, Array],
+    acceleration: Array,
+    jerk: Array,
+    period: float,
+    goal: Array | None = None,
+) -> JointTrajectory:
+    """With the rest of `problem` filled in."""
+    import ruckig
+
+    problem.current_position, problem.current_velocity, problem.current_acceleration = (x.tolist() for x in state)
+    problem.target_velocity = problem.target_acceleration = [0.0] * len(names)
+    problem.max_acceleration, problem.max_jerk = acceleration.tolist(), jerk.tolist()
+    profile = ruckig.Trajectory(len(names))
+    try:
+        result = ruckig.Ruckig(len(names)).calculate(problem, profile)
+    except ruckig.RuckigError as refused:
+        why = str(refused).strip().partition("\n")[0]
+        raise NotPlannable(f"Ruckig found no motion from this state ({why})") from None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise NotPlannable(f"Ruckig found no motion from this state ({result.name})")
     if profile.duration > LONGEST:
@@ -72,6 +120,4 @@ def _motion(q: Array, v: Array, a: Array, goal: Array | None, limits: MotionLimi
     velocities[-1] = accelerations[-1] = 0.0
     if goal is not None:
         positions[-1] = goal
-    return JointTrajectory.of_arrays(
-        limits.names, frozen(times), frozen(positions), frozen(velocities), frozen(accelerations)
-    )
+    return JointTrajectory.of_arrays(names, frozen(times), frozen(positions), frozen(velocities), frozen(accelerations))

@@ -26,14 +26,13 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.model.grasp import friction_coefficient, friction_load
+from manipcli.plan.attachment import MOST, AttachedForce
 from manipcli.plan.grasp_contacts import PALM, GraspContact, finger_links, grasp_contacts
 from manipcli.plan.motion import StepPlan
 from manipcli.plan.planner import Planner
 
 EDGES: Final = 8
 """Edges of the pyramid inside a friction cone; it is at most 8 % narrower."""
-MOST: Final = 1e3
-"""Largest ratio to the weight that is computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,8 @@ class GraspMargin:
         ratio: largest multiple of its weight that is held, at rest and as it is grasped.
         acceleration: [m/s2] largest acceleration in any of 14 directions (axes and diagonals) that is held with the
             weight; 0 if the weight is not held.
-        contacts: number of fingers that touch.
+        contacts: number of fingers that touch; 0 where an attachment holds.
+        attachment: `suction (60 N)`: what holds instead of fingers, with `force` [N] as its limit; "" for fingers.
     """
 
     body: str
@@ -58,6 +58,7 @@ class GraspMargin:
     ratio: float
     acceleration: float
     contacts: int
+    attachment: str = ""
 
     @property
     def text(self) -> str:
@@ -66,6 +67,7 @@ class GraspMargin:
             f"{number_of(self.contacts, 'finger')} at {readable(self.force, 'N')} each, "
             f"coefficient of friction {self.friction:.3g}"
         )
+        grip = self.attachment or grip
         if self.ratio < 1.0:
             return (
                 f"'{self.body}' ({readable(self.weight, 'N')}) is not held: {grip} holds {self.ratio:.2g} x its weight"
@@ -79,17 +81,25 @@ class GraspMargin:
 
 def grasp_margin(planner: Planner, plan: StepPlan) -> GraspMargin | None:
     """The margin of the grasp with which a step ends; None if it grasps nothing, or without a stated grip force."""
-    closing = next((m for m in plan.motions if m.grip is not None and m.grip.force is not None), None)
-    if closing is None or closing.grip is None or closing.grip.force is None or plan.end.carried is None:
+    closing = next((m for m in plan.motions if m.closes), None)
+    if closing is None or plan.end.carried is None:
         return None
-    grip, force = closing.grip, closing.grip.force
     body = planner.scene.body(plan.end.carried.body)
-    contacts = grasp_contacts(planner, plan.end, grip.joints)
     mu = friction_coefficient(planner.robot, body)
     g = float(np.linalg.norm(planner.scene.gravity))
     centre = (planner.body_pose(plan.end, body.name) @ body.X_OI).p
-    limits = force_limits(contacts, force, len(finger_links(planner.robot, grip.joints)))
-    held = HeldForce(contacts, limits, centre, mu)
+    held: HeldForce | AttachedForce
+    contacts: tuple[GraspContact, ...] = ()
+    holding, attachment = planner.robot.holding, ""
+    if holding is not None:
+        held, force, attachment = AttachedForce(planner, plan.end, centre, mu), holding.force, holding.limits
+    elif closing.grip is not None and closing.grip.force is not None:
+        grip, force = closing.grip, closing.grip.force
+        contacts = grasp_contacts(planner, plan.end, grip.joints)
+        limits = force_limits(contacts, force, len(finger_links(planner.robot, grip.joints)))
+        held = HeldForce(contacts, limits, centre, mu)
+    else:
+        return None
     weight = body.mass * g
     ratio = held.most(planner.scene.gravity * body.mass) if weight else MOST
     acceleration = 0.0
@@ -98,7 +108,7 @@ def grasp_margin(planner: Planner, plan: StepPlan) -> GraspMargin | None:
             held.most(-direction, beside=planner.scene.gravity * body.mass) / body.mass for direction in DIRECTIONS
         )
     touching = len({contact.finger for contact in contacts} - {PALM})
-    return GraspMargin(body.name, force, mu, weight, ratio, acceleration, touching)
+    return GraspMargin(body.name, force, mu, weight, ratio, acceleration, touching, attachment)
 
 
 def carries(planner: Planner, plan: StepPlan) -> bool:
@@ -108,6 +118,9 @@ def carries(planner: Planner, plan: StepPlan) -> bool:
     normal of one of its contacts: moments and the other components only lower that. A palm below the object holds all.
     True, too, where friction is too low for the hand at any level grasp: another grasp is then no better.
     """
+    if planner.robot.holding is not None:
+        margin = grasp_margin(planner, plan)
+        return margin is None or margin.ratio >= 1.0
     closing = next((m for m in plan.motions if m.grip is not None and m.grip.force is not None), None)
     if closing is None or closing.grip is None or closing.grip.force is None or plan.end.carried is None:
         return True

@@ -125,20 +125,6 @@ def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequenc
     return min(found)[1] if found and len(found) >= min(2, len(parts)) else None
 
 
-def refuse_pressing(
-    robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequence[str], held: str, posture: str
-) -> None:
-    """Refuse to let go of the body `held` with a hand that still holds it at `q` (n), in its pose `posture`.
-
-    Raises:
-        NotPlannable: names the deepest part.
-    """
-    still = pressing(robot, query, q, joints)
-    if still is not None:
-        message = f"'{still}' still presses on '{held}' with the hand in its pose '{posture}'"
-        raise NotPlannable(message, hint="set a pose in which the hand is open: `posture: POSE`")
-
-
 def closed_hand(joint: str, carried: Carried | None) -> NotPlannable:
     """The refusal of a motion of a joint of a hand that an earlier step closed."""
     what = "an earlier step closed" if carried is None else f"holds '{carried.body}'"

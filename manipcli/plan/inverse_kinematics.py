@@ -20,10 +20,11 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from numpy.linalg import _umath_linalg  # type: ignore[attr-defined, unused-ignore]
 
 from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Array, Transform, cross, frozen, matrix_from_axis_angle
@@ -31,6 +32,9 @@ from manipcli.core.text import number_of
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.base_move import base_advice
+
+# The kernel of numpy's `solve` without its checks, which cost several times as much; H is positive definite.
+_solve: Any = getattr(_umath_linalg, "solve1", np.linalg.solve)
 
 Open = Literal["nothing", "spin", "rotation"]
 """The part of the tool's orientation that a goal leaves open: nothing, the rotation about its z axis, or all of it."""
@@ -104,7 +108,10 @@ class InverseKinematics:
         self._kinematics = kinematics
         self.link = link
         self._X_LT = Transform.identity() if X_LT is None else X_LT
-        self._columns = np.array(self.columns, dtype=np.intp)
+        first = self.columns[0]
+        adjacent = self.columns == tuple(range(first, first + len(self.columns)))
+        # A slice of adjacent joints costs a fraction of an array of their indices.
+        self._columns = slice(first, first + len(self.columns)) if adjacent else np.array(self.columns, dtype=np.intp)
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
         self._open: Open = "nothing"
@@ -238,19 +245,20 @@ class InverseKinematics:
         stalled = 0
         for _ in range(_ITERATIONS):
             error, J, axis_error = self._linearise(X_WT, q)
-            x, y, z = error.tolist()[:3]
+            x, y, z, *_ = error.tolist()
             position_error = math.sqrt(x * x + y * y + z * z)
             if position_error <= 0.3 * POSITION_TOLERANCE and axis_error <= 0.3 * ANGLE_TOLERANCE:
-                break
+                return self._solution(q, position_error, axis_error)
             cost = 0.5 * float(error @ error)
             stalled = stalled + 1 if cost > 0.999 * previous else 0
             if stalled > 4:
-                break
+                return self._solution(q, position_error, axis_error)
             previous = cost
             here = q[columns]
             step = _damped_step(J, error, cost + 1e-9, here, lower, upper)
             q[columns] = np.minimum(np.maximum(here + step, lower), upper)
-        return self._solution(X_WT, q)
+        error, _, axis_error = self._linearise(X_WT, q)
+        return self._solution(q, float(np.linalg.norm(error[:3])), axis_error)
 
     def unit(self, joint: int) -> str:
         """Unit of the position of the solver's joint with this index."""
@@ -265,17 +273,11 @@ class InverseKinematics:
         J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
         return float(np.linalg.svd(J, compute_uv=False)[-1])
 
-    def _solution(self, X_WT: Transform, q: Array) -> Solution:
-        X_WC = self.forward(q)
-        error, angle = _pose_error(X_WT, X_WC.R, X_WC.p, self._open)
+    def _solution(self, q: Array, position_error: float, angle_error: float) -> Solution:
         here = q[self._columns]
         at_limit = (here <= self._lower + _AT_LIMIT) | (here >= self._upper - _AT_LIMIT)
-        return Solution(
-            q=frozen(q),
-            position_error=float(np.linalg.norm(error[:3])),
-            angle_error=angle,
-            at_limit=tuple(name for name, held in zip(self.joints, at_limit, strict=True) if held),
-        )
+        held = tuple(name for name, on in zip(self.joints, at_limit.tolist(), strict=True) if on)
+        return Solution(q=frozen(q), position_error=position_error, angle_error=angle_error, at_limit=held)
 
     def _unwound(self, solution: Solution, seed: Array) -> Solution:
         """The same pose with each rotating joint less than half a turn from `seed`, where its limits allow."""
@@ -290,7 +292,7 @@ class InverseKinematics:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
         error, angle = _pose_error(X_WT, R, p, self._open)
-        J = whole[:, self._columns]
+        J = np.asfortranarray(whole[:, self._columns])
         if self._open == "spin":
             z = X_WT.R[:, 2]
             J[3:] -= np.outer(z, z @ J[3:])
@@ -343,7 +345,7 @@ def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array,
     H = J.T @ J
     H.flat[:: n + 1] += damping
     gradient = J.T @ error
-    step = np.linalg.solve(H, gradient)
+    step: Array = _solve(H, gradient)
     if not _outward(q, step, lower, upper):
         return np.asarray(step)
     held = np.zeros(n, dtype=bool)
@@ -356,7 +358,7 @@ def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array,
         step = np.zeros(n)
         if not len(free):
             break
-        step[free] = np.linalg.solve(H[np.ix_(free, free)], gradient[free])
+        step[free] = _solve(H[free[:, None], free], gradient[free])
     return np.asarray(step)
 
 

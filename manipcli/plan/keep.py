@@ -7,7 +7,7 @@ motion, the projection of a configuration and the search of a path follow; for t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from manipcli.spec.keep import KeepSpec
 
 POURING = frozenset({"tilt", "tilt back"})
 """Labels of the motions that tilt a container."""
+RESERVE = 0.002
+"""[m] Of a margin that is a length."""
 NEAR = frozenset({"approach", "lower", "withdraw"})
 """Labels of the motions next to an object or its place."""
 
@@ -38,6 +40,7 @@ class Kept:
         bound: on the timing of the joints of these dynamics; None for a constraint on configurations alone.
         exempt: labels of motions that it does not apply to.
         derived: not written by the user: it applies only to motions whose end keeps it.
+        reserve: [rad or m] of the margin that chosen paths leave to the run, whose tracking is not exact.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Kept:
     bound: Callable[[PathDynamics], TimingBound] | None = None
     exempt: frozenset[str] = frozenset()
     derived: bool = False
+    reserve: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,24 @@ class KeepMember:
 
     name: str
     open: Callable[[KeepSpec, Planner, PlanningState], Kept | None]
+
+
+def reserving(keeps: tuple[Kept, ...], start: Array, end: Array) -> tuple[Kept, ...]:
+    """The constraints for a path from `start` to `end` (n), tighter by their reserves.
+
+    Where an end leaves less margin, the reserve is half of what it leaves.
+    """
+    return tuple(_reserving(kept, np.stack((start, end))) for kept in keeps)
+
+
+def _reserving(kept: Kept, ends: Array) -> Kept:
+    margin = kept.margin
+    if margin is None or kept.reserve <= 0.0:
+        return kept
+    reserve = min(kept.reserve, 0.5 * float(margin(ends).min()))
+    if reserve <= 0.0:
+        return kept
+    return replace(kept, margin=lambda q: margin(q) - reserve, reserve=0.0)
 
 
 def margins(keeps: tuple[Kept, ...], q: Array) -> Array:

@@ -76,6 +76,7 @@ class Motion:
         switch: of controllers, before anything else; None for no switch.
         begins: the state in which it begins, for reports; None where nothing moves.
         allowed: pairs of parts that may touch in it, besides the hand and what it holds.
+        searched: the path planner whose path around obstacles it follows; "" for a path that was not searched.
         takes: the object that is attached to the tool at its end, for robots with a `holding`.
         lets_go: what is attached to the tool is freed at its beginning.
     """
@@ -89,6 +90,7 @@ class Motion:
     switch: Switch | None = None
     begins: PlanningState | None = None
     allowed: frozenset[Pair] = frozenset()
+    searched: str = ""
     takes: str | None = None
     lets_go: bool = False
 

@@ -14,19 +14,20 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
 from manipcli.plan.attachment import attached, freed
-from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
-from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values, refuse_pressing
+from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
+from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
+from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.path import ANGULAR_STEP, follow_poses, joint_path, linear_path
+from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
@@ -51,7 +52,7 @@ class MotionBuilder:
         self._planner = planner
         self._now = state
         self._verb = verb
-        self._allowed = allowed
+        self._allowed = allowed | planner.allowed
         self._motions: list[Motion] = []
 
     @property
@@ -143,16 +144,20 @@ class MotionBuilder:
 
         What has contents stays upright there, too, see `motion_constraints`.
         """
-        planner, carried = self._planner, self._now.carried
-        try:
-            self.straight(label, X_WT, speed=speed)
-        except NotPlannable as refusal:
-            if carried is None or planner.searching() is None:
-                raise
+        planner = self._planner
+        search = None if self._now.carried is None else planner.searching(obstructed=False)
+        if search is None or line_blocked(planner, self._now, X_WT, self._query()) is None:
             try:
-                self.reach(label, X_WT, speed=speed)
-            except NotPlannable as other:
-                raise (other if other.reason == "in_the_way" else refusal) from None
+                return self.straight(label, X_WT, speed=speed)
+            except NotPlannable:
+                if self._now.carried is None or planner.searching() is None:
+                    raise
+        try:
+            self.reach(label, X_WT, speed=speed)
+        except NotPlannable as other:
+            if other.reason == "in_the_way":
+                raise
+            self.straight(label, X_WT, speed=speed)  # for its refusal
 
     def straight(
         self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
@@ -198,10 +203,7 @@ class MotionBuilder:
 
     def turn(self, label: str, axis: Array, angle: float, *, speed: float) -> None:
         """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
-        X_WT = self._planner.tool_pose(self._now)
-        count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
-        turned = [matrix_from_axis_angle(axis, k / count * angle) for k in range(count + 1)]
-        self.along(label, [Transform.of(xyz=X_WT.p, R=R @ X_WT.R) for R in turned], speed=speed)
+        self.along(label, rotated(self._planner.tool_pose(self._now), axis, angle), speed=speed)
 
     def back(self, label: str) -> None:
         """Repeat the last trajectory backwards.
@@ -294,10 +296,8 @@ class MotionBuilder:
         allowed = NOTHING
         if self._now.carried is not None:
             held = self._now.carried.body
-            there = self._with(grip.joints, grip.target)
             if must_arrive:
-                query = self._planner.grasping(self._now, held)
-                refuse_pressing(self._planner.robot, query, there, grip.joints, held, posture)
+                refuse_pressing(self._planner, self._now, self._with(grip.joints, grip.target), grip.joints, posture)
             allowed |= self._planner.hand_contacts(held)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
@@ -353,6 +353,8 @@ class MotionBuilder:
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
         free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
         self._accept(label, free, grip)
+        if free is not straight and (search := self._planner.searching()) is not None:
+            self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)
 
     def _timed(
         self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.model.configuration import with_joints, with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.motion import Motion, PlanningState
-from manipcli.plan.planned_states import PlannedStates, planned_states
+from manipcli.plan.motion_constraints import keeps_of
+from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planner import Planner
 from manipcli.plan.trajectory import JointTrajectory
 
 BINDS = 0.95
 """A limit binds while at least this share of it is used (of the scaled limit, for a motion below full speed)."""
-PERIOD = 0.01
-"""[s] between the examined states."""
+EVERY = 0.01
+"""[s] between the configurations whose manipulability is examined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +29,8 @@ class Margin:
     """The joint that comes nearest to one kind of limit.
 
     Attributes:
-        joint, quantity: `position`, `velocity`, `acceleration`, `jerk` or `torque`.
+        joint, quantity: `position`, `velocity`, `acceleration`, `jerk` or `torque`; for a constraint on the timing, its
+            key under `keep`, of the `tool` or the `contents`.
         used: share of the limit; of a position, share of the half range around its middle.
         left: distance to the limit, in the unit of the quantity.
         time: in the motion [s].
@@ -65,70 +69,93 @@ class MotionMargins:
     manipulability: Manipulability | None = None
 
 
-def motion_margins(planner: Planner, motion: Motion, begins: PlanningState, end: PlanningState) -> MotionMargins:
-    """Examines a motion every 10 ms."""
-    if motion.trajectory is None or motion.duration <= 0.0:
+def motion_margins(planner: Planner, motion: Motion, begins: PlanningState) -> MotionMargins:
+    """Examines all points of a motion that begins in this state; `planner`: with the constraints of its step."""
+    trajectory = motion.trajectory
+    if trajectory is None:
         return MotionMargins()
-    states = planned_states(planner, motion, end, begins=begins, period=PERIOD)
-    used = list(_used(planner.robot, motion.trajectory, states))
-    margins: dict[str, Margin] = {}
-    for quantity, joint, times, fraction, limit in used:
-        k = int(np.argmax(fraction))
-        margin = Margin(joint, quantity, float(fraction[k]), float((1.0 - fraction[k]) * limit), float(times[k]))
-        if quantity not in margins or margin.used > margins[quantity].used:
-            margins[quantity] = margin
-    return MotionMargins(_binding(used, margins), tuple(margins.values()), _manipulability(planner, states))
+    dynamics = PathDynamics(planner, begins, trajectory.names)
+    q, v, a = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    torque, stated = None, []
+    if v is not None and a is not None:
+        torque = dynamics.efforts(q, v, a)
+        kept = keeps_of(planner, begins, motion.label)
+        bounds = [each.bound(dynamics) for each in kept if each.bound is not None]
+        stated = [Used(bound.name, bound.subject, bound.used(q, v, a), bound.limit) for bound in bounds]
+    used = (*stated, *limits_used(planner.robot, trajectory, torque))
+    margins = nearest_limits(used, trajectory.times)
+    slowed = any(float(each.share.max()) >= BINDS for each in stated)
+    return MotionMargins(_binding(used, margins, slowed), margins, _manipulability(planner, trajectory, begins))
 
 
-Used = tuple[str, str, Array, Array, float]
-"""Quantity, joint, times (T), used share of the limit (T), and the limit."""
+class Used(NamedTuple):
+    """The used share of the `limit` of one joint, or of what is under `keep`, at k points; jerk has k - 1."""
+
+    quantity: str
+    joint: str
+    share: Array
+    limit: float
 
 
-def _used(robot: RobotModel, trajectory: JointTrajectory, states: PlannedStates) -> Iterator[Used]:
-    times = states.times
-    jerk = np.diff(states.acceleration, axis=0) / np.maximum(np.diff(times), 1e-9)[:, None]
-    for k, name in zip(robot.indices(trajectory.names), trajectory.names, strict=True):
+def limits_used(robot: RobotModel, trajectory: JointTrajectory, torque: Array | None = None) -> Iterator[Used]:
+    """Every finite limit of each joint: of positions, and of what the points give; `torque` (k, n) [N m or N]."""
+    v, a = trajectory.velocities, trajectory.accelerations
+    jerk = None
+    if a is not None and len(a) > 1:
+        jerk = np.diff(a, axis=0) / np.diff(trajectory.times)[:, None]
+    for k, name in enumerate(trajectory.names):
         limits = robot.joint(name).limits
-        if limits.lower is not None and limits.upper is not None and np.isfinite(limits.upper - limits.lower):
-            half = 0.5 * (limits.upper - limits.lower)
-            if half > 0.0:
-                middle = 0.5 * (limits.upper + limits.lower)
-                yield "position", name, times, np.abs(states.position[:, k] - middle) / half, half
-        for quantity, at, values, limit in (
-            ("velocity", times, states.velocity, limits.velocity if trajectory.velocities is not None else None),
-            ("acceleration", times, states.acceleration, limits.acceleration),
-            ("jerk", times[:-1], jerk, limits.jerk if len(jerk) else None),
-            ("torque", times, states.torque, limits.effort),
+        lower, upper = limits.within_soft
+        half = 0.5 * (upper - lower)
+        if 0.0 < half < np.inf:
+            yield Used("position", name, np.abs(trajectory.positions[:, k] - lower - half) / half, half)
+        for quantity, values, limit in (
+            ("velocity", v, limits.velocity),
+            ("acceleration", a, limits.acceleration),
+            ("jerk", jerk, limits.jerk),
+            ("torque", torque, limits.effort),
         ):
-            if limit and np.isfinite(limit) and (quantity == "velocity" or trajectory.accelerations is not None):
-                yield quantity, name, at, np.abs(values[:, k]) / limit, float(limit)
+            if values is not None and limit and np.isfinite(limit):
+                yield Used(quantity, name, np.abs(values[:, k]) / limit, float(limit))
 
 
-def _binding(used: list[Used], margins: dict[str, Margin]) -> Binding | None:
-    """Each state counts for the limit that is used most there, if it binds."""
-    timed = [one for one in used if one[0] in ("velocity", "acceleration", "jerk", "torque")]
-    scaled = max((margins[q].used for q in ("velocity", "acceleration") if q in margins), default=1.0)
+def nearest_limits(used: tuple[Used, ...], times: Array) -> tuple[Margin, ...]:
+    """The joint that comes nearest to each kind of limit."""
+    found: dict[str, Margin] = {}
+    for each in used:
+        k = int(np.argmax(each.share))
+        share = float(each.share[k])
+        if each.quantity not in found or share > found[each.quantity].used:
+            found[each.quantity] = Margin(each.joint, each.quantity, share, (1.0 - share) * each.limit, float(times[k]))
+    return tuple(found.values())
+
+
+def _binding(used: tuple[Used, ...], margins: tuple[Margin, ...], slowed: bool) -> Binding | None:
+    """Each point counts for the limit that is used most there, if it binds; `slowed`: a constraint does."""
+    # `velocity_scaling` scales velocities and accelerations alike. A constraint may be what keeps the joints slow, too.
+    most = max((one.used for one in margins if one.quantity in ("velocity", "acceleration")), default=1.0)
+    scaled = 1.0 if slowed else most
+    timed = [each for each in used if each.quantity != "position"]
     if not timed or scaled <= 0.0:
         return None
-    count = max(len(one[3]) for one in timed)
-    rows = np.zeros((len(timed), count))
-    for k, (quantity, _, _, fraction, _) in enumerate(timed):
-        # `velocity_scaling` scales velocities and accelerations alike.
-        rows[k, : len(fraction)] = fraction / (scaled if quantity in ("velocity", "acceleration") else 1.0)
-    best = np.argmax(rows, axis=0)
-    binds = rows[best, np.arange(count)] >= BINDS
+    shares = np.zeros((len(timed), max(len(each.share) for each in timed)))
+    for k, each in enumerate(timed):
+        shares[k, : len(each.share)] = each.share / (scaled if each.quantity in ("velocity", "acceleration") else 1.0)
+    binds = shares.max(axis=0) >= BINDS
     if not binds.any():
         return None
-    counts = np.bincount(best[binds], minlength=len(timed))
-    k = int(np.argmax(counts))
-    return Binding(timed[k][1], timed[k][0], float(counts[k]) / count)
+    counts = np.bincount(np.argmax(shares, axis=0)[binds], minlength=len(timed))
+    best = timed[int(np.argmax(counts))]
+    return Binding(best.joint, best.quantity, float(counts.max()) / shares.shape[1])
 
 
-def _manipulability(planner: Planner, states: PlannedStates) -> Manipulability | None:
+def _manipulability(planner: Planner, trajectory: JointTrajectory, begins: PlanningState) -> Manipulability | None:
+    steps = max(1, round(trajectory.duration / EVERY))
+    chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, steps + 1).astype(int))
+    q = with_joints(planner.robot, begins.position, trajectory.names, trajectory.positions[chosen])
     try:
-        solver = planner.solver
-    except NotPlannable:
+        values = [planner.solver.least_singular_value(row) for row in with_mimics(planner.robot, q)]
+    except NotPlannable:  # no tool
         return None
-    values = np.array([solver.least_singular_value(q) for q in states.position])
     k = int(np.argmin(values))
-    return Manipulability(float(values[k]), float(states.times[k]))
+    return Manipulability(values[k], float(trajectory.times[chosen[k]]))

@@ -7,7 +7,7 @@ the arm stays on one branch of its inverse kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +20,7 @@ from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics,
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
-_OTHERWISE = "start the line from another arm configuration (after a `pick`: another `yaw` of its `approach`)"
+_OTHERWISE = "start {} from another arm configuration (after a `pick`: another `yaw` of its `approach`)"
 
 
 def joint_path(waypoints: npt.ArrayLike) -> Array:
@@ -56,22 +56,40 @@ def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
     return (X_WA, *between, X_WB)
 
 
-def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) -> Array:
-    """The straight line of the tool from where `q` (n) has it to `X_WT`.
+def rotated(X_WT: Transform, axis: Array, angle: float) -> tuple[Transform, ...]:
+    """Poses from T on while it rotates in place about an `axis` (3,) of the world by `angle` [rad], of any size."""
+    count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
+    turns = [matrix_from_axis_angle(axis, k / count * angle) for k in range(count + 1)]
+    return tuple(Transform.of(xyz=X_WT.p, R=turn @ X_WT.R) for turn in turns)
+
+
+def linear_path(
+    solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform, visit: Callable[[Array], None] = lambda _: None
+) -> Array:
+    """The straight line of the tool from where `q` (n) has it to `X_WT`; `visit` is called as in `follow_poses`.
 
     Raises:
         NotPlannable: see `follow_poses`.
     """
-    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT))
+    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT), visit, shape="straight line")
 
 
-def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform]) -> Array:
+def follow_poses(
+    solver: InverseKinematics,
+    q: npt.ArrayLike,
+    poses: Sequence[Transform],
+    visit: Callable[[Array], None] = lambda _: None,
+    *,
+    shape: str = "tool's path",
+) -> Array:
     """Joint positions that move the tool through `poses`; the first is the tool pose at `q` (n).
 
     Args:
         solver: of the joints that move.
         q: (n) positions of all moving joints of the robot at the start.
         poses: `X_WT`, near neighbours (see `interpolate`).
+        visit: called with the positions (n) of all joints at each pose but the first, as soon as they are found.
+        shape: what the path is, for refusals.
 
     Returns:
         One waypoint per pose, of the solver's joints.
@@ -82,6 +100,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
     q = np.array(q, dtype=np.float64)
     columns = list(solver.columns)
     waypoints = [q[columns]]
+    otherwise = _OTHERWISE.format("the line" if shape == "straight line" else "it")
     walked = turned = 0.0
     for before, X_WT in pairwise(poses):
         walked += float(np.linalg.norm(X_WT.p - before.p))
@@ -91,8 +110,8 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
         where = f"after {walked * 1000.0:.0f} mm{rotated}"
         if not found.converged:
             raise NotPlannable(
-                f"the straight line is unreachable {where}: {found.explain()}",
-                hint=f"{_OTHERWISE}, make it shorter, or use `path: free`",
+                f"the {shape} is unreachable {where}: {found.explain()}",
+                hint=f"{otherwise}, make it shorter, or use `path: free`",
                 reason="line",
             )
         jump = np.abs(found.q[columns] - q[columns])
@@ -101,9 +120,10 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
             raise NotPlannable(
                 f"joint '{solver.joints[worst]}' would jump by {jump[worst]:.2f} {solver.unit(worst)} {where}, from "
                 f"one point to the next (near singular: {solver.singularity(q)})",
-                hint=f"{_OTHERWISE}, or use `path: free`",
+                hint=f"{otherwise}, or use `path: free`",
                 reason="line",
             )
         q = found.q
+        visit(q)
         waypoints.append(q[columns])
     return joint_path(waypoints)

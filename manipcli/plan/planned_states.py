@@ -9,12 +9,10 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.motion import Motion, PlanningState
+from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planner import Planner
 from manipcli.plan.prediction import carried_along
 from manipcli.plan.sweep import swept
-
-GRIP_SAMPLES = 20
-"""States of a hand that closes on something; it ends where it is predicted to stop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +22,7 @@ class PlannedStates:
     Attributes:
         times: (T,) [s] from the start of the motion, at least one.
         position, velocity, acceleration: (T, n); derivatives are 0 for joints that the trajectory does not move.
-        torque: (T, n) [N m or N] by inverse dynamics, with the carried bodies as point masses.
+        torque: (T, n) [N m or N] by inverse dynamics, with friction and what is carried.
         bodies: for each time `X_WO` of every movable body.
     """
 
@@ -71,28 +69,9 @@ def planned_states(
     bodies = [_bodies(planner, begins, row) for row in position]
     if motion.grip is not None or motion.trajectory is not None:
         bodies[-1] = end.bodies
-    torque = _torques(planner, begins, times, position, velocity, acceleration)
+    torque = PathDynamics(planner, begins, planner.robot.joint_names).efforts(position, velocity, acceleration)
     return PlannedStates(times, position, velocity, acceleration, torque, tuple(bodies))
 
 
 def _bodies(planner: Planner, begins: PlanningState, q: Array) -> tuple[Transform, ...]:
     return carried_along(planner, begins, begins.moved(q)).bodies
-
-
-def _torques(planner: Planner, begins: PlanningState, times: Array, q: Array, v: Array, a: Array) -> Array:
-    """(T, n): tau = M a + C v + g, plus J^T m (a_c - g) of the centre c of each carried body."""
-    kinematics = planner.kinematics
-    tau = np.array([kinematics.inverse_dynamics(*state) for state in zip(q, v, a, strict=True)])
-    carried = begins.carried
-    if carried is None:
-        return tau
-    X_WL = kinematics.forward(begins.position, carried.link)
-    gravity = np.asarray(planner.scene.gravity, dtype=np.float64)
-    for name in (carried.body, *planner.contents(begins, carried.body)):
-        body = planner.scene.body(name)
-        X_LC = X_WL.inverse() @ planner.body_pose(begins, name) @ Transform.of(xyz=body.X_OI.p)
-        jacobians = np.array([kinematics.jacobian(row, carried.link, X_LC)[:3] for row in q])
-        speed = np.einsum("tij,tj->ti", jacobians, v)
-        centre = np.gradient(speed, times, axis=0) if len(times) > 1 else np.zeros_like(speed)
-        tau += body.mass * np.einsum("tij,ti->tj", jacobians, centre - gravity)
-    return tau

@@ -22,6 +22,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.links_apart import links_apart
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_search import PathSearch
@@ -44,11 +45,6 @@ NO_WAY_AROUND = "first `move` to a pose from which the path is free"
 """The hint for a motion that is in collision."""
 PUT_APART = "move them apart: set `start: POSE` in the task, or `mount` in the robot file to move its base"
 """The hint for a robot that is too near to something before it moves."""
-OF_TWO_LINKS = (
-    "add the pair to `collision_ignore` in the robot file, if the real links are apart (a mesh counts as its convex "
-    "hull, unless the link is under `collision_parts`); correct an attached hand with its `pose` under `attach`"
-)
-"""The hint for two links of the robot that collide."""
 ROBOT = "robot/"
 _QUERIES = 8  # kept; the candidates of a step share a few
 
@@ -92,7 +88,7 @@ class Planner:
         """
         self.clearance = clearance
         self.clearances = clearances
-        self._allowed = NOTHING
+        self.allowed = NOTHING
         self.robot = robot
         self.scene = scene
         self.period = period
@@ -120,9 +116,9 @@ class Planner:
         view._search = PathSearch.of(self._paths, self.rng)
         return view
 
-    def searching(self) -> PathSearch | None:
-        """The search for a motion that is not free on its straight path; None while only those are tried."""
-        self._obstructed = True
+    def searching(self, *, obstructed: bool = True) -> PathSearch | None:
+        """The search for a motion that is `obstructed` on its straight path; None while only those are tried."""
+        self._obstructed |= obstructed
         return self._search
 
     @property
@@ -155,7 +151,7 @@ class Planner:
     def allowing(self, pairs: Pairs) -> Planner:
         """A view for one attempt at a step, in which these pairs may touch; it shares everything else."""
         other = self._view()
-        other._allowed = self._allowed | pairs
+        other.allowed = self.allowed | pairs
         other._obstructed, other._search = False, None
         return other
 
@@ -284,7 +280,7 @@ class Planner:
             allowed: further pairs that may touch.
         """
         carried = state.carried
-        allowed |= self._allowed
+        allowed |= self.allowed
         contents: tuple[Carried, ...] = ()
         if carried is not None:
             allowed |= self.hand_contacts(carried.body)
@@ -344,7 +340,7 @@ class Planner:
         if begins and held and carried is not None:
             hint = f"`lift` '{carried.body}' first"
         elif hit.a.startswith(ROBOT) and hit.b.startswith(ROBOT):
-            hint = OF_TWO_LINKS if begins else f"{NO_WAY_AROUND}; or {OF_TWO_LINKS}"
+            hint = links_apart(hit) if begins else f"{NO_WAY_AROUND}; or {links_apart(hit)}"
         elif begins and state.at_start:
             hint = PUT_APART
         elif begins:

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.configuration import with_joints
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Pairs, Planner
 from manipcli.plan.trajectory import JointTrajectory
@@ -74,10 +75,8 @@ def met(
 
 def _samples(planner: Planner, state: PlanningState, motion: JointTrajectory) -> Array:
     """(_SAMPLES, n) joint positions on the path, with its first and its last; other joints are as in `state`."""
-    path = np.tile(state.position, (_SAMPLES, 1))
-    columns = planner.robot.indices(motion.names)
-    path[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _SAMPLES).astype(int)]
-    return path
+    some = motion.positions[np.linspace(0, len(motion.positions) - 1, _SAMPLES).astype(int)]
+    return with_joints(planner.robot, state.position, motion.names, some)
 
 
 def pushed(

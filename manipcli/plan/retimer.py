@@ -24,6 +24,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.core.text import listed
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.second_order import Bounded
@@ -102,7 +103,8 @@ def _along(points: Array, limits: MotionLimits, period: float, bounds: Sequence[
             _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
             if speeds is None or not np.isfinite(speeds).all():
                 refuse_at_rest(bounds, spline(grid), spline(grid, 1))
-                others = ", and the bounds of the step" if bounds else ""
+                names = listed([f"`{bound.name}`" if bound.subject else bound.name for bound in bounds])
+                others = f", and the bounds of the step ({names})" if bounds else ""
                 raise NotPlannable(
                     f"the path has no timing within the velocity and acceleration limits{others}: it is not smooth"
                 )
@@ -128,7 +130,7 @@ def _along(points: Array, limits: MotionLimits, period: float, bounds: Sequence[
             # A bound may allow little, but leave peaks of s'', whose averages exceed it: with less there are none.
             chosen.append(timed(_LESS))
         for timing in chosen:
-            refuse_endless(points, limits, timing.duration + factor * timing.window)
+            refuse_endless(points, limits, timing.duration + factor * timing.window, bounds)
             smooth.append(sampled(*_averaged(timing.progress, timing.duration, factor * timing.window, period)))
         if bounds:
             break  # a longer window bends the bounds more, and what it exceeds of jerk is stretched

@@ -86,12 +86,12 @@ def first_hit(
 ) -> CollisionHit | None:
     """The first collision of this motion with the `query`, at points a fixed step apart.
 
-    Where they are free and the query has a margin, the bound of the motion between them is checked, too (`EdgeCheck`,
-    with this `slack`).
+    Where they are free and the query permits no overlap, the bound of the motion between them is checked, too
+    (`EdgeCheck`, with this `slack`).
     """
     times, positions = swept(planner, state, trajectory, grip)
     hit = query.check_trajectory(range(positions.shape[1]), state.position, times, positions)
-    if hit is not None or query.margin <= 0.0 or len(positions) < 2:
+    if hit is not None or query.margin < 0.0 or len(positions) < 2:
         return hit
     check = EdgeCheck(query, slack=slack)
     where = check.free_polyline(positions)

@@ -14,6 +14,7 @@ so that TOPP-RA can take it (Pham and Pham 2018, section III). F is bounded by a
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -40,7 +41,17 @@ class Terms(NamedTuple):
 
 
 class TimingBound(ABC):
-    """A bound for one motion, with the joints of its path (n)."""
+    """A bound for one motion, with the joints of its path (n).
+
+    Attributes:
+        name: of the bounded quantity: the key in task files, or `torque`.
+        subject: what is bounded, for reports; a joint's name is not known here.
+        limit: the value of the limit; nan where there are several.
+    """
+
+    name: str = ""
+    subject: str = ""
+    limit: float = math.nan
 
     @abstractmethod
     def still(self, q: Array, direction: Array) -> Array:
@@ -68,6 +79,10 @@ class TimingBound(ABC):
         rub = self.viscous(v)
         total = self.still(q, v) + self.moving(q, v, a)
         return total if rub is None else total + rub
+
+    def used(self, q: Array, v: Array, a: Array) -> Array:
+        """(k) the largest used share of the limit of a motion."""
+        return np.asarray(self.values(q, v, a).max(axis=1))
 
     def stretch(self, q: Array, v: Array, a: Array) -> float:
         """The factor by which time must be stretched to keep the bound; 1 or less if it is kept, at least 0.

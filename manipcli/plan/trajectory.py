@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
-from manipcli.core.geometry import Array, frozen
+from manipcli.core.geometry import Array
 from manipcli.plan.waypoints import CUBIC, LINEAR, QUINTIC, Point, TrajectoryPoint, Waypoint, columns_of, read_points
 
 __all__ = ["CUBIC", "LINEAR", "QUINTIC", "JointTrajectory", "Samples", "TrajectoryPoint", "Waypoint"]
@@ -91,13 +91,11 @@ class JointTrajectory:
         read = read_points(points, start, len(names))
         highest = int(read.orders.max())
         self._set(
-            tuple(names), frozen(read.times), frozen(read.positions),
-            frozen(read.velocities) if highest >= CUBIC else None,
-            frozen(read.accelerations) if highest == QUINTIC else None,
-            None if read.efforts is None else frozen(read.efforts),
-            None if bool((read.orders == highest).all()) else read.orders,
-            interpolation, led_in=read.led_in, integrated=read.integrated,
-            source=read.source,
+            names=tuple(names), times=read.times, positions=read.positions,
+            velocities=read.velocities if highest >= CUBIC else None,
+            accelerations=read.accelerations if highest == QUINTIC else None,
+            efforts=read.efforts, orders=None if bool((read.orders == highest).all()) else read.orders,
+            interpolation=interpolation, led_in=read.led_in, integrated=read.integrated, source=read.source,
         )  # fmt: skip
 
     @classmethod
@@ -119,45 +117,24 @@ class JointTrajectory:
         Raises:
             InvalidArgument: as the constructor.
         """
-
-        def view(values: npt.ArrayLike | None) -> Array | None:
-            if values is None:
-                return None
-            array = np.asarray(values, dtype=np.float64).view()
-            array.flags.writeable = False
-            return array
-
         made = object.__new__(cls)
-        t, p = view(times), view(positions)
-        assert t is not None and p is not None
         made._set(
-            tuple(names), t, p, view(velocities), view(accelerations), view(efforts), orders, interpolation,
-            led_in=led_in, integrated=False, source=None,
+            names=tuple(names), times=times, positions=positions, velocities=velocities, accelerations=accelerations,
+            efforts=efforts, orders=orders, interpolation=interpolation, led_in=led_in, integrated=False, source=None,
         )  # fmt: skip
         return made
 
-    def _set(
-        self,
-        names: tuple[str, ...],
-        times: Array,
-        positions: Array,
-        velocities: Array | None,
-        accelerations: Array | None,
-        efforts: Array | None,
-        orders: npt.NDArray[np.int8] | None,
-        interpolation: Interpolation,
-        *,
-        led_in: bool,
-        integrated: bool,
-        source: tuple[Waypoint, ...] | None,
-    ) -> None:
-        values = (
-            names, times, positions, velocities, accelerations, efforts, orders, interpolation, led_in, integrated,
-            source,
-        )  # fmt: skip
-        for field, value in zip(self.__slots__, values, strict=True):
-            object.__setattr__(self, field, value)
+    def _set(self, **fields: object) -> None:
+        for field, value in fields.items():
+            array = field in (*SINGULAR, "times") and value is not None
+            object.__setattr__(self, field, _read_only(value) if array else value)
         _validate(self)
+
+    def _with(self, **changes: object) -> JointTrajectory:
+        """The same with other fields."""
+        made = object.__new__(JointTrajectory)
+        made._set(**({field: getattr(self, field) for field in self.__slots__} | changes))
+        return made
 
     @property
     def duration(self) -> float:
@@ -224,15 +201,11 @@ class JointTrajectory:
         def columns(values: Array | None) -> Array | None:
             return None if values is None else values[:, order]
 
-        if self.source is not None:
-            points = [columns_of(point, order) for point in self.source]
-            return JointTrajectory(names, points, interpolation=self.interpolation)
-        made = JointTrajectory.of_arrays(
-            names, self.times, self.positions[:, order], columns(self.velocities), columns(self.accelerations),
-            columns(self.efforts), orders=self.orders, interpolation=self.interpolation, led_in=self.led_in,
+        source = None if self.source is None else tuple(columns_of(point, order) for point in self.source)
+        return self._with(
+            names=tuple(names), positions=self.positions[:, order], velocities=columns(self.velocities),
+            accelerations=columns(self.accelerations), efforts=columns(self.efforts), source=source,
         )  # fmt: skip
-        object.__setattr__(made, "integrated", self.integrated)
-        return made
 
     def with_spline_velocities(self, begin: Array | None = None) -> JointTrajectory:
         """With the velocities of the cubic spline that ends at rest, if points give only positions.
@@ -248,21 +221,11 @@ class JointTrajectory:
 
         rest = np.zeros(len(self.names))
         spline = CubicSpline(self.times, self.positions, bc_type=((1, rest if begin is None else begin), (1, rest)))
-        return JointTrajectory.of_arrays(
-            self.names, self.times, self.positions, spline(self.times, 1), None, self.efforts,
-            interpolation=self.interpolation, led_in=self.led_in,
-        )  # fmt: skip
+        return self._with(velocities=spline(self.times, 1))
 
     def with_interpolation(self, interpolation: Interpolation) -> JointTrajectory:
         """The same points with this interpolation."""
-        if interpolation == self.interpolation:
-            return self
-        if self.source is not None:
-            return JointTrajectory(self.names, self.source, interpolation=interpolation)
-        return JointTrajectory.of_arrays(
-            self.names, self.times, self.positions, self.velocities, self.accelerations, self.efforts,
-            orders=self.orders, interpolation=interpolation, led_in=self.led_in,
-        )  # fmt: skip
+        return self if interpolation == self.interpolation else self._with(interpolation=interpolation)
 
     def _refuse(self, t: Array) -> None:
         if self.source is not None:
@@ -353,6 +316,12 @@ class JointTrajectory:
             v0 + tau * (2.0 * c2 + tau * (3.0 * c3 + tau * (4.0 * c4 + tau * 5.0 * c5))),
             2.0 * c2 + tau * (6.0 * c3 + tau * (12.0 * c4 + tau * 20.0 * c5)),
         )
+
+
+def _read_only(values: object) -> Array:
+    array = np.asarray(values, dtype=np.float64).view()
+    array.flags.writeable = False
+    return array
 
 
 def _validate(trajectory: JointTrajectory) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import listed
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.timing_bound import TimingBound, kept
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
@@ -37,7 +38,9 @@ def excess(velocities: Array, accelerations: Array, limits: MotionLimits, *, per
     return factor
 
 
-def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0) -> None:
+def refuse_endless(
+    positions: Array, limits: MotionLimits, duration: float = 0.0, bounds: Sequence[TimingBound] = ()
+) -> None:
     """Refuse a motion from rest to rest along `positions` (k, n) that takes longer than `LONGEST`.
 
     For a distance d a joint needs at least d / v and 2 sqrt(d / a), and where the motion is straight cbrt(32 d / j).
@@ -46,6 +49,7 @@ def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0
         positions: the path, by points on it; two are a straight line.
         limits: of its joints.
         duration: [s] that the motion is known to take.
+        bounds: named where the limits of the joints allow a shorter motion.
 
     Raises:
         NotPlannable: names the slowest joint, and the limit that slows it down.
@@ -54,8 +58,15 @@ def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0
     with np.errstate(over="ignore"):
         squares, cubes = distance / limits.acceleration, distance / limits.jerk
         least = np.array([distance / limits.velocity, 2.0 * np.sqrt(squares), np.cbrt(32.0 * cubes)])
-    if max(duration, float(least[: 3 if len(positions) == 2 else 2].max())) <= LONGEST:
+    by_joints = float(least[: 3 if len(positions) == 2 else 2].max())
+    if max(duration, by_joints) <= LONGEST:
         return
+    if bounds and by_joints <= LONGEST:
+        names = [f"`keep: {bound.name}`" for bound in bounds if bound.subject] or [bound.name for bound in bounds]
+        raise NotPlannable(
+            f"the motion takes more than {LONGEST:g} s because of {listed(names)}",
+            hint="raise this limit, or make the motion shorter; longer motions are not planned",
+        )
     which, k = np.unravel_index(int(np.argmax(least)), least.shape)
     word, joint = ("velocity", "acceleration", "jerk")[which], limits.names[k]
     raise NotPlannable(
@@ -91,7 +102,7 @@ def on_ticks(
     stretch = 1.0
     path = curve(np.linspace(0.0, nominal, 100))[0]
     for _ in range(_ROUNDS):
-        refuse_endless(path, limits, nominal * stretch)
+        refuse_endless(path, limits, nominal * stretch, bounds)
         # The first tick not before the end, with a tolerance of a millionth of a period for rounding.
         ticks = max(1, math.ceil(nominal * stretch / period - 1e-6))
         times = np.arange(ticks + 1) * period

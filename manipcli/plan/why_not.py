@@ -16,8 +16,8 @@ START: Final = "start"
 """The stage of a refusal before any motion."""
 NAMED: Final = 5
 """Names of candidates that a group lists."""
-_LABEL: Final = re.compile(r"([a-z_]+): ")
-_DURING: Final = re.compile(r" s of '([a-z_]+)'")
+_LABEL: Final = re.compile(r"([a-z_]+(?: back)?): ")
+_DURING: Final = re.compile(r" s of '([a-z_ ]+)'")
 
 Refused = Sequence[tuple[str, Dropped]]
 """Id of the step and candidate, in the order of their refusal."""
@@ -67,4 +67,5 @@ def change_for_most(refused: Refused) -> str:
     body, count = bodies.most_common(1)[0]
     if 2 * count < len(refused):
         return ""
-    return f"move '{body}': it is in the way of {count} of {number_of(len(refused), 'candidate')}"
+    tried = number_of(len(refused), "candidate")
+    return f"move '{body}', or the goal away from it: it is in the way of {count} of {tried}"

@@ -63,7 +63,7 @@ def _findings(
         kind = load.kind_of(path)
         if kind == "task":
             task = of_task(path)
-            return (*task.findings, *preflight_findings(task))
+            return (*task.findings, *preflight_findings(task, margins=True))
         if kind == "controllers":
             return load.load_controllers(path, model=controllers_spec()).findings
         file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from manipcli.core.errors import Diagnostic, NotPlannable
 from manipcli.core.registry import Seam
 from manipcli.preflight.checks import PREFLIGHT_CHECKS
@@ -12,7 +14,7 @@ from manipcli.task.task import Task
 
 
 def preflight_findings(
-    task: Task, plan: Plan | None = None, *, checks: Seam[Check] = PREFLIGHT_CHECKS
+    task: Task, plan: Plan | None = None, *, checks: Seam[Check] = PREFLIGHT_CHECKS, margins: bool = False
 ) -> tuple[Diagnostic, ...]:
     """Warnings about gains, efforts, grasps and timeouts, with a value that works, each at its place in its file.
 
@@ -23,6 +25,7 @@ def preflight_findings(
         plan: its plan; None: plan it here. If planning fails, the findings include the refusal, and gains are checked
             at the named poses.
         checks: the registry.
+        margins: add a note with the margin of each grasp.
     """
     found: list[Diagnostic] = []
     if plan is None:
@@ -35,4 +38,14 @@ def preflight_findings(
     for check in checks:
         if (plan is not None or not check.needs_plan) and (physics or not check.needs_physics):
             found += check.findings(subject)
+    if margins and plan is not None:
+        found += _grasp_margins(task, plan)
     return tuple(found)
+
+
+def _grasp_margins(task: Task, plan: Plan) -> Iterator[Diagnostic]:
+    """What each grasp of the plan holds, at its step."""
+    numbers = {step.id: k for k, step in enumerate(plan.steps)}
+    for step, margin in plan.grasps():
+        place = task.file.place("steps", numbers[step])
+        yield Diagnostic("TASK250", f"step '{step}': {margin.text}", place, severity="note")

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.plan.candidates import Dropped
 from manipcli.plan.motion import Motion
@@ -18,6 +19,7 @@ from manipcli.task.plan_task import Plan, PlannedStep, spans
 
 MOST_GHOSTS: Final = 8
 """Ghosts of a page; it has eight colours, and more hide the motion."""
+_STILL: Final = 1.0  # s of a page on which nothing moves
 NOTE: Final = "planned, not simulated: bodies are where the planner predicts them"
 
 
@@ -34,6 +36,31 @@ def planned_playback(plan: Plan, name: str, *, rate: float = RATE) -> Playback:
         before = step.plan.end
         steps.append(PlaybackStep(step.id, step.verb, step.id, begins, clock, "done", phases=tuple(phases)))
     return _playback(plan, name, states, tuple(steps))
+
+
+def refused_playback(plan: Plan, name: str, refusal: NotPlannable) -> tuple[Playback, tuple[Ghost, ...]]:
+    """A task without a plan: still at its start, with the reason, and a ghost of what was planned of the refused step.
+
+    Args:
+        plan: without steps.
+        name: of the task.
+        refusal: why it has no plan.
+    """
+    last: BaseException | None = refusal
+    while isinstance(last, NotPlannable) and not last.motions:  # the reported one has none, its cause has
+        last = last.__cause__
+    tried = Dropped("", last) if isinstance(last, NotPlannable) else None
+    ghost = _run(plan, _motions(tried), tried, 0.0) if tried is not None else None
+    times = np.array([0.0, _STILL]) if ghost is None else ghost.times
+    n, step = len(plan.start.position), str(refusal.step or "")
+    still = np.zeros((len(times), n))
+    states = PlannedStates(times, still + plan.start.position, still, still, still, (plan.start.bodies,) * len(times))
+    end = float(times[-1])
+    shown = _playback(plan, name, [(0.0, states)], (PlaybackStep(step, "", step, 0.0, end, "failed", refusal.cause),))
+    groups = (f"{one.count} refused: {one.step}, {one.stage}: {one.cause}" for one in refusal.candidates)
+    reasons = (f"no plan: {refusal}", *([f"hint: {refusal.hint}"] if refusal.hint else []), *groups)
+    ghosts = () if ghost is None else (ghost_of(f"{step}: refused", ghost, shown),)
+    return replace(shown, notes=("not simulated: the start of the task", *reasons)), ghosts
 
 
 def planned_ghosts(plan: Plan, shown: Playback) -> tuple[tuple[Ghost, ...], int]:

@@ -4,105 +4,33 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol, TextIO
-
-import numpy as np
+from typing import TextIO
 
 from manipcli.core.geometry import Array
 from manipcli.model.collision import CollisionHit
-from manipcli.model.robot import RobotModel
-from manipcli.plan.candidates import Dropped
-from manipcli.plan.grasp_margin import GraspMargin
 from manipcli.plan.motion_margins import MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import stage_of
 from manipcli.report.json import Json, dumps, picked, plain
+from manipcli.task.plan_task import Plan, PlannedMotion, PlannedStep
 
 
-class PlannedStep(Protocol):
-    """The shown fields of a step."""
-
-    @property
-    def id(self) -> str: ...
-    @property
-    def verb(self) -> str: ...
-    @property
-    def candidate(self) -> str: ...
-    @property
-    def dropped(self) -> Sequence[Dropped]: ...
-
-
-class PlannedMotion(Protocol):
-    """The shown fields of a motion; `trajectory` is None for a motion of the hand alone."""
-
-    @property
-    def step_id(self) -> str: ...
-    @property
-    def verb(self) -> str: ...
-    @property
-    def label(self) -> str: ...
-    @property
-    def trajectory(self) -> JointTrajectory | None: ...
-    @property
-    def duration(self) -> float: ...
-
-
-@dataclass(frozen=True, slots=True)
-class Limiting:
-    """The nearest limit of a motion: its joint, its quantity, and the used fraction of the limit."""
-
-    joint: str
-    quantity: str
-    fraction: float
-
-
-def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
-    """The nearest limit of a motion: the largest |v| / v_max, |a| / a_max or |da/dt| / j_max of all joints and times.
-
-    A time-optimal motion at full speed reaches a fraction of 1, one with `velocity_scaling: 0.5` about 0.5. None if the
-    points have no derivatives or the robot has no such limit.
-    """
-    used: list[Limiting] = []
-    jerks = None
-    if trajectory.accelerations is not None and len(trajectory.times) > 1:
-        jerks = np.diff(trajectory.accelerations, axis=0) / np.diff(trajectory.times)[:, None]
-    for k, name in enumerate(trajectory.names):
-        limits = robot.joint(name).limits
-        for quantity, values, limit in (
-            ("velocity", trajectory.velocities, limits.velocity),
-            ("acceleration", trajectory.accelerations, limits.acceleration),
-            ("jerk", jerks, limits.jerk),
-        ):
-            if values is not None and limit:
-                used.append(Limiting(name, quantity, float(np.abs(values[:, k]).max()) / limit))
-    return max(used, key=lambda use: use.fraction, default=None)
-
-
-class PlannedTask(Protocol):
-    """The shown parts of a plan."""
-
-    @property
-    def steps(self) -> Sequence[PlannedStep]: ...
-    @property
-    def motions(self) -> Sequence[PlannedMotion]: ...
-    def clearances(self) -> Sequence[CollisionHit | None]: ...
-    def margins(self) -> Sequence[MotionMargins]: ...
-    def grasps(self) -> Sequence[tuple[str, GraspMargin]]: ...
-
-
-def render_json(task: str, plan: PlannedTask, robot: RobotModel) -> str:
+def render_json(task: str, plan: Plan) -> str:
     """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m."""
-    motions = zip(plan.motions, plan.clearances(), plan.margins(), strict=True)
+    motions = zip(plan.motions, plan.path_kinds(), plan.clearances(), plan.margins(), strict=True)
     return dumps(
         {
             "task": task,
             "verdict": "passed",
             "duration": round(sum(motion.duration for motion in plan.motions), 9),
-            "motions": [_motion(motion, robot, near, margins) for motion, near, margins in motions],
+            "motions": [_motion(motion, kind, near, margins) for motion, kind, near, margins in motions],
             "steps": [_step(step) for step in plan.steps],
             "grasps": [
-                {"step": step, **picked(margin, "body force friction weight ratio acceleration contacts")}
+                {
+                    "step": step,
+                    **picked(margin, "body force friction weight ratio acceleration contacts"),
+                    **({"attachment": margin.attachment} if margin.attachment else {}),
+                }
                 for step, margin in plan.grasps()
             ],
             "errors": [],
@@ -150,18 +78,20 @@ def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> li
     return [f"{value:.9g}" for value in values[:, trajectory.names.index(joint)]]
 
 
-def _motion(motion: PlannedMotion, robot: RobotModel, near: CollisionHit | None, margins: MotionMargins) -> Json:
+def _motion(motion: PlannedMotion, kind: str, near: CollisionHit | None, margins: MotionMargins) -> Json:
     trajectory = motion.trajectory
-    most = limiting(trajectory, robot) if trajectory is not None else None
+    timed = [margin for margin in margins.margins if margin.quantity in ("velocity", "acceleration", "jerk")]
+    most = max(timed, key=lambda margin: margin.used, default=None)
     return {
         "step": motion.step_id,
         "verb": motion.verb,
         "motion": motion.label,
         "duration": round(motion.duration, 9),
+        "path": kind or None,
         "joints": list(trajectory.names) if trajectory is not None else [],
         "limited_by": None
         if most is None
-        else {"joint": most.joint, "quantity": most.quantity, "used": round(most.fraction, 6)},
+        else {"joint": most.joint, "quantity": most.quantity, "used": round(most.used, 6)},
         "bound_by": None if margins.binding is None else picked(margins.binding, "joint quantity share"),
         "margins": plain(margins.margins),
         "manipulability": None if margins.manipulability is None else picked(margins.manipulability, "least time"),

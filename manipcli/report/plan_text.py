@@ -6,52 +6,60 @@ from collections.abc import Sequence
 
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
-from manipcli.plan.motion_margins import MotionMargins
-from manipcli.report.plan import PlannedTask
+from manipcli.plan.motion_margins import Binding, MotionMargins
+from manipcli.plan.why_not import by_stage
 from manipcli.report.table import table
+from manipcli.task.plan_task import Plan
 
 
-def render_text(task: str, plan: PlannedTask) -> str:
-    """Tables with one row per motion (the step's name only at its first), per margin, and per step with candidates."""
+def render_text(task: str, plan: Plan) -> str:
+    """Tables with one row per motion (the step's name only at its first), per margin, and per stage of candidates."""
     margins = plan.margins()
     parts = [_motions(plan, margins), _margins(plan, margins)]
     parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
-    if candidates := _candidates(plan):
-        parts.append(candidates)
+    chosen = [step for step in plan.steps if step.dropped and step.candidate]
+    parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
+    parts.append(render_refused(by_stage([(step.id, one) for step in plan.steps for one in step.dropped])))
     total = sum(motion.duration for motion in plan.motions)
     parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {total:.2f} s")
     return "\n\n".join(part for part in parts if part)
 
 
 def render_refused(candidates: Sequence[RefusedCandidates]) -> str:
-    """The refused candidates by stage, the commonest first."""
+    """The refused candidates by stage, the commonest first; "" if there are none."""
     rows = [(str(group.count), group.step, group.stage, group.cause) for group in candidates]
-    return table(("refused", "step", "at", "because"), rows, right=("refused",))
+    return table(("refused", "step", "at", "because"), rows, right=("refused",)) if rows else ""
 
 
-def _motions(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
+def _motions(plan: Plan, found: Sequence[MotionMargins]) -> str:
     rows = []
     previous = None
-    for motion, near, margins in zip(plan.motions, plan.clearances(), found, strict=True):
+    for motion, kind, near, margins in zip(plan.motions, plan.path_kinds(), plan.clearances(), found, strict=True):
         bound, dexterity = margins.binding, margins.manipulability
         rows.append(
             (
                 motion.step_id if motion.step_id != previous else "",
                 motion.verb if motion.step_id != previous else "",
                 motion.label,
+                kind or "-",
                 f"{motion.duration:.3f} s",
-                f"{bound.joint} {bound.quantity}, {100.0 * bound.share:.0f} % of the time" if bound else "-",
+                f"{_bound(bound)}, {100.0 * bound.share:.0f} % of the time" if bound else "-",
                 f"{1000.0 * near.distance:.1f} mm" if near is not None else "-",
                 f"{near.a} and {near.b} at {near.time:.2f} s" if near is not None else "-",
                 f"{dexterity.least:.3f} at {dexterity.time:.2f} s" if dexterity else "-",
             )
         )
         previous = motion.step_id
-    headers = ("step", "verb", "motion", "duration", "bound by", "clearance", "between", "manipulability")
+    headers = ("step", "verb", "motion", "path", "duration", "bound by", "clearance", "between", "manipulability")
     return table(headers, rows, right=("duration", "clearance"))
 
 
-def _margins(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
+def _bound(bound: Binding) -> str:
+    """`joint_4 acceleration`, or `tool_speed`."""
+    return bound.quantity if bound.quantity.startswith(bound.joint) else f"{bound.joint} {bound.quantity}"
+
+
+def _margins(plan: Plan, found: Sequence[MotionMargins]) -> str:
     """The nearest joint of each kind of limit in each motion."""
     rows = [
         (
@@ -65,8 +73,3 @@ def _margins(plan: PlannedTask, found: Sequence[MotionMargins]) -> str:
         for first, margin in ((k == 0, one) for k, one in enumerate(margins.margins))
     ]
     return table(("motion", "limit", "nearest joint", "used", "at"), rows, right=("used", "at")) if rows else ""
-
-
-def _candidates(plan: PlannedTask) -> str:
-    rows = [(step.id, one.name or "-", one.refusal.cause) for step in plan.steps for one in step.dropped]
-    return table(("step", "dropped candidate", "because"), rows) if rows else ""

@@ -14,6 +14,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
+from manipcli.plan.from_motion import stopped
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
@@ -44,8 +45,9 @@ def build_manager(task: Task, kinematics: Kinematics | None = None) -> Controlle
     compat = task.robot_file.spec.compat
     kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
     return build_controllers(
-        file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat
-    )
+        file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat,
+        stop_planner=stopped,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,6 +118,7 @@ class EngineMember:
         chosen: (robot, scene, settings) -> values that the engine chose itself, for the log.
         version: of the engine, for the log.
         prepare: imports the engine's library, which is otherwise imported by the first world.
+        missing: () -> how to install its library; "" where it is installed.
     """
 
     name: str
@@ -128,3 +129,4 @@ class EngineMember:
     chosen: Callable[[RobotModel, Scene, EngineSettings], Mapping[str, str]]
     version: Callable[[], str]
     prepare: Callable[[], object]
+    missing: Callable[[], str] = lambda: ""

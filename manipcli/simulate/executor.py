@@ -150,9 +150,11 @@ class Executor:
             self._tick()
 
     def stop(self) -> None:
-        """Cancel active goals, let the joints stop within their limits, and hold still; alarms are ignored."""
+        """Cancel goals, let the joints stop within their limits, and hold still until they rest; alarms are ignored."""
         self._cancel()
         for _ in range(self._ticks(REST)):
+            self._session.tick()
+        while self._moving and not self._session.manager.faults:  # a stop with a low limit takes longer
             self._session.tick()
 
     def _come_to_rest(self) -> None:
@@ -160,9 +162,14 @@ class Executor:
         self._cancel()
         self._tick()
         faults = self._session.manager.faults
-        while not faults and any(controller.output.velocity.any() for controller in self._serving):
+        while not faults and self._moving:
             self._tick()
             faults = self._session.manager.faults
+
+    @property
+    def _moving(self) -> bool:
+        """Whether a reference of the last motion moves."""
+        return any(controller.output.velocity.any() for controller in self._serving)
 
     def _ticks(self, duration: float) -> int:
         """The number of ticks in `duration` [s]."""

@@ -57,3 +57,6 @@ class AgreeSpec(Model):
     force: Allowance | None = Field(
         None, description="How much the peak force of each grasp may differ, as a share. Default: any."
     )
+    contact_force: Allowance | None = Field(
+        None, description="How much the peak contact force of each step may differ, as a share. Default: any."
+    )

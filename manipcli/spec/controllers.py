@@ -144,7 +144,8 @@ class ConstraintsSpec(Model):
     ] = 0.05
     decelerate_on_cancel: bool = Field(
         True,
-        description="Whether a cancel decelerates, within position limits; if false, the reference stops at once. "
-        "Default true.",
+        description="Whether a cancel decelerates, within position limits, and without `compat` an abort; within the "
+        "limits of acceleration and jerk, with `compat` at constant deceleration. If false, the reference stops at "
+        "once. Default true.",
     )
     joints: dict[str, JointConstraintSpec] = Field({}, description="Tolerances by joint.")

@@ -93,7 +93,7 @@ def explain(error: ValidationError, root: Node, model: type[BaseModel], area: st
     """All errors as diagnostics, in the order of the file."""
     complaints = [_locate(details, root) for details in error.errors(include_url=False)]
     findings: list[Diagnostic] = []
-    for complaint in _decide(_counted(complaints), root):
+    for complaint in _decide(_without_renamed(_counted(complaints), root), root):
         findings.append(_finding(complaint[0], complaint, root, model, area))
     unique = dict.fromkeys(findings)
     return tuple(sorted(unique, key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0)))
@@ -145,6 +145,22 @@ def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
     return result
 
 
+def _without_renamed(complaints: list[_Complaint], root: Node) -> list[_Complaint]:
+    """Without a missing key that a misspelt one stands for: a similar one, or where no key of the block is known."""
+    unknown: dict[tuple[Loc, tuple[tuple[int, str], ...]], list[str]] = {}
+    for complaint in complaints:
+        if complaint.error["type"] == "extra_forbidden":
+            unknown.setdefault((complaint.path[:-1], complaint.tags), []).append(str(complaint.path[-1]))
+
+    def renamed(complaint: _Complaint) -> bool:
+        given = unknown.get((complaint.path[:-1], complaint.tags), [])
+        block = node_at(root, complaint.path[:-1])
+        all_unknown = isinstance(block, MappingNode) and len(given) == len(block.entries)
+        return bool(given) and (all_unknown or any(nearest(key, [str(complaint.path[-1])]) for key in given))
+
+    return [complaint for complaint in complaints if complaint.error["type"] != "missing" or not renamed(complaint)]
+
+
 def _decide(complaints: Sequence[_Complaint], root: Node) -> list[list[_Complaint]]:
     """Keeps the best matching branch of each union; if none matches, its branches become one complaint."""
     decided: list[list[_Complaint]] = []
@@ -184,7 +200,7 @@ def _finding(
     what, hint = _message(first, branches, root, model)
     at_key = kind == "extra_forbidden" or bool(first.error.get("ctx", {}).get("key", False))
     origin = None if at_key else _origin(node, root)
-    if kind in _RANGES and hint is not None and origin is not None:
+    if (kind in _RANGES or kind == "unit") and hint is not None and origin is not None:
         hint = f"{hint}; {origin}"
     elif hint is None:
         hint = origin
@@ -218,7 +234,8 @@ def _message(
     if kind == "missing":
         return f"the key '{path[-1]}' is missing", _described(_field(first, model), path)
     if "message" in context:
-        return str(context["message"]), str(context.get("hint", "")) or None
+        hint = str(context.get("hint", "")) or None
+        return str(context["message"]), hint or (_described(_field(first, model), path) if kind == "unit" else None)
     if kind == "literal_error":
         what, hint = _unknown_word(str(context.get("expected", "")), node)
         return what, hint or _described(_field(first, model), path)
@@ -230,9 +247,8 @@ def _message(
         ), None
     if kind in _RANGES:
         field = _field(first, model)
-        optional = field is not None and field.default is None
         unit = _unit(first, model)
-        hint = hints.other_unit(unit, context, node) or (_described(field, path) if optional else None)
+        hint = hints.other_unit(unit, context, node) or _described(field, path)
         return f"must be {_RANGES[kind]} {_limit(context, unit)}, not {shown(node)}", hint
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None

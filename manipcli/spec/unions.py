@@ -14,7 +14,7 @@ from operator import or_
 from types import MappingProxyType
 from typing import Annotated, ForwardRef, Optional, Protocol, TypeVar, cast
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, create_model
 from typing_extensions import TypeAliasType
 
 from manipcli.core.registry import Seam
@@ -112,12 +112,20 @@ def simulation_model(engines: Members) -> type[SimulationSpec]:
     own = {name: (spec, Field(spec(), description=about(spec))) for name, spec in engines if spec.model_fields}
     default = SimulationSpec.model_fields["engine"].default
     text = f"Engine: {', '.join(f'`{name}`' for name, _ in engines)}. Default {default}."
+    names = [name for name, _ in engines]
+
+    def known(engine: str) -> str:
+        if engine not in names:
+            near = did_you_mean(engine, names, kind="engines")
+            raise problem("name", f"unknown engine '{escape(engine)}'", hint=near)
+        return engine
+
     # The field names are only known at run time: no overload of create_model fits.
     made = create_model(  # type: ignore[call-overload]
         "SimulationSpec",
         __base__=SimulationSpec,
         __doc__=SimulationSpec.__doc__,
-        engine=(str, Field(default, description=text)),
+        engine=(Annotated[str, AfterValidator(known)], Field(default, description=text)),
         **own,
     )
     return cast(type[SimulationSpec], made)

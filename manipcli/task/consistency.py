@@ -12,12 +12,12 @@ from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
-from manipcli.core.text import did_you_mean
-from manipcli.judge.expectation import expectation_problems, labels, until_problems
+from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, no_hand
 from manipcli.plan.part_pairs import pair_problems
+from manipcli.plan.path_planners.ompl_algorithm import algorithm_problems
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.move import MoveSpec
 from manipcli.plan.unknown_names import UnknownPosture
@@ -30,6 +30,7 @@ from manipcli.spec.located import Located
 from manipcli.spec.partial.partial_task import intended_ids
 from manipcli.spec.retry import retried
 from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.task.agree_limits import unusable_limits
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged
 
@@ -99,16 +100,10 @@ def not_there(
     if spec.start is not None and spec.start not in poses:
         message = f"robot '{robot.name}' has no pose '{spec.start}'"
         yield task.source.finding(ABSENT, ("start",), message, hint=f"poses: {', '.join(poses)}")
-    if spec.simulation.engine not in ENGINES.names:
-        message = f"unknown engine '{spec.simulation.engine}'"
-        hint = did_you_mean(spec.simulation.engine, ENGINES.names, kind="engines")
-        yield task.source.finding(ABSENT, ("simulation", "engine"), message, hint=hint)
-    names = tuple(labels(spec.judged))
-    for name in () if kept else spec.agree.margins:
-        if name not in names:
-            message = f"the task has no expectation '{name}'"
-            near = did_you_mean(name, names, kind="expectations")
-            yield task.source.finding(ABSENT, ("agree", "margins", name), message, hint=near, key=True)
+    for p in algorithm_problems(spec.planner):
+        yield task.source.finding(ABSENT, ("planner", *p.loc), p.message, hint=p.hint)
+    if not kept:
+        yield from unusable_limits(task)
 
 
 def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:

@@ -24,11 +24,13 @@ from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_margins import MotionMargins, motion_margins
 from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
+from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import explained
+from manipcli.spec.keep import KeepSpec
 from manipcli.spec.task import StepSpec
 from manipcli.task.task import Task
 
@@ -44,6 +46,7 @@ class PlannedStep:
         grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
         candidate: name of the candidate; "" for the only way.
         dropped: the candidates that were tried before it.
+        keep: of the step.
     """
 
     id: str
@@ -53,6 +56,7 @@ class PlannedStep:
     grasps: tuple[Array, ...] = ()
     candidate: str = ""
     dropped: tuple[Dropped, ...] = ()
+    keep: tuple[KeepSpec, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +109,15 @@ class Plan:
 
     def margins(self) -> tuple[MotionMargins, ...]:
         """What binds each of `motions`, its margins and its manipulability."""
-        return tuple(motion_margins(self.planner, *span) for span in self.spans())
+        keeps = [step.keep for step in self.steps for _ in step.plan.motions]
+        return tuple(
+            motion_margins(self.planner.keeping(keep), motion, before)
+            for keep, (motion, before, _) in zip(keeps, self.spans(), strict=True)
+        )
+
+    def path_kinds(self) -> tuple[str, ...]:
+        """What the path of each of `motions` is; see `path_kind`."""
+        return tuple(path_kind(self.planner, motion, begins) for motion, begins, _ in self.spans())
 
     @property
     def outline(self) -> PlanOutline:
@@ -117,6 +129,12 @@ class Plan:
             ),
             self.judged,
         )
+
+
+def unplanned(task: Task) -> Plan:
+    """A plan without steps, for pictures of a task that has none: its start and scene."""
+    task = task.known
+    return Plan(steps=(), start=_start(task), planner=_planner(task))
 
 
 def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None) -> Plan:
@@ -131,7 +149,7 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     """
     task = task.known
     planner = _planner(task)
-    start = PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+    start = _start(task)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
     return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
 
@@ -203,6 +221,10 @@ def start_position(task: Task) -> Array:
     return configuration(task.robot, task.spec.start)
 
 
+def _start(task: Task) -> PlanningState:
+    return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+
+
 def _steps(
     task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None]
 ) -> tuple[PlannedStep, ...]:
@@ -244,7 +266,7 @@ def _steps(
     return tuple(
         PlannedStep(
             str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps,
-            one.chosen.candidate.name, one.dropped,
+            one.chosen.candidate.name, one.dropped, step.keep,
         )
         for k, (step, one) in enumerate(zip(steps, solved, strict=True))
     )  # fmt: skip

@@ -8,6 +8,7 @@ from manipcli.conditions.members import CONDITIONS
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.plan.path_planners import PATH_PLANNERS
 from manipcli.plan.steps import STEPS
+from manipcli.simulate.engine import EngineMember
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.base import about
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
@@ -26,12 +27,20 @@ def controllers_spec() -> type[ControllersSpec]:
     return controllers_model(CONTROLLERS)
 
 
+def _about_engine(member: EngineMember) -> str:
+    physics = "Physics" if member.physics == "full" else "Ideal tracking, no physics"
+    missing = member.missing()
+    return f"{physics}. Not installed; {missing}." if missing else f"{physics}."
+
+
 def meanings(kind: str) -> Mapping[str, str]:
-    """One-line description of each word of a kind (`steps`, `conditions`, `expectations`); empty for other kinds."""
+    """One-line description of each word of a kind (`steps`, `conditions`, `expectations`, `engines`); empty for other
+    kinds."""
     conditions = {member.name: about(member.spec) for member in CONDITIONS} | COMBINATIONS
     descriptions = {
         "steps": {member.name: about(member.spec) for member in STEPS},
         "conditions": conditions,
         "expectations": conditions | QUANTIFIERS,
+        "engines": {member.name: _about_engine(member) for member in ENGINES},
     }
     return descriptions.get(kind, {})

@@ -300,7 +300,12 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
     pipeline.plan_task = lambda _: SimpleNamespace(
-        motions=(_motion(),), steps=(), clearances=lambda: (NEAR,), margins=lambda: (margins,), grasps=tuple
+        motions=(_motion(),),
+        steps=(),
+        path_kinds=lambda: ("straight",),
+        clearances=lambda: (NEAR,),
+        margins=lambda: (margins,),
+        grasps=tuple,
     )
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0

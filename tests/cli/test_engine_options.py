@@ -51,7 +51,9 @@ def folder(tmp_path: Path) -> Path:
         (["--engines", "pybullet,kinematik"], "unknown engine 'kinematik'", "did you mean 'kinematic'?"),
         (["--engines", "pybullet,pybullet"], "pybullet: given twice", "name each engine once"),
         (["--engines", "pybullet"], "one engine; there is nothing to compare", "add --check-step"),
-        (["--engines", "pybullet,"], "unknown engine ''", "engines: "),
+        (["--engines", "pybullet,"], "--engines pybullet,: an engine has no name", "such as --engines pybullet,mujoco"),
+        (["--engines", ""], "--engines '': no engine", "such as --engines pybullet,mujoco"),
+        (["--engines", ","], "--engines ,: no engine", "such as --engines pybullet,mujoco"),
         (
             ["--engines", "pybullet,kinematic", "--set", "simulation.engine=pybullet"],
             "--set simulation.engine=pybullet: no effect with --engines",

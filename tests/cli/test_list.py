@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.simulate.engines import mujoco
 
 FILES = {
     "tasks/b.yaml": "task: b\nrobot: r.yaml\n",
@@ -75,10 +76,21 @@ def test_words_are_those_of_the_registries(capsys: pytest.CaptureFixture[str], k
     assert "pose" not in words
     assert main(["list", kind]) == 0
     lines = capsys.readouterr().out.splitlines()
-    if kind in ("steps", "conditions", "expectations"):
+    if kind in ("steps", "conditions", "expectations", "engines"):
         assert lines.pop(0).split() == ["word", "meaning"]
-        assert all(line.endswith((".", "`.")) and len(line.split()) > 3 for line in lines)
+        assert all(line.endswith((".", "`.")) and len(line.split()) > (1 if kind == "engines" else 3) for line in lines)
     assert [line.split()[0] for line in lines] == words
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_an_engine_without_its_package_is_listed_with_its_extra(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, installed: bool
+) -> None:
+    monkeypatch.setattr(mujoco, "installed", lambda: installed)
+    assert main(["list", "engines"]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert ("Not installed; install it: pip install 'manipcli[mujoco]'." in lines["mujoco"]) == (not installed)
+    assert lines["kinematic"].endswith("  Ideal tracking, no physics.")
 
 
 TASK = str(Path(__file__).parents[2] / "tasks" / "pour.yaml")

@@ -169,3 +169,24 @@ def test_pictures_and_pages_are_written_and_reproducible(
 def test_to_needs_export(written: Write, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", str(written(MOVES)), "--allow-outside", "--to", "x"]) == 4
     assert "--to has no effect without --export" in capsys.readouterr().err
+
+
+def test_a_constraint_of_a_step_binds_its_motion(written: Write) -> None:
+    """Slow enough, the tool is at its speed limit for nearly all of the time; without, a joint binds."""
+    turn, back = "move: {to: {joint_1: 10 deg}}", "{move: {to: home}, keep: {tool_speed: 0.1}}"
+    free, slow = planned(written(f"{HEAD}steps:\n  - {turn}\n  - {back}\n")).margins()
+    assert free.binding is not None and slow.binding is not None
+    assert free.binding.joint == "joint_1"
+    assert (slow.binding.joint, slow.binding.quantity) == ("tool", "tool_speed")
+    assert slow.binding.share > 0.8  # the rest: it starts and stops
+
+
+def test_a_pose_beyond_a_joint_limit_names_the_joint(written: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    """The pose is reached until the limits of one joint are narrowed."""
+    path = str(written(HEAD + "steps:\n  - move: {pose: {xyz: [0.3, 0, 0.5], rpy: [180 deg, 0, 0]}}\n"))
+    assert main(["plan", path, "--allow-outside"]) == 0
+    narrow = "robot.limits.joint_4={lower: -1.65, upper: 0.05}"
+    capsys.readouterr()
+    assert main(["plan", path, "--allow-outside", "--set", narrow]) == 1
+    told = capsys.readouterr().err
+    assert "joint_4" in told.split("at the limits of ")[1].split(", with the tool at")[0]

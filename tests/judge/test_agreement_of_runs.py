@@ -10,12 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.errors import InvalidInput, Loc, Place
+from manipcli.core.errors import Loc, Place
 from manipcli.judge.agreement import Agreement, compare
 from manipcli.judge.measured_run import GraspNumbers, MeasuredRun, Variant
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, StepWord, Verdict, VerdictWord
+from manipcli.report.agreement.agreement_json import agreement_object
 from manipcli.report.agreement.agreement_text import numbers_table, render_text
 from manipcli.report.agreement.compared_runs import ComparedRuns
+from manipcli.report.agreement.disagreement import message
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.spec.agree import AgreeSpec
 
@@ -109,13 +111,58 @@ def test_a_share_ignores_what_is_too_small_to_matter_and_an_amount_does_not() ->
     assert not compare([run("a", agree=AgreeSpec(margins={"inside": "0.4 mm"})), run("b", near)]).agrees
 
 
-def test_an_amount_in_another_unit_is_refused_at_its_place() -> None:
-    agree = AgreeSpec(margins={"inside": "2 deg"})
-    with pytest.raises(InvalidInput) as refused:
-        compare([run("a", agree=agree), run("b")])
-    (finding,) = refused.value.findings
-    assert (finding.code, finding.place) == ("TASK246", Place("pour.yaml", 6, 5))
-    assert finding.message == "agree.margins.inside: '2 deg' is an angle; the margin is in m"
+def test_all_limits_in_another_unit_than_the_margins_of_the_runs_are_reported_with_the_numbers() -> None:
+    """Conditions with several units: only the runs show which one decides."""
+    agree = AgreeSpec(margins={"inside": "2 deg", "upright": "1 cm"})
+    made = compare([run("a", agree=agree), run("b", with_margin(0.5))])
+    assert [(found.cause, found.name) for found in made.disagreements] == [("limit", "inside"), ("limit", "upright")]
+    assert made.disagreements[0].place == Place("pour.yaml", 6, 5)
+    assert [message(found) for found in made.disagreements] == [
+        "a limit cannot be used: agree.margins.inside: '2 deg' is an angle; the margin is in m",
+        "a limit cannot be used: agree.margins.upright: '1 cm' is a length; the margin is in rad",
+    ]
+    lines = numbers_table(made).splitlines()
+    assert [line.split()[1] for line in lines if line.endswith("other unit")] == ["inside", "upright"]
+    assert agreement_object(made)["disagreements"]
+    failed = compare([run("a", agree=agree), run("b", with_margin(-0.01))]).disagreements
+    assert [found.cause for found in failed] == ["engines", "limit", "limit"], "nor do they hide a verdict"
+
+
+def test_a_limit_of_what_no_two_engines_have_is_warned_about() -> None:
+    """Of what they have, it is not; nor where one engine was run, or nothing."""
+    every = AgreeSpec(
+        margin=0.1, margins={"inside": "5 cm", "upright": "50 %"}, duration=0.1, slip=0.01, force=0.1, contact_force=0.1
+    )
+    assert compare([run("a", agree=every), run("b")]).warnings == ()
+    bare = {"grasps": (), "forces": {}}
+    one = [replace(run("a", agree=every), **bare), run("b")]
+    messages = [finding.message for finding in compare(one).warnings]
+    assert messages == [
+        "agree.slip has no effect: fewer than two engines have a slip in the hand",
+        "agree.force has no effect: fewer than two engines have a grasp",
+        "agree.contact_force has no effect: fewer than two engines have a contact",
+    ]
+    unmet = replace(VERDICT, expectations=(replace(INSIDE, outcome="not_evaluated", margin=None), UPRIGHT))
+    (finding,) = compare([run("a", unmet, agree=every), run("b", unmet)]).warnings
+    assert (finding.code, finding.severity, finding.place) == ("TASK248", "warning", Place("pour.yaml", 6, 5))
+    assert finding.message == "agree.margins.inside has no effect: fewer than two engines have a margin of 'inside'"
+    assert compare([replace(run("a", agree=every), **bare), run("a", half_step=True)]).warnings == ()
+
+
+def test_the_peak_contact_force_of_a_step_differs_by_what_is_allowed() -> None:
+    other = replace(run("b"), forces={"pick_1": 25.0})
+    assert compare([run("a", agree=AgreeSpec(contact_force=0.2)), other]).agrees
+    (found,) = compare([run("a", agree=AgreeSpec(contact_force=0.19)), other]).disagreements
+    assert (found.kind, found.name, found.allowed) == ("contact_force", "pick_1", pytest.approx(0.19 * 25.0))
+    assert compare([run("a", agree=AgreeSpec(force=0.0)), other]).agrees, "that limits grasps"
+
+
+def test_the_table_says_between_which_runs_differences_are() -> None:
+    pair = [run("a"), run("b")]
+    note = "difference: between the engines at the step of the task"
+    assert note not in numbers_table(compare(pair))
+    assert note in numbers_table(compare([*pair, run("a", half_step=True)]))
+    assert note not in numbers_table(compare([run("a"), run("a", half_step=True)])), "no differences"
 
 
 def test_margins_in_different_units_are_not_comparable_where_they_are_limited() -> None:

@@ -16,6 +16,7 @@ from manipcli.cli.app import main
 from manipcli.core.errors import InvalidInput
 from manipcli.logs import recorded_task
 from manipcli.pipeline import run_task, verify_log
+from manipcli.simulate.engines import ENGINES
 
 ROOT = Path(__file__).parents[2]
 Rewrite = Callable[..., Path]
@@ -206,6 +207,27 @@ def test_options_that_show_a_run_are_refused_where_it_is_verified(capsys: pytest
     assert told in capsys.readouterr().err
     assert main(["replay", "absent.mcap", "--allow-different", "--format", "json"]) == 4
     assert "--allow-different, --format json: no effect without --verify" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("engine", [member.name for member in ENGINES if member.physics == "full"])
+def test_a_run_with_contacts_verifies_in_each_engine(tmp_path: Path, engine: str) -> None:
+    """A ball falls on the floor, beside an arm that is held."""
+    if engine == "mujoco":
+        pytest.importorskip("mujoco")
+    task = tmp_path / "drop.yaml"
+    task.write_text(
+        f"task: drop\nrobot: {ROOT}/robots/arm7_hand3/robot.yaml\n"
+        f"controllers: {ROOT}/controllers/arm7_hand3.yaml\n"
+        f"simulation: {{engine: {engine}, settle: 0 s}}\n"
+        "scene:\n  ball: {sphere: {radius: 2 cm}, mass: 50 g, pose: {xyz: [1, 0, 0.07]}}\n"
+        "steps:\n  - wait: 0.3 s\n"
+        "expect:\n  - eventually: {collision: [ball, floor]}\n"
+    )
+    path = tmp_path / "drop.mcap"
+    assert run_task(task, log=path).verdict.verdict == "passed"
+    made = verify_log(path)
+    assert (made.identical, made.messages.first, made.entries) == (True, None, ())
+    assert made.messages.messages > 300
 
 
 @pytest.mark.slow

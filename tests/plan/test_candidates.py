@@ -81,9 +81,30 @@ def test_each_attempt_continues_after_the_last_and_tells_what_was_dropped() -> N
     attempts = Attempts(of(attempt, range(4), "no way"))
     one, two = attempts.take(), attempts.take()
     assert (one.candidate.name, two.candidate.name) == ("0", "2")
-    assert [(each.name, each.refusal.cause) for each in two.dropped] == [("1", "1 is odd")]
+    assert [(each.name, each.refusal.cause) for each in attempts.dropped] == [("1", "1 is odd")]
     with pytest.raises(NotPlannable, match=r"all 2 candidates failed: 1 is odd \(2 of 2\)"):
         attempts.take()
+
+
+def test_a_look_is_asked_after_a_refusal_and_spares_the_plan_until_its_reason_is_wanted() -> None:
+    looked, planned = [], []
+
+    def look(k: int) -> NotPlannable | None:
+        looked.append(k)
+        return NotPlannable("seen") if k < 3 else None
+
+    def plan(k: int) -> StepPlan:
+        planned.append(k)
+        if k < 3:
+            raise NotPlannable(f"why {k}")
+        return PLAN
+
+    attempts = Attempts(Candidates(Candidate(partial(plan, k), name=str(k), look=partial(look, k)) for k in range(5)))
+    assert attempts.take().candidate.name == "3"
+    assert (looked, planned) == ([1, 2, 3], [0, 3])
+    assert [(each.name, each.refusal.cause) for each in attempts.dropped] == [(str(k), f"why {k}") for k in range(3)]
+    assert planned == [0, 3, 1, 2]
+    assert len(attempts.dropped) == 3 and len(planned) == 4
 
 
 def test_grasps_near_an_excluded_one_are_skipped() -> None:

@@ -15,8 +15,11 @@ from manipcli.core.errors import InvalidInput, NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.clearance import least_distance
 from manipcli.model.collision import CollisionQuery, pairs
+from manipcli.model.configuration import with_joints
 from manipcli.plan.clearance import least_clearance
 from manipcli.plan.planner import CLEARANCE
+from manipcli.plan.sweep import first_hit
+from manipcli.plan.trajectory import JointTrajectory
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
@@ -177,3 +180,27 @@ def test_what_is_poured_may_touch_where_it_is_poured(bench: Make) -> None:
     arm.do("lift", {"object": "cup"})
     arm.do("pour", {"object": "cup", "into": "bowl", "tilt": "125 deg"})
     assert arm.planner.contents(arm.now, "bowl") == ("egg", "hat")
+
+
+def test_pairs_that_a_step_allows_have_no_clearance(tmp_path: Path) -> None:
+    """Also not where they are the nearest: then the next pair counts."""
+    move = "move: {to: {joint_1: 20 deg}}"
+    (near,) = plan_task(load_task(task(tmp_path, "", move), allow_outside=True)).clearances()
+    assert near is not None
+    pair = f"[{near.a}, {near.b}]"
+    (next_,) = plan_task(load_task(task(tmp_path, "", f"{move}\n    allow: [{pair}]"), allow_outside=True)).clearances()
+    assert next_ is not None
+    assert (next_.a, next_.b) != (near.a, near.b) and next_.distance >= near.distance
+
+
+@pytest.mark.parametrize("clearance", [0.0, CLEARANCE])
+def test_nothing_is_passed_between_two_points(bench: Make, clearance: float) -> None:
+    """The arm swings through a thin post between two free points of a trajectory, without a clearance, too."""
+    arm = bench(scene="\n  post: {box: {size: [1 cm, 1 cm, 2.0]}, pose: {xyz: [0.39, 0.21, 1.0]}, fixed: true}\n")
+    arm.planner.clearance = clearance
+    query = arm.planner.query(arm.start)
+    swing = JointTrajectory.of_arrays(("joint_1",), [0.0, 1.0], [[0.0], [1.0]])
+    ends = with_joints(arm.robot, arm.start.position, swing.names, swing.positions)
+    assert not any(query.touches(q) for q in ends)
+    hit = first_hit(arm.planner, arm.start, query, swing, None)
+    assert hit is not None and "post" in (hit.a, hit.b)

@@ -18,6 +18,12 @@ LIMITS = MotionLimits(
 )
 
 
+def stop(limits: MotionLimits, state: tuple[Array, Array, Array], *, together: bool = False) -> JointTrajectory:
+    return stopped(
+        limits.names, state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD, together=together
+    )
+
+
 def kept(motion: JointTrajectory, limits: MotionLimits) -> None:
     v, a = motion.velocities, motion.accelerations
     assert v is not None and a is not None
@@ -30,7 +36,7 @@ def kept(motion: JointTrajectory, limits: MotionLimits) -> None:
 def test_a_stop_from_constant_speed_takes_v_over_a_and_a_over_j() -> None:
     """With v a > a^2 / j the acceleration ramps up and down: T = v / a + a / j, d = v T / 2."""
     v = np.array([1.5, -2.5])
-    motion = stopped(np.zeros(2), v, np.zeros(2), LIMITS, period=PERIOD)
+    motion = stop(LIMITS, (np.zeros(2), v, np.zeros(2)))
     T = np.abs(v) / LIMITS.acceleration + LIMITS.acceleration / LIMITS.jerk
     assert motion.duration == pytest.approx(T.max(), abs=PERIOD)
     np.testing.assert_allclose(motion.positions[-1], v * T / 2.0, atol=1e-6)
@@ -40,7 +46,7 @@ def test_a_stop_from_constant_speed_takes_v_over_a_and_a_over_j() -> None:
 def test_without_a_jerk_limit_a_stop_is_one_deceleration() -> None:
     limits = replace(LIMITS, jerk=np.full(2, np.inf))
     v = np.array([1.5, -2.5])
-    motion = stopped(np.zeros(2), v, np.zeros(2), limits, period=PERIOD)
+    motion = stop(limits, (np.zeros(2), v, np.zeros(2)))
     np.testing.assert_allclose(motion.positions[-1], v * np.abs(v) / (2.0 * limits.acceleration), atol=1e-6)
 
 
@@ -53,10 +59,10 @@ def test_any_state_leads_to_rest_within_the_limits(seed: int) -> None:
         return rng.uniform(-1.0, 1.0, 2), rng.uniform(-0.7, 0.7, 2) * LIMITS.velocity, rng.uniform(-0.7, 0.7, 2) * 4.0
 
     q, v, a = state()
-    stop = stopped(q, v, a, LIMITS, period=PERIOD)
+    stops = [stop(LIMITS, (q, v, a), together=together) for together in (False, True)]
     goal = rng.uniform(-2.0, 2.0, 2)
     there = redirected(q, v, a, goal, LIMITS, period=PERIOD)
-    for motion in (stop, there):
+    for motion in (*stops, there):
         kept(motion, LIMITS)
         assert motion.velocities is not None
         np.testing.assert_allclose(motion.positions[0], q)

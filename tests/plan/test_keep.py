@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,12 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.plan import kept_path, kept_problem
+from manipcli.plan import constrained_motion, kept_path, kept_problem
+from manipcli.plan.keep import Kept, reserving
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
+from manipcli.plan.motion_margins import motion_margins
+from manipcli.plan.path_kind import path_kind
 from manipcli.plan.steps import STEPS
 from manipcli.spec.keep import KeepSpec
 
@@ -79,6 +83,68 @@ def test_a_path_is_searched_where_the_line_is_no_help(held: Bench, monkeypatch: 
     assert one.trajectory is not None and other.trajectory is not None
     assert one.trajectory.velocities is not None
     np.testing.assert_array_equal(one.trajectory.velocities[-1], 0.0)
+
+
+@pytest.mark.parametrize("limit", [0.5, 1.5])
+def test_a_chosen_path_leaves_a_reserve_to_the_run(held: Bench, monkeypatch: pytest.MonkeyPatch, limit: float) -> None:
+    """1 deg, at most a fifth of the limit."""
+    monkeypatch.setattr(kept_path, "_tool_line", lambda *_: None)
+    assert tilt(cups(held, planned(held, ACROSS, {"upright": 1.0}))) > limit
+    assert tilt(cups(held, planned(held, ACROSS, {"upright": f"{limit} deg"}))) <= limit - min(1.0, 0.2 * limit) + 1e-6
+
+
+@pytest.mark.parametrize(("at_end", "left"), [(1.0, 0.1), (0.1, 0.05), (0.0, 0.0), (-0.2, 0.0)])
+def test_the_reserve_is_at_most_half_of_what_the_ends_leave(at_end: float, left: float) -> None:
+    kept = Kept("upright", margin=lambda q: q[:, 0], reserve=0.1)
+    (tighter,) = reserving((kept,), np.array([2.0]), np.array([at_end]))
+    assert tighter.margin is not None
+    assert 3.0 - tighter.margin(np.array([[3.0]]))[0] == pytest.approx(left)
+
+
+def test_where_only_a_path_without_the_reserve_exists_it_is_accepted(
+    held: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tighter(keeps: tuple[Kept, ...], *_: Array) -> tuple[Kept, ...]:
+        return (replace(keeps[0], margin=lambda q: np.full(len(q), -1.0)),)
+
+    with_reserve = planned(held, ACROSS, {"upright": "5 deg"})
+    monkeypatch.setattr(constrained_motion, "reserving", tighter)
+    without = planned(held, ACROSS, {"upright": "5 deg"})
+    assert tilt(cups(held, with_reserve)) <= 5.0 and tilt(cups(held, without)) <= 5.0
+
+
+def test_the_kind_of_each_path_is_known(held: Bench) -> None:
+    for path, kind in (("free", "straight"), ("linear", "tool line")):
+        (motion,) = planned(held, {**ACROSS, "path": path}).motions
+        assert path_kind(held.planner, motion, held.now) == kind
+    (motion,) = planned(held, ACROSS, {"upright": "1 deg"}).motions
+    assert path_kind(held.planner, motion, held.now) in ("tool line", "curve")
+    assert path_kind(held.planner, replace(motion, searched="rrt_connect"), held.now) == "searched, rrt_connect"
+    assert path_kind(held.planner, replace(motion, trajectory=None), held.now) == ""
+
+
+@pytest.mark.parametrize(
+    ("keep", "bound"),
+    [
+        ({"tool_speed": 0.1}, ("tool", "tool_speed")),
+        ({"tool_acceleration": 0.2}, ("tool", "tool_acceleration")),
+        ({"slosh": "1 deg"}, ("contents", "slosh")),
+    ],
+)
+def test_what_binds_is_named(held: Bench, keep: dict[str, object], bound: tuple[str, str]) -> None:
+    planner = held.planner.keeping((KeepSpec.model_validate(keep),))
+    plan = planned(held, ACROSS, keep)
+    found = motion_margins(planner, plan.motions[0], held.now, plan.end)
+    assert found.binding is not None
+    assert (found.binding.joint, found.binding.quantity) == bound
+    (margin,) = (margin for margin in found.margins if margin.quantity == bound[1])
+    assert 0.9 < margin.used < 1.006
+
+
+def test_a_motion_that_a_constraint_makes_endless_names_it(held: Bench) -> None:
+    with pytest.raises(NotPlannable) as refused:
+        planned(held, ACROSS, {"tool_speed": 1e-4})
+    assert refused.value.cause.endswith("the motion takes more than 600 s because of `keep: tool_speed`")
 
 
 def test_what_a_constraint_allows_anyway_changes_nothing(held: Bench) -> None:

@@ -11,8 +11,10 @@ import pytest
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.plan.candidates import first
+from manipcli.plan.free_motion import line_blocked
 from manipcli.plan.limit_check import verify
 from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path_planners.ompl import OmplSpec
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
@@ -188,3 +190,24 @@ def test_ompl_is_named_where_it_is_not_installed(divided: Bench, monkeypatch: py
         searched(divided, "move", left(divided), OmplSpec())
     assert refusal.value.hint is not None
     assert "manipcli[ompl]" in refusal.value.hint
+
+
+def test_a_line_that_is_surely_blocked_is_refused_by_its_plan_too(divided: Bench) -> None:
+    """Over and beside the wall: what a look refuses has no plan, and most of what has none is seen at a look."""
+    bench = divided
+    seen = blocked = 0
+    start = bench.planner.tool_pose(bench.now)
+    for y in np.linspace(-0.1, 0.5, 6).tolist():
+        for z in (0.0, 0.15, 0.3):
+            X_WT = Transform(start.R, start.p + np.array([0.0, y, z]))
+            look = line_blocked(bench.planner, bench.now, X_WT, bench.planner.query(bench.now))
+            builder = MotionBuilder(bench.planner, bench.now)
+            try:
+                builder.straight("carry", X_WT, speed=1.0)
+            except NotPlannable:
+                blocked += 1
+                seen += look is not None
+            else:
+                assert look is None
+    assert 0 < blocked < 18
+    assert seen >= 0.8 * blocked

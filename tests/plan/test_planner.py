@@ -176,6 +176,17 @@ def test_a_hand_that_hits_something_on_its_move_is_told_how_it_may_and_an_arm_is
         assert "touch" not in (arm.planner.refusal(arm.now, hit, "comes", "", move=move).hint or "")
 
 
+def test_links_that_are_apart_but_nearer_than_the_clearance_are_told_of_the_clearance(bench: Make) -> None:
+    """Rounded down, so that what the hint says is kept."""
+    arm = bench()
+    hit = CollisionHit("robot/link_7", "robot/palm", 0.00239)
+    for now in (arm.start, arm.start.moved(arm.start.position)):
+        hint = arm.planner.refusal(now, hit, "is", "before the motion").hint or ""
+        assert "`clearance: {pairs: [{between: [robot/link_7, robot/palm], distance: ...}]}`" in hint
+        assert "up to 2.3 mm" in hint
+        assert "`collision_ignore`" not in hint
+
+
 def test_links_that_overlap_are_told_of_the_robot_file(bench: Make) -> None:
     """Wherever it is: no other start or mount takes them apart."""
     arm = bench()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform
+from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.place import _tilted
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
@@ -58,6 +59,26 @@ def test_tilted_the_lip_is_over_the_middle_of_the_tray_at_the_clearance(story: S
     low = lip(cups(story, "pour", "tilt")[-1])
     np.testing.assert_allclose(low[:2], TRAY, atol=FACETS)
     assert low[2] - RIM == pytest.approx(0.08, abs=FACETS)  # the middle of the default 4 to 12 cm
+
+
+def test_with_an_offset_the_lip_is_that_far_before_the_middle(bench: Make, story: Story) -> None:
+    """Before: the tilted cup's own axis points from the lip to the middle."""
+    arm = bench()
+    arm.now = before = story.steps["pour"][0]
+    plan = arm.plan("pour", {"object": "cup", "into": "tray", "tilt": "105 deg", "offset": "3 cm"})
+    X_TO = np.linalg.inv(arm.tool(before.position)) @ arm.body("cup", before).matrix
+    end = arm.tools(before, plan, "tilt")[-1] @ X_TO
+    ahead = end[:2, 2] / np.linalg.norm(end[:2, 2])
+    np.testing.assert_allclose(lip(end)[:2], TRAY - 0.03 * ahead, atol=FACETS)
+
+
+def test_an_offset_outside_the_container_is_refused(bench: Make) -> None:
+    arm = bench()
+    spec = STEPS["pour"].spec.model_validate({"object": "cup", "into": "tray", "offset": "16 cm"})
+    (problem,) = STEPS["pour"].check(spec, arm.robot, arm.scene)
+    assert problem.loc == ("offset",)
+    assert problem.message == "the lip is 160 mm from the centre of 'tray', outside its rim"
+    assert problem.hint == "'tray' reaches 150 mm from its centre"
 
 
 def test_the_cup_tilts_as_far_as_asked_about_one_horizontal_axis_in_place(story: Story) -> None:

@@ -260,3 +260,19 @@ def test_a_task_is_planned_cheaper_and_twice_the_same(tmp_path: Path) -> None:
         assert 0.0 <= cost.limits <= LIMIT_WEIGHT
         assert 0.0 <= cost.singularity <= SINGULARITY_WEIGHT
         assert 0.0 < cost.grasp <= GRASP_WEIGHT
+
+
+def test_plans_of_a_robot_without_a_tool_are_compared(tmp_path: Path) -> None:
+    """It has no singularity of a tool; its plan is the only one."""
+    own = ROOT / "examples" / "04_own_robot"
+    robot = (own / "robot.yaml").read_text(encoding="utf-8").replace("reacher.urdf", f"{own}/reacher.urdf")
+    robot = robot.replace("{chain: {base: base, tip: fore}}", "{joints: [pan, shoulder, elbow]}")
+    (tmp_path / "robot.yaml").write_text(robot, encoding="utf-8")
+    task = (own / "task.yaml").read_text(encoding="utf-8").replace("controllers.yaml", f"{own}/controllers.yaml")
+    (tmp_path / "task.yaml").write_text(task, encoding="utf-8")
+    plans = [
+        plan_task(load_task(tmp_path / "task.yaml", overrides=[f"plan.optimise={n}"], allow_outside=True))
+        for n in (0, 2)
+    ]
+    assert plans[0].planner.robot.tool is None
+    assert [each.duration for each in plans[0].motions] == [each.duration for each in plans[1].motions]

@@ -26,6 +26,7 @@ def dropped(cause: str, *parts: str, name: str = "") -> tuple[str, Dropped]:
     [
         ("approach: the tool cannot follow the line", "approach"),
         ("'robot/palm' comes within 4 mm of 'wall' (1.0 mm apart) at t = 0.30 s of 'lift'", "lift"),
+        ("tilt back: joint 'a' needs 12 N m", "tilt back"),
         ("'cup' is not held: the hand holds nothing", "start"),
         ("no joint positions reach (1, 2, 3) m: the nearest pose is 3 mm off", "start"),
     ],
@@ -46,7 +47,9 @@ def test_groups_count_every_candidate_once_and_the_commonest_is_first() -> None:
 def test_the_change_frees_most_candidates() -> None:
     wall = [dropped("reach: blocked", "wall", "robot/palm"), dropped("lift: blocked", "wall", "cup")]
     other = dropped("reach: blocked", "box")
-    assert change_for_most([*wall, other]) == "move 'wall': it is in the way of 2 of 3 candidates"
+    assert change_for_most([*wall, other]) == (
+        "move 'wall', or the goal away from it: it is in the way of 2 of 3 candidates"
+    )
     assert change_for_most([dropped("reach: too far"), dropped("reach: too far"), other]) == ""
 
 

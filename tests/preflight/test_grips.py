@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.pipeline import run_task
+from manipcli.preflight.check_files import check_files
 from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
@@ -169,3 +170,19 @@ def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
     assert "it slipped" in str(run.verdict)
     assert preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "scene.block.friction=2.7"])) == ()
     assert preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "simulation.gravity=[0, 0, -1.62]"])) == ()
+
+
+def test_check_notes_what_each_grasp_holds_and_weighs_what_is_in_it(pick: Path) -> None:
+    """A cup of 80 g weighs with the stone in it; the margin is that of the plan."""
+    text = pick.read_text(encoding="utf-8")
+    cup = "cup: {cup: {radius: 3 cm, height: 9 cm, wall: 3 mm}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}\n"
+    stone = "  stone: {sphere: {radius: 2 cm}, mass: 1.9 kg, inside: cup}\n"
+    block = next(line for line in text.splitlines(keepends=True) if line.startswith("  block:"))
+    text = text.replace(block, f"  {cup}{stone}").replace("block", "cup") + "  - lift: {object: cup, by: 10 cm}\n"
+    pick.write_text(text, encoding="utf-8")
+    found = {finding.code: finding for finding in check_files([pick])}
+    assert "'cup' (1.98 kg with its contents) weighs 19.4 N" in found["TASK241"].message
+    ((step, margin),) = plan_task(load_task(pick)).grasps()
+    note = found["TASK250"]
+    assert (note.severity, note.message, step) == ("note", f"step 'pick_1': {margin.text}", "pick_1")
+    assert note.place is not None and "pick" in text.splitlines()[note.place.line - 1]

@@ -10,9 +10,9 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.plan.candidates import Dropped
-from manipcli.replay.planned_playback import MOST_GHOSTS, planned_ghosts, planned_playback
+from manipcli.replay.planned_playback import MOST_GHOSTS, planned_ghosts, planned_playback, refused_playback
 from manipcli.task.load_task import load_task
-from manipcli.task.plan_task import Plan, plan_task
+from manipcli.task.plan_task import Plan, plan_task, unplanned
 
 ROOT = Path(__file__).parents[2]
 
@@ -65,3 +65,23 @@ def test_ghosts_are_dropped_candidates_in_the_time_of_their_step(plan: Plan) -> 
     )
     assert len(planned_ghosts(replace(plan, steps=many), shown)[0]) == MOST_GHOSTS
     assert planned_ghosts(replace(plan, steps=many), shown)[1] == 2
+
+
+def test_a_task_without_a_plan_is_shown_at_its_start_with_the_reason_and_what_was_tried(tmp_path: Path) -> None:
+    file = tmp_path / "wall.yaml"
+
+    file.write_text(
+        f"task: t\nrobot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\nscene:\n"
+        "  wall: {box: {size: [0.3, 0.02, 0.3]}, pose: {xyz: [0.55, 0.0, 0.35]}, fixed: true}\nsteps:\n"
+        "  - move: {pose: {xyz: [0.5, 0.25, 0.4], rpy: [180 deg, 0, 0]}}\n"
+        "  - move: {pose: {xyz: [0.5, -0.25, 0.4], rpy: [180 deg, 0, 0]}, path: linear}\n"
+    )
+    task = load_task(file)
+    with pytest.raises(NotPlannable) as refused:
+        plan_task(task)
+    nothing = unplanned(task)
+    shown, ghosts = refused_playback(nothing, "t", refused.value)
+    assert (shown.position == nothing.start.position).all()
+    assert [(step.id, step.outcome, step.text) for step in shown.steps] == [("move_2", "failed", refused.value.cause)]
+    assert any("'wall'" in note for note in shown.notes)
+    assert len(ghosts) == 1

@@ -82,8 +82,14 @@ def test_a_tolerance_in_degrees_is_told_to_say_so() -> None:
     assert finding.hint == "in degrees? write '15 deg'; in millimetres? write '15 mm'"
 
 
-def test_a_number_out_of_range_that_may_not_be_left_out_has_no_such_hint() -> None:
-    assert refused(f"{ROBOT}default_acceleration: -1\n").hint is None
+def test_a_number_out_of_range_comes_with_the_description_of_its_key() -> None:
+    hint = refused(f"{ROBOT}default_acceleration: -1\n").hint
+    assert hint is not None and hint.startswith("default_acceleration: Acceleration limit of joints without one")
+
+
+def test_a_quantity_with_another_unit_comes_with_the_description_of_its_key() -> None:
+    hint = refused(f"{ROBOT}default_acceleration: 3 kg\n").hint
+    assert hint is not None and hint.startswith("default_acceleration: Acceleration limit of joints without one")
 
 
 @pytest.mark.parametrize("prefix", ["b/ \\n", " b_", "b\\u202e", "b" * 101])
@@ -103,6 +109,33 @@ def told(block: str) -> Diagnostic:
         load_task_text(TASK + block, "t.yaml", model=task_spec())
     (finding,) = error.value.findings
     return finding
+
+
+def test_a_key_of_a_single_mapping_that_stands_for_a_list_has_the_hints_of_an_item() -> None:
+    """`keep` takes one mapping, or a list of them."""
+    step = "steps: [{move: {to: home}, keep: KEEP}]\n"
+    for keep in ("{tool_sped: 1}", "[{tool_sped: 1}]"):
+        finding = told(step.replace("KEEP", keep))
+        assert finding.hint is not None and finding.hint.startswith("did you mean 'tool_speed'?")
+
+
+@pytest.mark.parametrize("block", ["{region: {size: [1, 1, 1]}}", "{boxx: 3}"])
+def test_a_misspelt_key_is_not_also_missing(block: str) -> None:
+    step = f"steps: [{{move: {{to: home}}, keep: {{inside: {block}}}}}]\n"
+    finding = told(step)
+    assert finding.code == "TASK201"
+
+
+def test_an_unknown_engine_is_reported_with_the_other_errors_of_the_file() -> None:
+    text = "simulation: {engine: pybulet, settle: -1 s}\nsteps: [{move: {to: home}}]\n"
+    with pytest.raises(InvalidInput) as error:
+        load_task_text(TASK + text, "t.yaml", model=task_spec())
+    findings = error.value.findings
+    assert [(f.code, f.message) for f in findings] == [
+        ("TASK203", "simulation.engine: unknown engine 'pybulet'"),
+        ("TASK204", "simulation.settle: must be at least 0, not '-1 s'"),
+    ]
+    assert findings[0].hint == "did you mean 'pybullet'?"
 
 
 @pytest.mark.parametrize(

@@ -350,7 +350,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
             "t.yaml:11:12: error[TASK209]: steps[1].until: a condition needs a name: one of inside, near",
             "",
         ),
-        ("of: cup}", "off: cup}", "t.yaml:11:21: error[TASK202]", ""),
+        ("of: cup}", "off: cup}", "t.yaml:11:36: error[TASK201]", "did you mean 'of'?"),
         ("- id: last", "- id: move_1", "", ""),
         ("- id: last", "- id: 'a b'", "t.yaml:13:9: error[TASK208]: steps[2].id: 'a b' is not a valid id", "letters"),
         (

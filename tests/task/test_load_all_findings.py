@@ -434,7 +434,7 @@ controllers:
     )
     assert [one[:2] for one in found] == [
         (4, "CTRL144"), (6, "CTRL205"), (7, "CTRL102"), (7, "CTRL201"), (8, "CTRL207"), (8, "CTRL104"),
-        (10, "CTRL202"), (11, "CTRL201"), (12, "CTRL205"), (13, "CTRL205"),
+        (11, "CTRL201"), (12, "CTRL205"), (13, "CTRL205"),
     ]  # fmt: skip
     assert found[1][2] == "d: Derivative, 0 or more. Default 0."
 

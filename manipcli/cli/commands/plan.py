@@ -73,6 +73,8 @@ def plan(
     try:
         planned = pipeline.plan_task(loaded)
     except NotPlannable as refusal:
+        if html is not None:
+            _write_refused_page(pipeline.unplanned(loaded), loaded.spec.task, html, refusal)
         if format_ != "json":
             if sum(group.count for group in refusal.candidates) > 1:
                 from manipcli.report.plan_text import render_refused
@@ -102,7 +104,7 @@ def plan(
     if format_ == "json":
         from manipcli.report.plan import render_json
 
-        console.result(render_json(name, planned, loaded.robot))
+        console.result(render_json(name, planned))
     else:
         from manipcli.report.plan_text import render_text
 
@@ -120,6 +122,16 @@ def _write_page(planned: Plan, name: str, path: Path) -> None:
     if more:
         console.talk(f"note: {more} more dropped candidates are not drawn")
     write_whole(path, player_page(playback, ghosts=ghosts).encode())
+
+
+def _write_refused_page(nothing: Plan, name: str, path: Path, refusal: NotPlannable) -> None:
+    from manipcli.core.whole_file import write_whole
+    from manipcli.replay.planned_playback import refused_playback
+    from manipcli.replay.player import player_page
+
+    playback, ghosts = refused_playback(nothing, name, refusal)
+    write_whole(path, player_page(playback, ghosts=ghosts).encode())
+    console.talk(f"written: {path}, the start of the task and what was tried")
 
 
 def _export(planned: Plan, folder: Path) -> None:

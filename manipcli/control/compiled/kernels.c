@@ -49,6 +49,15 @@ static int64_t *integers(const Kernel *self, Size k) { return (int64_t *)self->a
 static unsigned char *flags(const Kernel *self, Size k) { return (unsigned char *)self->arrays[k].buf; }
 static Size length(const Kernel *self, Size k) { return self->arrays[k].len / self->arrays[k].itemsize; }
 
+/* Whether a buffer, requested with PyBUF_FORMAT, has elements of a type: d double, i int64, else bool. */
+static int has_type(const Py_buffer *view, char type)
+{
+    const char *found = view->format ? view->format : "B";
+    if (type == 'd') return strcmp(found, "d") == 0;
+    if (type == 'i') return view->itemsize == 8 && (strcmp(found, "l") == 0 || strcmp(found, "q") == 0);
+    return strcmp(found, "?") == 0;
+}
+
 /* numpy's maximum and minimum: NaN wins; of two zeros, the one that the processor's instruction chooses: the larger and
  * the smaller by sign on ARM, the second operand on x86. */
 #if defined(__aarch64__) || defined(_M_ARM64)
@@ -190,7 +199,12 @@ static PyObject *run_model_efforts(Kernel *self, PyObject *const *args)
     const int64_t *followers = integers(self, FOLLOWERS), *drivers = integers(self, DRIVERS);
     Py_buffer view;
     double *efforts;
-    if (PyObject_GetBuffer(args[0], &view, PyBUF_C_CONTIGUOUS | PyBUF_WRITABLE) < 0) return NULL;
+    if (PyObject_GetBuffer(args[0], &view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | PyBUF_WRITABLE) < 0) return NULL;
+    if (!has_type(&view, 'd')) {
+        PyBuffer_Release(&view);
+        PyErr_SetString(PyExc_TypeError, "efforts of another type than double");
+        return NULL;
+    }
     if (view.len != self->n * (Size)sizeof(double)) {
         PyBuffer_Release(&view);
         PyErr_SetString(PyExc_ValueError, "efforts of another number of joints");
@@ -409,23 +423,16 @@ static int take(Kernel *self, PyObject *array, const char *field)
 {
     Py_buffer *view = &self->arrays[self->count];
     char type = field[0] | 0x20;
-    const char *found;
-    int write = field[0] != type ? PyBUF_WRITABLE : 0, known;
+    int write = field[0] != type ? PyBUF_WRITABLE : 0;
     if (PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | write) < 0) {
         PyErr_Clear();
         PyErr_Format(PyExc_BufferError, "%s: array %zd is not contiguous, or read-only", self->law->name, self->count);
         return 0;
     }
     self->count++;
-    found = view->format ? view->format : "B";
-    if (type == 'd')
-        known = strcmp(found, "d") == 0;
-    else if (type == 'i')
-        known = view->itemsize == 8 && (strcmp(found, "l") == 0 || strcmp(found, "q") == 0);
-    else
-        known = strcmp(found, "?") == 0;
-    if (!known) {
-        PyErr_Format(PyExc_BufferError, "%s: array %zd has the type '%s'", self->law->name, self->count - 1, found);
+    if (!has_type(view, type)) {
+        PyErr_Format(PyExc_BufferError, "%s: array %zd has the type '%s'", self->law->name, self->count - 1,
+                     view->format ? view->format : "B");
         return 0;
     }
     if (field[1] != '0' && view->len != self->n * (field[1] - '0') * view->itemsize) {

@@ -39,6 +39,7 @@ from manipcli.control.control_loop import ControlLoop, NoLoop
 from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
+from manipcli.control.stopping import StopPlanner
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, Transform
@@ -156,10 +157,11 @@ class CartesianImpedanceController:
         limits: Sequence[JointLimits] | None = None,
         types: Sequence[JointType] | None = None,
         compat: Compat | None = None,
+        stop_planner: StopPlanner | None = None,
     ) -> None:
         self._follower = JointTrajectoryController(
             name=name, joints=joints, command_interfaces=("position",), constraints=constraints, limits=limits,
-            types=types, compat=compat,
+            types=types, compat=compat, stop_planner=stop_planner,
         )  # fmt: skip
         self.name, self.joints = self._follower.name, self._follower.joints
         self.feed_forward: FeedForward = feed_forward
@@ -306,6 +308,7 @@ def build(name: str, spec: CartesianImpedanceSpec, context: BuildContext) -> Car
         limits=[joint.limits for joint in joints],
         types=[joint.type for joint in joints],
         compat=context.compat,
+        stop_planner=context.stop_planner,
     )
 
 

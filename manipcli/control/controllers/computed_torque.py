@@ -30,6 +30,7 @@ from manipcli.control.control_loop import ControlLoop, InverseDynamicsLoop, erro
 from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
+from manipcli.control.stopping import StopPlanner
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
@@ -103,6 +104,7 @@ class ComputedTorqueController:
         limits: Sequence[JointLimits] | None = None,
         types: Sequence[JointType] | None = None,
         compat: Compat | None = None,
+        stop_planner: StopPlanner | None = None,
     ) -> None:
         if not bandwidth > 0.0:
             raise InvalidArgument("CTRL180", f"controller '{name}': bandwidth is {bandwidth} Hz; expected more than 0")
@@ -116,6 +118,7 @@ class ComputedTorqueController:
             limits=limits,
             types=types,
             compat=compat,
+            stop_planner=stop_planner,
         )
         self.name, self.joints = self._follower.name, self._follower.joints
         followed = self._follower.output
@@ -161,6 +164,7 @@ def build(name: str, spec: ComputedTorqueSpec, context: BuildContext) -> Compute
         limits=[joint.limits for joint in joints],
         types=[joint.type for joint in joints],
         compat=context.compat,
+        stop_planner=context.stop_planner,
     )
 
 

@@ -135,6 +135,7 @@ def build(name: str, spec: JointTrajectorySpec, context: BuildContext) -> JointT
         stop_trajectory_duration=spec.stop_trajectory_duration,
         speed_scaling=spec.speed_scaling.initial_scaling_factor,
         positions_upsampling=spec.positions_upsampling.enable,
+        stop_planner=context.stop_planner,
     )
 
 

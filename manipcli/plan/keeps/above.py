@@ -9,7 +9,7 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.plan.held_frame import held_points, points_of
-from manipcli.plan.keep import NEAR, KeepMember, Kept
+from manipcli.plan.keep import NEAR, RESERVE, KeepMember, Kept
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
 from manipcli.scene.scene import Body
@@ -32,7 +32,7 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
         where = f"{readable(height, 'm')} above" if height >= 0.0 else f"{readable(-height, 'm')} below"
         return f"{name} is {where} the top of '{other}', beyond `above: {other}, by: {readable(by, 'm')}`"
 
-    return Kept("above", margin, text, exempt=NEAR)
+    return Kept("above", margin, text, exempt=NEAR, reserve=RESERVE)
 
 
 def _top(body: Body, planner: Planner, state: PlanningState) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.plan.held_frame import held_points, points_of
-from manipcli.plan.keep import KeepMember, Kept
+from manipcli.plan.keep import RESERVE, KeepMember, Kept
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
 from manipcli.spec.keep import KeepSpec
@@ -29,7 +29,7 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
         axis = int(np.argmin(left))
         return f"{name} leaves `inside: {{box: ...}}` by {readable(float(-left[axis]), 'm')} along {'xyz'[axis]}"
 
-    return Kept("inside", lambda q: room(q).min(axis=1), text)
+    return Kept("inside", lambda q: room(q).min(axis=1), text, reserve=RESERVE)
 
 
 MEMBER = KeepMember("inside", opened)

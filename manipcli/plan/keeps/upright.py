@@ -13,6 +13,9 @@ from manipcli.spec.keep import KeepSpec
 
 WITH_CONTENTS = math.radians(20.0)
 """[rad] The limit for an object with contents, if none is stated: chosen, well above what grasps and places tilt."""
+RESERVE = math.radians(1.0)
+"""[rad] Of a stated limit, at most a fifth of it: for the deviation of the arm from its plan, and a little slip."""
+_SHARE = 0.2
 _SLIPPED = math.radians(2.0)  # what an object that is held tilted may tilt more
 
 
@@ -40,7 +43,10 @@ def _within(limit: float, planner: Planner, state: PlanningState, *, derived: bo
         why = ", which has contents" if derived else ""
         return f"'{carried.body}'{why} tilts by {tilt:.1f} deg, beyond `upright: {math.degrees(limit):g} deg`"
 
-    return Kept("upright", lambda q: limit - tilts(planner, carried, q), text, exempt=POURING, derived=derived)
+    reserve = 0.0 if derived else min(RESERVE, _SHARE * limit)
+    return Kept(
+        "upright", lambda q: limit - tilts(planner, carried, q), text, exempt=POURING, derived=derived, reserve=reserve
+    )
 
 
 MEMBER = KeepMember("upright", opened)

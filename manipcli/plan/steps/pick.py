@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar, get_args
@@ -138,6 +139,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     usual = face_frames(frames, planner.robot) if fingerless else frames.usual()
     out_of_reach: dict[GraspFrame, NotPlannable | None] = {}
     lines: dict[GraspFrame, tuple[float, float, Array]] = {}
+    unlikely: set[GraspFrame] = set()  # no approach to these was within reach so far
     attempts = 0
     weak: list[Candidate] = []
 
@@ -156,13 +158,18 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             raise refusal.but(hint=hint)
         attempts += further
         before_approach = backed_off(frame.X_WT, distance, slope)
-        builder.reach(
-            "reach",
-            before_approach,
-            speed=spec.velocity_scaling,
-            hand=spec.open,
-            avoid=() if avoid is None else (avoid,),
-        )
+        with planner.solver.trying(FEW) if frame in unlikely else nullcontext():
+            try:
+                builder.reach(
+                    "reach",
+                    before_approach,
+                    speed=spec.velocity_scaling,
+                    hand=spec.open,
+                    avoid=() if avoid is None else (avoid,),
+                )
+            except NotPlannable:
+                unlikely.add(frame)
+                raise
         try:
             builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2, allowed=touching)
             if fingerless:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.free_motion import line_blocked
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.place_goals import ROOM, UPRIGHT, crowded, spots, standing
@@ -111,8 +112,7 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     what = f"cannot place '{spec.object}'"
     if spec.region is None:
         X_WG = _goal(spec, planner, state)
-        options = (Candidate(plan, name=name) for name, plan in _ways(spec, planner, state, X_WG))
-        return Candidates(options, what=what, decides="place")
+        return Candidates(_ways(spec, planner, state, X_WG), what=what, decides="place")
     region = spec.region.box
 
     def in_region() -> Iterator[Candidate]:
@@ -127,8 +127,8 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
             free += 1
             if free > PLACES:
                 return
-            for name, plan in itertools.islice(_ways(spec, planner, state, X_WG), WAYS):
-                yield Candidate(plan, name=f"{where}, {name}")
+            for way in itertools.islice(_ways(spec, planner, state, X_WG), WAYS):
+                yield replace(way, name=f"{where}, {way.name}")
 
     return Candidates(in_region(), what=what, decides="place")
 
@@ -161,10 +161,8 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     return standing(planner, state, spec.object, spec.onto, spec.at, spec.yaw)
 
 
-def _ways(
-    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform
-) -> Iterator[tuple[str, Callable[[], StepPlan]]]:
-    """The ways to set the object down at `X_WG`, with their names.
+def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Candidate]:
+    """The ways to set the object down at `X_WG`.
 
     The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
 
@@ -175,13 +173,29 @@ def _ways(
     X_OT = planner.held_in_tool(state).inverse()
     lowered: dict[tuple[float, float], MotionBuilder | NotPlannable] = {}
 
+    def above(X_WL: Transform, clearance: float) -> Transform:
+        return Transform.of(xyz=(0.0, 0.0, clearance)) @ (X_WL @ X_OT)
+
+    def tilted(tilt: float) -> Transform:
+        return _tilted(planner.scene.body(spec.object), X_WG, X_OT, tilt)
+
+    @cache
+    def look(tilt: float, clearance: float) -> NotPlannable | None:
+        """Why it surely cannot be carried there while no paths are searched."""
+        if planner.searching(obstructed=False) is not None:
+            return None
+        refusal = line_blocked(planner, state, above(tilted(tilt), clearance), planner.query(state))
+        if refusal is not None:
+            planner.searching()
+        return refusal
+
     def lower(tilt: float, clearance: float) -> MotionBuilder:
         """Carry and lower to the place; planned once for all withdrawals."""
-        X_WL = _tilted(planner.scene.body(spec.object), X_WG, X_OT, tilt)
+        X_WL = tilted(tilt)
         X_WT = X_WL @ X_OT
         builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
-            builder.carry("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.velocity_scaling)
+            builder.carry("carry", above(X_WL, clearance), speed=spec.velocity_scaling)
         support = planner.touching(put(planner, builder.now, {spec.object: X_WL}), spec.object)
         with _hinted(_LOWER):
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
@@ -210,7 +224,8 @@ def _ways(
     tilts = TILTS if not upright and X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
     ways = itertools.product(tilts, (True,) if near else (False, True), *withdrawals)
     for way in ways:
-        yield _name(*way), partial(attempt, *way)
+        tilt, _, clearance, *_ = way
+        yield Candidate(partial(attempt, *way), name=_name(*way), look=partial(look, tilt, clearance))
 
 
 def _name(tilt: float, grazing: bool, clearance: float, retreat: float, slope: float) -> str:

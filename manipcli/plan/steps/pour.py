@@ -4,7 +4,8 @@
       until: {inside: {object: ball, of: tray}}
       timeout: 15 s
 
-The lip (the lowest point of the rim when tilted) is placed above the centre of the container. With c the centre of the
+The lip (the lowest point of the rim when tilted) is placed above the centre of the container, or `offset` before it:
+what leaves the cup flies on in the direction w. With c the centre of the
 rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup tips, all from O in the
 world, a rotation R by theta about a puts the lip at
 
@@ -38,7 +39,7 @@ from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, Pause
+from manipcli.spec.quantity import Angle, Length, Pause
 
 YAWS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
 """Candidate rotations of the hand about the vertical, relative to how the cup is held."""
@@ -55,6 +56,11 @@ class PourSpec(Model):
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
     dwell: Annotated[Pause, Field(ge=0, description="Time to stay tilted [s], at most 1 h; extended by `until`.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
+    offset: Length = Field(
+        0.0,
+        description="How far the lip is before the centre of the receiving rim, against the direction of the pour [m]: "
+        "what pours out fast lands further; negative: beyond it.",
+    )
     velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying and tilting."
     )
@@ -76,10 +82,10 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
         a = _horizontal_axis(R_WT0)
-        theta = sense * spec.tilt
-        lip = mouth + clearance * UP
+        theta, w = sense * spec.tilt, sense * np.cross(a, UP)
+        lip = mouth + clearance * UP - spec.offset * w
         R_tilt = matrix_from_axis_angle(a, theta)
-        p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
+        p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, w) + R_WT0 @ X_TO.p)
         builder = MotionBuilder(planner, state, allowed=poured)
         builder.carry("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
         builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
@@ -134,10 +140,18 @@ def _righted(R_WO: Array) -> Array:
 
 
 def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown bodies, or a body poured into itself."""
+    """Unknown bodies, a body poured into itself, or a lip that is not over the container."""
     if spec.object == spec.into:
         return (Problem(loc=("into",), message=f"'{spec.object}' cannot be poured into itself"),)
-    return unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
+    found = unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
+    if found:
+        return found
+    reach = float(max(scene.body(spec.into).size[:2]) / 2)
+    if abs(spec.offset) < reach:
+        return ()
+    message = f"the lip is {readable(abs(spec.offset), 'm')} from the centre of '{spec.into}', outside its rim"
+    hint = f"'{spec.into}' reaches {readable(reach, 'm')} from its centre"
+    return (Problem(loc=("offset",), message=message, hint=hint),)
 
 
 def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:

@@ -23,6 +23,9 @@ _SIDES = 32
 class SloshBound(TimingBound):
     """The values are 1 + h f / |g| <= 1 with the normals h of the planes."""
 
+    name = "slosh"
+    subject = "contents"
+
     def __init__(self, dynamics: PathDynamics, link: str, X_LC: Transform, gravity: Array, angle: float) -> None:
         """
         Args:
@@ -35,7 +38,7 @@ class SloshBound(TimingBound):
         self._frame = link, X_LC
         self._gravity = gravity
         self._g = float(np.linalg.norm(gravity))
-        self._angle = angle
+        self._angle = self.limit = angle
         turn = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
         inner = math.tan(angle) * math.cos(math.pi / _SIDES)
         self._inner = np.stack((np.cos(turn), np.sin(turn), np.full(_SIDES, -inner)), axis=1)

@@ -14,10 +14,12 @@ _SIDES = 32  # of the polygon inside the circle that the acceleration may fill: 
 class ToolBound(TimingBound):
     """Common parts of both."""
 
+    subject = "tool"
+
     def __init__(self, dynamics: PathDynamics, link: str, X_LT: Transform, limit: float) -> None:
         self._dynamics = dynamics
         self._frame = link, X_LT
-        self._limit = limit
+        self._limit = self.limit = limit
 
     def still(self, q: Array, direction: Array) -> Array:
         return np.zeros((len(q), 1))
@@ -30,6 +32,11 @@ class ToolBound(TimingBound):
 class ToolSpeed(ToolBound):
     """|v| <= limit [m/s], as |v|^2 / limit^2 <= 1."""
 
+    name = "tool_speed"
+
+    def used(self, q: Array, v: Array, a: Array) -> Array:
+        return np.sqrt(self.moving(q, v, a)[:, 0])
+
     def moving(self, q: Array, v: Array, a: Array) -> Array:
         velocity, _ = self._motion(q, v, a)
         return np.asarray(np.sum(velocity**2, axis=1, keepdims=True) / self._limit**2)
@@ -41,6 +48,8 @@ class ToolSpeed(ToolBound):
 
 class ToolAcceleration(ToolBound):
     """|a| <= limit [m/s2]."""
+
+    name = "tool_acceleration"
 
     def moving(self, q: Array, v: Array, a: Array) -> Array:
         _, acceleration = self._motion(q, v, a)

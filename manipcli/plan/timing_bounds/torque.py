@@ -22,6 +22,8 @@ ROOM = 0.05
 class TorqueBound(TimingBound):
     """For the joints with an effort limit that their load at rest leaves room in; (k, 2 m) values for m such joints."""
 
+    name = "torque"
+
     def __init__(self, robot: RobotModel, dynamics: PathDynamics, names: tuple[str, ...], path: Array) -> None:
         """
         Args:

@@ -9,6 +9,7 @@ from manipcli.preflight.checks import (
     grip_force_limit,
     grip_friction,
     grip_stiffness,
+    idle_keeps,
     inert_actuators,
     insufficient_effort,
     light_objects,
@@ -24,6 +25,7 @@ PREFLIGHT_CHECKS: Seam[Check] = Seam(
     members=(
         closing_speed.CHECK,
         deadlines.CHECK,
+        idle_keeps.CHECK,
         grip_force_limit.CHECK,
         light_objects.CHECK,
         grip_friction.CHECK,

@@ -54,13 +54,15 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
             continue
         force = min(_held_force(subject, name, grasp.force) for name in grasp.joints)
         friction = friction_coefficient(task.robot, body)
-        carried, weight = friction_load(friction, (force, force)), body.mass * g
+        inside = plan.planner.contents(grasp.end, body.name)
+        mass = body.mass + sum(task.scene.body(name).mass for name in inside)
+        carried, weight = friction_load(friction, (force, force)), mass * g
         if carried < RESERVE * weight:
-            message = f"step '{grasp.step}': friction carries {carried:.3g} N, '{body.name}' "
-            message += (
-                f"({readable(body.mass, 'kg')}) weighs {weight:.3g} N: two fingers press with {force:.3g} N each, "
+            heavy = f"{readable(mass, 'kg')}{' with its contents' if inside else ''}"
+            message = (
+                f"step '{grasp.step}': friction carries {carried:.3g} N, '{body.name}' ({heavy}) weighs {weight:.3g} "
+                f"N: two fingers press with {force:.3g} N each, coefficient of friction {friction:.3g}"
             )
-            message += f"coefficient of friction {friction:.3g}"
             hint = "it will slip: raise the friction"
             if carried >= weight:
                 enough = f"{weight / friction:.3g} N per finger carries twice its weight"

@@ -8,7 +8,7 @@ from manipcli.judge.agreement import Agreement, Disagreement
 from manipcli.judge.compared_numbers import Row
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.agreement.disagreement import message, summary
-from manipcli.report.json import Json, dumps, number, render_run
+from manipcli.report.json import Json, dumps, finding_object, number, render_run
 
 
 def render_json(compared: ComparedRuns) -> str:
@@ -31,6 +31,7 @@ def agreement_object(agreement: Agreement) -> dict[str, Json]:
         "compared": [run.name for run in agreement.runs],
         "disagreements": [_disagreement(found) for found in agreement.disagreements],
         "numbers": [_row(row) for row in agreement.rows],
+        "warnings": [finding_object(finding) for finding in agreement.warnings],
     }
 
 

@@ -18,6 +18,7 @@ from manipcli.report.agreement.disagreement import (
 from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
+from manipcli.report.text import describe as describe_finding
 
 TITLES: dict[Kind, str] = {
     "margin": "margin",
@@ -38,6 +39,7 @@ def render_text(compared: ComparedRuns) -> str:
         runs = runs_table(agreement, compared.reports)
         return "\n".join([runs, "", *(f"{FAIL} {reason}" for reason in reasons), f"{FAIL} {summary(agreement)}"])
     parts = [f"{FAIL} {describe(found)}" for found in agreement.disagreements]
+    parts += [describe_finding(warning) for warning in agreement.warnings]
     parts += [""] if parts else []
     parts += [numbers_table(agreement), "", runs_table(agreement, compared.reports), ""]
     failed = [run for run in agreement.runs if run.verdict.verdict != "passed"]
@@ -48,7 +50,8 @@ def render_text(compared: ComparedRuns) -> str:
 
 
 def numbers_table(agreement: Agreement) -> str:
-    """Every number of every run; the difference is that of the engines at the step of the task."""
+    """Every number of every run; the difference is that of the engines at the step of the task, as the last line says
+    where there are other runs."""
     names = [run.name for run in agreement.runs]
     several = len(agreement.engines) > 1
     rows = [
@@ -62,7 +65,10 @@ def numbers_table(agreement: Agreement) -> str:
         for row in agreement.rows
     ]
     last = ("difference", "allowed") if several else ()
-    return table(("", "of", "number", *names, *last), rows, right=(*names, *last))
+    lines = [table(("", "of", "number", *names, *last), rows, right=(*names, *last))]
+    if several and len(agreement.engines) < len(agreement.runs):
+        lines.append("difference: between the engines at the step of the task, without the runs at half the step")
+    return "\n".join(lines)
 
 
 def limited(row: Row) -> bool:

@@ -11,7 +11,11 @@ from manipcli.judge.compared_numbers import Kind, Row
 from manipcli.judge.measured_run import Number
 from manipcli.report.display_quantity import quantity
 
-CAUSES = {"engines": "engines disagree", "step": "the verdict depends on the step"}
+CAUSES = {
+    "engines": "engines disagree",
+    "step": "the verdict depends on the step",
+    "limit": "a limit cannot be used",
+}
 NAMES: dict[Kind, str] = {
     "margin": "the margin of '{}'",
     "duration": "the duration of the task",
@@ -21,8 +25,6 @@ NAMES: dict[Kind, str] = {
     "grasp_force": "the peak force of the grasp of '{}'",
     "contact_force": "the peak contact force in step '{}'",
 }
-KEYS: dict[Kind, str] = {"duration": "duration", "step_duration": "duration", "slip": "slip", "grasp_force": "force"}
-"""The fields of `agree:` for numbers other than margins."""
 
 
 def describe(found: Disagreement, *, file: str | None = None) -> str:
@@ -39,6 +41,8 @@ def message(found: Disagreement) -> str:
 
 
 def _difference(found: Disagreement) -> str:
+    if found.cause == "limit":
+        return found.texts[0]
     a, b = found.runs
     if found.outcomes:
         values = found.values or (None, None)
@@ -88,6 +92,8 @@ def difference_of(row: Row) -> str:
 
 def allowed_of(row: Row) -> str:
     """The allowed difference of a row for a table."""
+    if row.misfit:
+        return "other unit"
     return "any" if row.allowed is None else shown(Number(row.allowed, row.unit))
 
 
@@ -106,5 +112,11 @@ def short_summary(agreement: Agreement) -> str:
     """The result in one line below the disagreements: `engines disagree: 2 differences`."""
     if agreement.agrees:
         return summary(agreement)
-    causes = dict.fromkeys(CAUSES[found.cause] for found in agreement.disagreements)
-    return f"{', and '.join(causes)}: {number_of(len(agreement.disagreements), 'difference')}"
+    differing = [CAUSES[found.cause] for found in agreement.disagreements if found.cause != "limit"]
+    unusable = len(agreement.disagreements) - len(differing)
+    parts = []
+    if differing:
+        parts.append(f"{', and '.join(dict.fromkeys(differing))}: {number_of(len(differing), 'difference')}")
+    if unusable:
+        parts.append(f"not compared: {number_of(unusable, 'margin')} with an unusable limit")
+    return "; ".join(parts)

@@ -120,9 +120,9 @@ def _numbers(compared: ComparedRuns) -> Markup:
     ]
     about = "Difference: between the engines at the step of the task. Allowed: by `agree:` of the task."
     headers = ("", "of", "number", *names, *last)
-    return element(
-        "section", heading("numbers", "Numbers", about), table(headers, rows, numbers=(*names, *last), stacks=True)
-    )
+    warned = (element("p", str(warning)) for warning in compared.agreement.warnings)
+    shown = table(headers, rows, numbers=(*names, *last), stacks=True)
+    return element("section", heading("numbers", "Numbers", about), *warned, shown)
 
 
 def _runs(compared: ComparedRuns, urls: Sequence[str | None]) -> Markup:

@@ -196,4 +196,5 @@ MEMBER = EngineMember(
     chosen=_chosen,
     version=version,
     prepare=library,
+    missing=lambda: "" if installed() else INSTALL,
 )

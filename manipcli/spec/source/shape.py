@@ -42,19 +42,22 @@ def at(model: type[BaseModel], path: Loc, tags: Mapping[int, str]) -> list[objec
 
 
 def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
-    """The keys of these types, with their fields."""
-    return {
+    """The keys of these types, with their fields; of lists, those of an item, as one mapping needs no list."""
+    own = {
         field.alias or name: field
         for kind in kinds
         if isinstance(kind, type) and issubclass(kind, BaseModel)
         for name, field in kind.model_fields.items()
     }
+    items = [item for kind in kinds if _is_list(kind) for item, _ in alternatives(get_args(kind)[0])]
+    return own or (keys_of(items) if items else {})
 
 
 def is_of_fixed_length(kinds: Sequence[object]) -> bool:
     """Whether all lists among the types have the same fixed length."""
-    any_length = any(get_origin(kind) is list or get_args(kind)[-1:] == (Ellipsis,) for kind in kinds)
-    return not any_length and len({len(get_args(kind)) for kind in kinds if get_origin(kind) is tuple}) == 1
+    return (
+        not any(map(_is_list, kinds)) and len({len(get_args(kind)) for kind in kinds if get_origin(kind) is tuple}) == 1
+    )
 
 
 def takes_any_key(kinds: Sequence[object]) -> bool:
@@ -81,6 +84,11 @@ def _called(kind: object, tag: str) -> bool:
     return literal or kind.__name__ == tag
 
 
+def _is_list(kind: object) -> bool:
+    """Whether it is a list of any length."""
+    return get_origin(kind) is list or (get_origin(kind) is tuple and get_args(kind)[-1:] == (Ellipsis,))
+
+
 def _below(kind: object, part: str | int) -> list[tuple[object, str | None]]:
     origin, arguments = get_origin(kind), get_args(kind)
     if isinstance(kind, type) and origin is None and issubclass(kind, BaseModel):
@@ -92,4 +100,6 @@ def _below(kind: object, part: str | int) -> list[tuple[object, str | None]]:
         if len(arguments) == 2 and arguments[1] is Ellipsis:
             return alternatives(arguments[0])
         return alternatives(arguments[min(part, len(arguments) - 1)])
+    if _is_list(kind):  # a single mapping instead of a list of one
+        return [pair for item, _ in alternatives(arguments[0]) for pair in _below(item, part)]
     return []

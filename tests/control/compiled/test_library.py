@@ -75,6 +75,22 @@ def test_a_row_beyond_the_last_and_a_wrong_call_are_refused(kernels: library.Ker
         run("0")
 
 
+def test_efforts_of_another_type_or_length_are_refused(kernels: library.Kernels, using: Using) -> None:
+    """They are given to each run, not bound. Eight bytes of an integer are not a double: 1 would be read as 5e-324."""
+    none, command = np.zeros(0, dtype=np.int64), np.zeros(2)
+    with using(kernels):
+        run = bind("model_efforts", 2, *vectors(2, 2), none, none, np.zeros(0), np.arange(2), command)
+    assert run is not None
+    for efforts in (np.ones(2, dtype=np.int64), np.ones(4, dtype=np.float32), np.ones(2, dtype=">f8")):
+        with pytest.raises(TypeError, match="double"):
+            run(efforts, False)
+    with pytest.raises(ValueError, match="another number of joints"):
+        run(np.ones(3), False)
+    assert command.tolist() == [0.0, 0.0]
+    run(np.array([1.0, 2.0]), False)
+    assert command.tolist() == [1.0, 2.0]
+
+
 def test_a_kernel_keeps_its_arrays(kernels: library.Kernels, using: Using) -> None:
     rows = np.zeros((2, 1000))
     with using(kernels):

@@ -6,8 +6,8 @@ import pytest
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import RobotModel
+from manipcli.plan.motion_margins import limits_used, nearest_limits
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.report.plan import limiting
 
 
 def robot(*, velocity: float, acceleration: float, jerk: float | None) -> RobotModel:
@@ -36,12 +36,13 @@ def cosine() -> JointTrajectory:
 def test_the_nearest_limit_is_the_one_used_most(
     velocity: float, acceleration: float, jerk: float | None, nearest: str
 ) -> None:
-    found = limiting(cosine(), robot(velocity=velocity, acceleration=acceleration, jerk=jerk))
-    assert found is not None
+    used = tuple(limits_used(robot(velocity=velocity, acceleration=acceleration, jerk=jerk), cosine()))
+    found = max(nearest_limits(used, cosine().times), key=lambda margin: margin.used)
     assert (found.joint, found.quantity) == ("j", nearest)
-    assert found.fraction == pytest.approx(0.5, rel=1e-5)  # differences of neighbours, 3 ms apart
+    assert found.used == pytest.approx(0.5, rel=1e-5)  # differences of neighbours, 3 ms apart
 
 
 def test_points_without_derivatives_say_nothing_of_limits() -> None:
     bare = JointTrajectory.of_arrays(("j",), np.array([0.0, 1.0]), np.array([[0.0], [1.0]]))
-    assert limiting(bare, robot(velocity=1.0, acceleration=1.0, jerk=1.0)) is None
+    used = limits_used(robot(velocity=1.0, acceleration=1.0, jerk=1.0), bare)
+    assert [each.quantity for each in used] == ["position"]
