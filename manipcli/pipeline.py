@@ -22,7 +22,7 @@ from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import LinkInertial, RobotModel
 from manipcli.model.self_collision import SelfCollisionMatrix
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
@@ -52,6 +52,7 @@ __all__ = [
     "check_files",
     "compare_runs",
     "controllers_of",
+    "inertials",
     "judge_log",
     "kind_of",
     "load_sight",
@@ -67,6 +68,17 @@ __all__ = [
     "verify_log",
     "words",
 ]
+
+
+def inertials(
+    path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> tuple[LinkInertial, ...]:
+    """Where the inertials of a robot file's links come from, if not from its description.
+
+    Raises:
+        InvalidInput: all errors of the file.
+    """
+    return load_sight(path, package_path=package_path, allow_outside=allow_outside).robot.inertials
 
 
 def self_collisions(

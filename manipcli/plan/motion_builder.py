@@ -269,9 +269,8 @@ class MotionBuilder:
             refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
             raise refusal.but(hint=roomier or None) from refusal
-        link = planner.tool_link
-        X_LW = planner.kinematics.forward(closed, link).inverse()
-        carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
+        X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
+        carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(self._now, body))
         allowed = self._allowed | planner.hand_contacts(body)
         duration = grip_time(planner, self._now, grip)
         takes = None if planner.robot.holding is None else body

@@ -27,6 +27,8 @@ _TYPES: dict[str, JointType] = {
 }
 _HELD = frozenset({"floating", "planar"})
 """Types with several degrees of freedom, which are treated as fixed."""
+UNSTATED: Final = "URDF036"
+"""Code of a limit that is 0 or missing, read as not stated."""
 UNBOUNDED: Final = sys.float_info.max
 """Written as the limit of an unlimited joint where URDF requires one."""
 
@@ -144,7 +146,7 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
         if kind != "continuous" and side not in limit.attributes and other in limit.attributes:
             message = f"joint '{name}': {side} limit is missing; 0 is used"
             hint = f'write {side}="0" if this is intended'
-            reader.report("URDF036", message, limit.place, hint=hint, severity="note")
+            reader.report(UNSTATED, message, limit.place, hint=hint, severity="note")
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
     if kind == "continuous" or lower is None or upper is None or (lower == -UNBOUNDED and upper == UNBOUNDED):
         return JointLimits(velocity=velocity, effort=effort)
@@ -167,7 +169,7 @@ def _stated(reader: Reader, limit: Element, attribute: str, joint: str) -> float
         how = "is 0" if value == 0.0 else "is missing"
         message = f"joint '{joint}': {attribute} limit {how}; it is read as not stated"
         hint = f"add it to the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
-        reader.report("URDF036", message, limit.place, hint=hint, severity="warning")
+        reader.report(UNSTATED, message, limit.place, hint=hint, severity="warning")
     return None
 
 

@@ -146,6 +146,14 @@ READING_TREE: tuple[Check, ...] = (
         one_joint(tip=INERTIAL.replace("0.02", "0"), kind="fixed", inside=""),
         severity="warning",
     ),
+    physics_check(
+        "URDF038",
+        "singular-inertia",
+        "An inertia is singular by rounding",
+        "The least moment of a thin rod rounds to 0. Engines divide by it, so a millionth of the largest is used.",
+        one_joint(tip=INERTIAL.replace('izz="0.02"', 'izz="0"') + CUBE),
+        severity="note",
+    ),
     readiness_check(
         "URDF015",
         "transmission",
