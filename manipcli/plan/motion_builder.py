@@ -27,6 +27,7 @@ from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
+from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, spilled
@@ -257,8 +258,8 @@ class MotionBuilder:
             self._accept(CLOSING, None, grip)
             self._now = replace(self._now, closed=True)
             return
-        query = planner.grasping(self._now, body)
-        closed, touched = closed_on(planner.robot, query, self._now.position, grip.joints, grip.target)
+        now = against_jaw(planner, self._now, body, grip)
+        closed, touched = closed_on(planner.robot, planner.grasping(now, body), now.position, grip.joints, grip.target)
         if must_hold and not touched:
             raise NotPlannable(
                 f"the hand, closed to '{posture}', does not touch '{body}'",
@@ -270,12 +271,12 @@ class MotionBuilder:
         except NotPlannable as refusal:
             raise refusal.but(hint=roomier or None) from refusal
         X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
-        carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(self._now, body))
+        carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(now, body))
         allowed = self._allowed | planner.hand_contacts(body)
         duration = grip_time(planner, self._now, grip)
         takes = None if planner.robot.holding is None else body
         self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed, takes=takes))
-        self._now = replace(self._now.moved(closed), carried=carried, closed=True)
+        self._now = replace(now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
         """Open the hand to a pose; the held object stays where it is. It may touch that, or the body it is `around`.
@@ -294,10 +295,9 @@ class MotionBuilder:
             raise no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
-            held = self._now.carried.body
             if must_arrive:
                 refuse_pressing(self._planner, self._now, self._with(grip.joints, grip.target), grip.joints, posture)
-            allowed |= self._planner.hand_contacts(held)
+            allowed |= self._planner.hand_contacts(self._now.carried.body)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
