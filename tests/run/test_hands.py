@@ -36,7 +36,8 @@ def finger(side: str, sign: int) -> str:
 
 JAW: dict[str, Any] = {
     "hand": f'<link name="palm">{mass(0.5, 2e-3)}{box("0.03 0.1 0.02", "0 0 0.01")}'
-    f'{box("0.02 0.01 0.09", "0 -0.03 0.065")}</link><link name="jaw">{mass(0.1, 2e-4)}{box("0.02 0.01 0.09", "0 -0.005 0.045")}</link>'
+    f'{box("0.02 0.01 0.09", "0 -0.03 0.065")}</link>'
+    f'<link name="jaw">{mass(0.1, 2e-4)}{box("0.02 0.01 0.09", "0 -0.005 0.045")}</link>'
     + turning("hinge", "palm", "jaw", "0 0.03 0.02", "-1 0 0"),
     "joint": "hinge", "opened": 1.0, "closed": -0.2, "tool": 0.085,
 }  # fmt: skip
