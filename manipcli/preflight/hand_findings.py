@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
+from typing import Final
 
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
@@ -12,6 +14,9 @@ from manipcli.shapes.convex_parts import concave
 from manipcli.shapes.primitives import Geometry, Mesh
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
+
+HOLLOW: Final = 0.75
+"""A finger that fills less than this share of its convex hull is worth splitting: published ones often fill 0.85."""
 
 
 def hand_joints(robot: RobotModel) -> tuple[str, ...]:
@@ -41,15 +46,7 @@ def hand_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagn
             hint if seen else "add <collision> shapes to the description",
             "warning",
         )
-    hollow = [
-        name
-        for finger in fingers
-        for name in finger
-        if any(
-            isinstance(g.shape, Mesh) and g.shape.part is None and concave(g.shape.path) for g in links[name].collisions
-        )
-    ]
-    hollow = sorted(set(hollow))
+    hollow = [name for name in sorted({*chain(*fingers)}) if any(map(_hollow, links[name].collisions))]
     if hollow:
         message = f"the collision meshes of {listed(hollow)} are concave and count as their convex hulls: "
         message += "what a jaw seems to enclose, it overlaps"
@@ -57,6 +54,6 @@ def hand_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagn
         yield Diagnostic("ROBOT358", message, file.place("description"), hint, "note")
 
 
-def _concave(geometry: Geometry) -> bool:
+def _hollow(geometry: Geometry) -> bool:
     shape = geometry.shape
-    return isinstance(shape, Mesh) and shape.part is None and concave(shape.path)
+    return isinstance(shape, Mesh) and shape.part is None and concave(shape.path, HOLLOW)
