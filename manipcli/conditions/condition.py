@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from manipcli.conditions.robustness import Robustness
 from manipcli.conditions.state_window import StateWindow
-from manipcli.core.errors import Loc
+from manipcli.core.errors import Loc, Severity
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -95,12 +95,14 @@ class Problem:
         message: what is wrong.
         hint: what to write instead, for example the nearest name.
         code: only for problems with a code of their own.
+        severity: `warning` only for problems of controllers.
     """
 
     loc: Loc
     message: str
     hint: str | None = None
     code: str = ""
+    severity: Severity = "error"
 
 
 @dataclass(frozen=True, slots=True)

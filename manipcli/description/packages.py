@@ -121,6 +121,11 @@ class Packages:
         self._below: dict[str, Path] | None = None
         self._meant: dict[Path, str | None] = {}
 
+    @property
+    def found(self) -> Mapping[str, Path]:
+        """The packages that were asked for so far, by name."""
+        return dict(self._found)
+
     def root(self, name: str) -> Path:
         """The folder of package `name`.
 
@@ -170,6 +175,11 @@ class Packages:
             for folder in (*self._package_path, *given):
                 self._below = packages_below(folder) | self._below
         return self._below.get(name)
+
+    def found_by_name(self, uri: str) -> bool:
+        """Whether a `file://` URI is in a package that was found by its name, as `file://$(find NAME)/...` gives it."""
+        path = Path("/" + unquote(uri.removeprefix("file://").removeprefix("localhost")).lstrip("/"))
+        return any(path.is_relative_to(root) for root in self._found.values())
 
     def below(self, description: Path) -> Packages:
         """For the URIs in a file that was found here: the same search path and rules, relative to that file."""

@@ -11,7 +11,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
-from manipcli.description.expanded import unread_description
+from manipcli.description.expanded import is_plain, unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
@@ -185,6 +185,10 @@ class _Descriptions:
             self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
         packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside, named=self._named)
+        if arguments and is_plain(path):
+            message = f"'{path.name}' is plain URDF: `args` only fill `$(var NAME)` of the controllers file"
+            self._reporter.note("XACRO003", message, (*loc[:-1], "args"), hint=None)
+            arguments = {}
         errors_only = tuple(check for check in CHECKS if check.severity == "error")  # others also read visual meshes
         examination = examine(path, packages=packages, arguments=arguments, checks=errors_only)
         parts = examination.parts

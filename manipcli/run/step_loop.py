@@ -19,6 +19,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
+from manipcli.run.effort_shortage import effort_shortage
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
@@ -135,6 +136,9 @@ class StepLoop:
             if end.outcome == "done" or attempt == attempts or not self._may_go_on:
                 end = self._closed(planned, end)
             ended = self._session.time
+            if end.outcome != "done" and self._physics:
+                short = effort_shortage(self._session, self._task.scene.gravity)
+                end = replace(end, text=f"{short}; {end.text}") if short else end
             self._event("step_ended", planned, end.outcome, end.text)
             if end.outcome == "done" or not self._may_go_on:
                 break

@@ -79,7 +79,7 @@ def _lines(data: dict[str, Plain]) -> list[str]:
     lines: list[str] = []
     for key, value in data.items():
         name = _text(key)
-        short = f"{name}: {_inline(value)}"
+        short = f"{name}: {inline(value)}"
         if len(short) <= _WIDTH or not isinstance(value, dict | list):
             lines.append(short)
         elif isinstance(value, dict):
@@ -94,17 +94,18 @@ def _lines(data: dict[str, Plain]) -> list[str]:
 def _items(items: list[Plain]) -> list[str]:
     lines: list[str] = []
     for item in items:
-        inner = _lines(item) if isinstance(item, dict) and len(_inline(item)) > _WIDTH else [_inline(item)]
+        inner = _lines(item) if isinstance(item, dict) and len(inline(item)) > _WIDTH else [inline(item)]
         lines.append(f"- {inner[0]}")
         lines.extend(f"  {line}" for line in inner[1:])
     return lines
 
 
-def _inline(value: Plain) -> str:
+def inline(value: Plain) -> str:
+    """A value on one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_text(key)}: {_inline(v)}" for key, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_text(key)}: {inline(v)}" for key, v in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_inline, value)) + "]"
+        return "[" + ", ".join(map(inline, value)) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None:

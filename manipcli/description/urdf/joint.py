@@ -122,6 +122,10 @@ def _with_soft(reader: Reader, element: Element, name: str, kind: JointType) -> 
     lower, upper = (reader.number(safety, f"soft_{side}_limit", 0.0) or 0.0 for side in ("lower", "upper"))
     k_position, k_velocity = (_not_negative(reader, safety, key, name) or 0.0 for key in ("k_position", "k_velocity"))
     positions = k_position > 0.0 and lower < upper and kind != "continuous"
+    if not positions and lower < upper and kind != "continuous":
+        message = f"joint '{name}': the soft limits {lower:g} to {upper:g} have no effect without k_position"
+        hint = "add k_position, a velocity per distance [1/s]; 20 is a usual value"
+        reader.report("URDF086", message, safety.place, hint=hint, severity="warning")
     if not positions and k_velocity == 0.0:
         return limits
     soft = SoftLimits(
@@ -197,6 +201,11 @@ def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -
 def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
     name = element.name or "(without a name)"
     kind = element.first("type") or element.first("plugin")
+    if kind is None and element.attributes.get("type"):
+        message = f"transmission '{name}' has its type as an attribute, as before ros_control: ignored"
+        hint = f"write <type>transmission_interface/{element.attributes['type'].rpartition('/')[2]}</type> inside"
+        reader.report("URDF015", message, element.place, hint=hint, severity="warning")
+        return None
     if kind is None or not kind.text:
         message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"
         reader.report("URDF015", message, element.place)

@@ -246,8 +246,8 @@ def _usable_mesh(reader: Reader, element: Element, uri: str, packages: Packages)
         reader.report("URDF200", f"collision mesh '{uri}' {error.reason}", element.place, hint=error.hint)
         return False
     if facts.flat:
-        message = f"collision mesh '{uri}' is flat: its convex hull has no volume"
-        reader.report("URDF210", message, element.place, hint="use a thin <box>")
+        message = f"collision mesh '{uri}' is flat, ignored: its convex hull has no volume"
+        reader.report("URDF210", message, element.place, hint="use a thin <box>", severity="warning")
     return not facts.flat
 
 

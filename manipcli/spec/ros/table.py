@@ -27,6 +27,7 @@ class Block:
         neutral: values with the same effect as a missing key, as in parameter dumps.
         unserved: values of a key that ROS supports and manipcli does not.
         most: largest tolerance; a larger one is left out with a warning.
+        refused: key -> why a controller that has it cannot be served: it would command something else.
         filled: lists that must not be empty, though ours may be.
     """
 
@@ -38,12 +39,13 @@ class Block:
     neutral: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     unserved: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     most: Mapping[str, float] = field(default_factory=dict)
+    refused: Words = field(default_factory=dict)
     filled: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
         """All ROS parameters of the block."""
-        return (*self.known, *self.quiet, *self.renamed, *self.inner)
+        return (*self.known, *self.quiet, *self.renamed, *self.inner, *self.refused)
 
 
 def _same(node: MappingNode) -> MappingNode:
@@ -62,7 +64,7 @@ class Table:
         idle: command interface -> our keys that have no effect on it.
         interface: ROS key that names a hardware interface; a controller with an interface that manipcli does not have
             is left out with a warning.
-        needs: required key; a controller without it is left out with a warning.
+        needs: required keys, of which one suffices; a controller without them is left out with a warning.
     """
 
     own: str
@@ -71,7 +73,7 @@ class Table:
     reshape: Callable[[MappingNode], MappingNode] = _same
     idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     interface: str = ""
-    needs: str = ""
+    needs: tuple[str, ...] = ()
 
 
 def model_below(model: type[BaseModel] | None, key: str) -> type[BaseModel] | None:
