@@ -36,7 +36,7 @@ def brick(mass: float = 2.0) -> Body:
 
 def expected(model: RobotModel, force: Array, centre: Array, q: Array) -> Array:
     """(6) The wrench of the tool on a body whose force (3,) acts at its `centre`, in the tool frame."""
-    X_WT = Transform.of(xyz=(0.0, 0.0, 1.0, *q)) @ X_LT
+    X_WT = Transform.of(xyz=np.array([0.0, 0.0, 1.0]) + q) @ X_LT
     return np.concatenate((X_WT.R.T @ force, X_WT.R.T @ np.cross(centre - X_WT.p, force)))
 
 
