@@ -315,7 +315,9 @@ def _tool(reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], links: S
     return Tool(link=spec.tool.link, X_LT=spec.tool.pose.transform, holding=_holding(spec.tool.holding))
 
 
-def _holding(spec: HoldingSpec) -> Holding | None:
+def _holding(spec: HoldingSpec | None) -> Holding | None:
+    if spec is None:
+        return None
     if spec.suction is not None:
         force = spec.suction.force
         torque = CUP_RADIUS * force if spec.suction.torque is None else spec.suction.torque

@@ -237,8 +237,8 @@ class ToolSpec(Model):
 
     link: str = Field(description="The link that carries the tool.")
     pose: PoseSpec = Field(PoseSpec(), description="Pose of the tool frame in the link. Default: identity.")
-    holding: HoldingSpec = Field(
-        HoldingSpec(),
+    holding: HoldingSpec | None = Field(
+        None,
         description="What holds a grasped object: contact and friction, a suction cup, or a weld. Default friction.",
     )
 
