@@ -78,7 +78,7 @@ class Holding:
             force = float(np.linalg.norm(wrench[:3]))
             return max(Load(force / self.force, f"force {force:.3g} N, limit {self.force:.3g} N"), twisted)
         pull, shear = -float(wrench[2]), math.hypot(float(wrench[0]), float(wrench[1]))
-        if pull >= self.force or pull >= shear:
+        if mu * pull >= shear:
             text = f"pull {pull:.3g} N and shear {shear:.3g} N, suction {self.force:.3g} N"
         else:
             text = f"shear {shear:.3g} N, friction {mu:.3g} holds {mu * (self.force - pull):.3g} N"
