@@ -1,7 +1,4 @@
-"""Builder of a step's motions: each method adds one that starts where the last ended.
-
-Every motion is timed, verified against the limits and free of collisions.
-"""
+"""Builder of a step's motions, each from the end of the last: timed, within the limits and free of collisions."""
 
 from __future__ import annotations
 
@@ -19,6 +16,7 @@ from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
 from manipcli.plan.attachment import attached, freed
+from manipcli.plan.blind_grasp import blindly_closed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
 from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
@@ -206,14 +204,15 @@ class MotionBuilder:
         """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         self.along(label, rotated(self._planner.tool_pose(self._now), axis, angle), speed=speed)
 
-    def back(self, label: str) -> None:
+    def back(self, label: str, *, emptied: bool) -> None:
         """Repeat the last trajectory backwards.
 
-        Limits are symmetric and the path was free forwards: only torques are checked, as friction acts the other way.
+        Limits are symmetric and the path was free forwards: torques are checked, as friction acts the other way, and
+        collisions only if what is held was `emptied` since: its contents then lie elsewhere.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
         trajectory = timed.reversed_motion(self._planner, self._now, label, done)
-        self._accept(label, trajectory, None)
+        (self._add if emptied else self._accept)(label, trajectory, None)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
         """Follow given points from the end of the last motion, sampled at every control tick and at their end.
@@ -235,7 +234,7 @@ class MotionBuilder:
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
         """Close the hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
-        The fingers are predicted to stop where the first link of each touches the body.
+        The fingers are predicted to stop where the first link of each touches the body, or any if it is not known.
 
         Args:
             posture: named.
@@ -254,9 +253,10 @@ class MotionBuilder:
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
+        before, duration = self._now, grip_time(planner, self._now, grip)
         if body is None:
-            self._accept(CLOSING, None, grip)
-            self._now = replace(self._now, closed=True)
+            self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)
+            self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=self._allowed))
             return
         now = against_jaw(planner, self._now, body, grip)
         closed, touched = closed_on(planner.robot, planner.grasping(now, body), now.position, grip.joints, grip.target)
@@ -273,9 +273,8 @@ class MotionBuilder:
         X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
         carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(now, body))
         allowed = self._allowed | planner.hand_contacts(body)
-        duration = grip_time(planner, self._now, grip)
         takes = None if planner.robot.holding is None else body
-        self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed, takes=takes))
+        self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=allowed, takes=takes))
         self._now = replace(now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
@@ -350,7 +349,7 @@ class MotionBuilder:
         query, end = self._query(), self._with(limits.names, target)
         with self._labelled(label):
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
-        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
+        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals, end)
         self._accept(label, free, grip)
         if free is not straight and (search := self._planner.searching()) is not None:
             self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)

@@ -242,7 +242,8 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
         hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
-        return refusal.but(hint="; or ".join(hints) or None)
+        # An earlier step may have put the object where it cannot be picked.
+        return refusal.but(hint="; or ".join(hints) or None, parts=refusal.parts | {spec.object})
 
     return Candidates(options(), what=f"cannot pick '{spec.object}'", decides="grasp", explain=explain)
 

@@ -14,6 +14,10 @@ Words = Mapping[str, str]
 """Values that a ROS type implies: our key -> value; several values are separated by blanks."""
 
 
+Data = dict[str, Plain]
+"""The parameters of a controller as plain data."""
+
+
 @dataclass(frozen=True, slots=True)
 class Block:
     """The ROS parameters of one block. Names that our spec has need not be listed.
@@ -29,6 +33,7 @@ class Block:
         most: largest tolerance; a larger one is left out with a warning.
         refused: key -> why a controller that has it cannot be served: it would command something else.
         filled: lists that must not be empty, though ours may be.
+        unwritten: names of older versions, which are read but not written.
     """
 
     known: frozenset[str] = frozenset()
@@ -41,6 +46,7 @@ class Block:
     most: Mapping[str, float] = field(default_factory=dict)
     refused: Words = field(default_factory=dict)
     filled: frozenset[str] = frozenset()
+    unwritten: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -52,6 +58,10 @@ def _same(node: MappingNode) -> MappingNode:
     return node
 
 
+def _unchanged(data: Data) -> Data:
+    return data
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """One of our types, and the ROS types that are rewritten to it.
@@ -60,7 +70,9 @@ class Table:
         own: our type.
         types: ROS type -> values that it implies.
         parameters: ROS parameters of all these types.
+        ros2: the type in ROS 2 that is written, by the interface that it commands, or under "" for any.
         reshape: restructures a controller after renaming.
+        unshape: the inverse, before renaming, of the parameters to write.
         idle: command interface -> our keys that have no effect on it.
         interface: ROS key that names a hardware interface; a controller with an interface that manipcli does not have
             is left out with a warning.
@@ -70,7 +82,9 @@ class Table:
     own: str
     types: Mapping[str, Words]
     parameters: Block
+    ros2: Words
     reshape: Callable[[MappingNode], MappingNode] = _same
+    unshape: Callable[[Data], Data] = _unchanged
     idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     interface: str = ""
     needs: tuple[str, ...] = ()

@@ -12,6 +12,7 @@ from manipcli.spec.block_fields import bounds_of
 from manipcli.spec.quantity import JointTolerance
 from manipcli.spec.ros.reshape import forward, joint_trajectory, one_joint, pid
 from manipcli.spec.ros.table import Block, Table
+from manipcli.spec.ros.unshape import to_forward, to_gripper, to_joint_trajectory, to_pid, to_wrench
 from manipcli.spec.source.tree import Plain
 
 _EVERYWHERE: Final = frozenset({"use_sim_time", "publish_state", "state_publish_rate", "publish_rate"})
@@ -56,6 +57,7 @@ JOINT_TRAJECTORY: Final = Table(
         | {"set_last_command_interface_value_as_state_on_activation"},
         quiet=_EVERYWHERE | {"action_monitor_rate"},
         renamed={"open_loop_control": "interpolate_from_desired_state"},
+        unwritten=frozenset({"open_loop_control"}),
         inner={
             "gains": Block(joint=_GAINS),
             "constraints": Block(inner={"joints": Block(joint=Block(most=_WIDEST))}),
@@ -72,7 +74,9 @@ JOINT_TRAJECTORY: Final = Table(
                  "of one controller (`CONTROLLER/joint`)"},
         filled=frozenset({"command_interfaces"}),
     ),
+    ros2={"": "joint_trajectory_controller/JointTrajectoryController"},
     reshape=joint_trajectory,
+    unshape=to_joint_trajectory,
 )  # fmt: skip
 
 GRIPPER: Final = Table(
@@ -95,7 +99,9 @@ GRIPPER: Final = Table(
             "max_effort": (0, 0.0),
         },
     ),
+    ros2={f: f"{f}_controllers/GripperActionController" for f in ("effort", "position")},
     reshape=one_joint,
+    unshape=to_gripper,
 )  # fmt: skip
 
 FORWARD: Final = Table(
@@ -115,7 +121,9 @@ FORWARD: Final = Table(
         renamed={"interface_name": "command_interface"},
         neutral=_NEUTRAL,
     ),
+    ros2={"": "forward_command_controller/ForwardCommandController"},
     reshape=forward,
+    unshape=to_forward,
     interface="interface_name",
 )
 
@@ -142,7 +150,9 @@ PID: Final = Table(
         refused={"reference_and_state_dof_names": "its states are those of `dof_names`: give the same names there, or "
                  "the references of one controller (`CONTROLLER/joint`)"},
     ),
+    ros2={"": "pid_controller/PidController"},
     reshape=pid,
+    unshape=to_pid,
 )  # fmt: skip
 
 JOINT_STATES: Final = Table(
@@ -157,6 +167,7 @@ JOINT_STATES: Final = Table(
             "map_interface_to_joint_state": ({name: name for name in INTERFACES},),
         },
     ),
+    ros2={"": "joint_state_broadcaster/JointStateBroadcaster"},
 )  # fmt: skip
 
 WRENCH: Final = Table(
@@ -173,6 +184,8 @@ WRENCH: Final = Table(
         quiet=_EVERYWHERE | {"sensor_name", "interface_names"},
         neutral=_NEUTRAL | {"additional_frames_to_publish": ([],)},
     ),
+    ros2={"": "force_torque_sensor_broadcaster/ForceTorqueSensorBroadcaster"},
+    unshape=to_wrench,
     needs=("link", "frame_id"),
 )  # fmt: skip
 
