@@ -151,6 +151,15 @@ def untouchable(world: World) -> str | None:
     return world.unrecorded.get("contacts")
 
 
+def unpinched(context: CheckContext, condition: str) -> tuple[Problem, ...]:
+    """A problem for a robot that holds by an attachment: no fingers pinch the object, so the condition never holds."""
+    holding = context.robot.holding
+    if holding is None:
+        return ()
+    message = f"`{condition}` needs two fingers that press: '{context.robot.name}' holds by {holding.kind}"
+    return (Problem((), message, "ask where the object is: `above`, `near`"),)
+
+
 def effortless(world: World) -> str | None:
     """Why efforts are unknown; None if they are known."""
     return None if world.physics else "the engine has no physics, so joints have no efforts"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from manipcli.description.urdf.link import MISSING_VISUAL, REGULARISED
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.build_limits import with_limits
+from manipcli.model.holding import CUP_RADIUS, Holding
 from manipcli.model.inertials import ESTIMATE, repaired_links, with_inertials
 from manipcli.model.joint_units import misread_units
 from manipcli.model.link_collisions import REMEDY, replaced_meshes, with_collisions
@@ -27,6 +29,7 @@ from manipcli.model.named_poses import build_groups, build_poses
 from manipcli.model.normalised_urdf import portable_urdf
 from manipcli.model.reporter import Reporter
 from manipcli.model.robot import Group, RobotModel, Tool
+from manipcli.spec.holding import HoldingSpec
 from manipcli.spec.located import Source
 from manipcli.spec.robot import AttachSpec, RobotSpec
 
@@ -309,4 +312,17 @@ def _tool(reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], links: S
         return None if tip is None else Tool(link=tip, X_LT=Transform.identity())
     if not _known_link(reporter, spec.tool.link, links, ("tool", "link")):
         return None
-    return Tool(link=spec.tool.link, X_LT=spec.tool.pose.transform)
+    return Tool(link=spec.tool.link, X_LT=spec.tool.pose.transform, holding=_holding(spec.tool.holding))
+
+
+def _holding(spec: HoldingSpec | None) -> Holding | None:
+    if spec is None:
+        return None
+    if spec.suction is not None:
+        force = spec.suction.force
+        torque = CUP_RADIUS * force if spec.suction.torque is None else spec.suction.torque
+        return Holding("suction", force, torque, spec.suction.reach)
+    if spec.weld is not None:
+        limits = (math.inf if limit is None else limit for limit in (spec.weld.force, spec.weld.torque))
+        return Holding("weld", *limits)
+    return None

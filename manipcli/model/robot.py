@@ -17,6 +17,7 @@ from manipcli.description.elements import (
     Link,
     TransmissionTag,
 )
+from manipcli.model.holding import Holding
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +40,14 @@ class NamedPose:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """The tool frame T at `X_LT` in `link`: +z is the approach direction, y the direction in which fingers close."""
+    """The tool frame T at `X_LT` in `link`: +z is the approach direction, y the direction in which fingers close.
+
+    `holding`: the attachment that holds objects; None: contact and friction do.
+    """
 
     link: str
     X_LT: Transform
+    holding: Holding | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +149,11 @@ class RobotModel:
     compat: Literal["ros1", "ros2"] = "ros2"
     actuators: tuple[Actuator, ...] = ()
     inertials: tuple[LinkInertial, ...] = ()
+
+    @property
+    def holding(self) -> Holding | None:
+        """The attachment that holds objects in the tool; None: contact and friction do."""
+        return None if self.tool is None else self.tool.holding
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:

@@ -26,14 +26,13 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.model.grasp import friction_coefficient, friction_load
+from manipcli.plan.attachment import MOST, AttachedForce
 from manipcli.plan.grasp_contacts import PALM, GraspContact, finger_links, grasp_contacts
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 
 EDGES: Final = 8
 """Edges of the pyramid inside a friction cone; it is at most 8 % narrower."""
-MOST: Final = 1e3
-"""Largest ratio to the weight that is computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +49,7 @@ class GraspMargin:
             weight; 0 if the weight is not held.
         contacts: number of fingers that touch.
         contents: what lies in the object, which the hand carries, too.
+        attachment: `suction (60 N)`: what holds instead of fingers, with `force` [N] as its limit; "" for fingers.
     """
 
     body: str
@@ -60,6 +60,7 @@ class GraspMargin:
     acceleration: float
     contacts: int
     contents: tuple[str, ...] = ()
+    attachment: str = ""
 
     @property
     def text(self) -> str:
@@ -68,6 +69,7 @@ class GraspMargin:
             f"{number_of(self.contacts, 'finger')} at {readable(self.force, 'N')} each, "
             f"coefficient of friction {self.friction:.3g}"
         )
+        grip = self.attachment or grip
         what = f"'{self.body}'{' with its contents' if self.contents else ''} ({readable(self.weight, 'N')})"
         if self.ratio < 1.0:
             return f"{what} is not held: {grip} holds {self.ratio:.2g} x its weight"
@@ -77,15 +79,21 @@ class GraspMargin:
 
 def grasp_margin(planner: Planner, plan: StepPlan) -> GraspMargin | None:
     """The margin of the grasp with which a step ends; None if it grasps nothing, or without a stated grip force."""
-    closed = _closed(plan)
+    closed = _closed(planner, plan)
     if closed is None:
         return None
     joints, force, name = closed
     body, load = planner.scene.body(name), _load(planner, plan.end, name)
-    contacts = grasp_contacts(planner, plan.end, joints)
     mu = friction_coefficient(planner.robot, body)
-    limits = force_limits(contacts, force, len(finger_links(planner.robot, joints)))
-    held = HeldForce(contacts, limits, load.centre, mu)
+    contacts: tuple[GraspContact, ...] = ()
+    holding = planner.robot.holding
+    held: HeldForce | AttachedForce
+    if holding is not None:
+        held = AttachedForce(planner, plan.end, load.centre, mu)
+    else:
+        contacts = grasp_contacts(planner, plan.end, joints)
+        limits = force_limits(contacts, force, len(finger_links(planner.robot, joints)))
+        held = HeldForce(contacts, limits, load.centre, mu)
     pull = planner.scene.gravity * load.mass
     weight = float(np.linalg.norm(planner.scene.gravity)) * load.mass
     ratio = held.most(pull) if weight else MOST
@@ -93,7 +101,8 @@ def grasp_margin(planner: Planner, plan: StepPlan) -> GraspMargin | None:
     if ratio >= 1.0:
         acceleration = min(held.most(-direction, beside=pull) / load.mass for direction in DIRECTIONS)
     touching = len({contact.finger for contact in contacts} - {PALM})
-    return GraspMargin(name, force, mu, weight, ratio, acceleration, touching, load.contents)
+    attachment = "" if holding is None else holding.limits
+    return GraspMargin(name, force, mu, weight, ratio, acceleration, touching, load.contents, attachment)
 
 
 def carries(planner: Planner, plan: StepPlan) -> bool:
@@ -104,7 +113,10 @@ def carries(planner: Planner, plan: StepPlan) -> bool:
     normal of one of its contacts: moments and the other components only lower that. A palm below the object holds all.
     True, too, where friction is too low for the hand at any level grasp: another grasp is then no better.
     """
-    closed, gravity = _closed(plan), planner.scene.gravity
+    if planner.robot.holding is not None:
+        margin = grasp_margin(planner, plan)
+        return margin is None or margin.ratio >= 1.0
+    closed, gravity = _closed(planner, plan), planner.scene.gravity
     g = float(np.linalg.norm(gravity))
     if closed is None or not g:
         return True
@@ -145,12 +157,18 @@ def _load(planner: Planner, state: PlanningState, name: str) -> _Load:
     return _Load(mass, moment / mass, contents)
 
 
-def _closed(plan: StepPlan) -> tuple[tuple[str, ...], float, str] | None:
-    """Joints of the hand, grip force [N] and object of a step that grasps; None if it does not, or without a force."""
-    closing = next((m for m in plan.motions if m.grip is not None and m.grip.force is not None), None)
-    if closing is None or closing.grip is None or closing.grip.force is None or plan.end.carried is None:
+def _closed(planner: Planner, plan: StepPlan) -> tuple[tuple[str, ...], float, str] | None:
+    """Joints of the hand, force [N] and object of a step that grasps; None if it does not, or without a force.
+
+    The force is that of the grip; of an attachment, its limit.
+    """
+    closing, holding = next((m for m in plan.motions if m.closes), None), planner.robot.holding
+    if closing is None or plan.end.carried is None:
         return None
-    return closing.grip.joints, closing.grip.force, plan.end.carried.body
+    grip, name = closing.grip, plan.end.carried.body
+    if holding is not None:
+        return () if grip is None else grip.joints, holding.force, name
+    return None if grip is None or grip.force is None else (grip.joints, grip.force, name)
 
 
 def force_limits(contacts: Sequence[GraspContact], force: float, count: int) -> dict[int, float]:

@@ -100,6 +100,8 @@ class Motion:
         allowed: pairs of parts that may touch in it, besides the hand and what it holds.
         searched: the path planner whose path around obstacles it follows; "" for a path that was not searched.
         tolerances: of the trajectory, instead of the controller's.
+        takes: the object that is attached to the tool at its end, for robots with a `holding`.
+        lets_go: what is attached to the tool is freed at its beginning.
     """
 
     label: str
@@ -113,6 +115,18 @@ class Motion:
     allowed: frozenset[Pair] = frozenset()
     searched: str = ""
     tolerances: GoalTolerances | None = None
+    takes: str | None = None
+    lets_go: bool = False
+
+    @property
+    def closes(self) -> bool:
+        """Whether the hand closes on something."""
+        return self.takes is not None or (self.grip is not None and self.grip.force is not None)
+
+    @property
+    def opens(self) -> bool:
+        """Whether the hand moves without closing on something, or frees an object."""
+        return not self.closes and (self.lets_go or self.grip is not None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,17 +15,20 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
+from manipcli.plan.attachment import attached, freed
 from manipcli.plan.blind_grasp import blindly_closed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
-from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
+from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
+from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
+from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
-from manipcli.plan.prediction import carried_along, put, spilled
+from manipcli.plan.prediction import carried_along, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.trajectory_sampling import resampled
@@ -65,10 +68,6 @@ class MotionBuilder:
         other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
-
-    def with_body(self, name: str, X_WO: Transform) -> PlanningState:
-        """The present state with one body moved to `X_WO`."""
-        return put(self._planner, self._now, {name: X_WO})
 
     def let_go(self, posture: str) -> PlanningState:
         """The present state with the hand at a pose and empty; collisions are not checked."""
@@ -248,6 +247,9 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and does not touch it.
         """
         planner = self._planner
+        if handless(planner.robot, posture):
+            motion, self._now = attached(planner, self._now, body, self._allowed)
+            return self._motions.append(motion)
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
@@ -256,8 +258,8 @@ class MotionBuilder:
             self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)
             self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=self._allowed))
             return
-        query = planner.grasping(self._now, body)
-        closed, touched = closed_on(planner.robot, query, self._now.position, grip.joints, grip.target)
+        now = against_jaw(planner, self._now, body, grip)
+        closed, touched = closed_on(planner.robot, planner.grasping(now, body), now.position, grip.joints, grip.target)
         if must_hold and not touched:
             raise NotPlannable(
                 f"the hand, closed to '{posture}', does not touch '{body}'",
@@ -268,12 +270,12 @@ class MotionBuilder:
             refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
             raise refusal.but(hint=roomier or None) from refusal
-        link = planner.tool_link
-        X_LW = planner.kinematics.forward(closed, link).inverse()
-        carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
+        X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
+        carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(now, body))
         allowed = self._allowed | planner.hand_contacts(body)
-        self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=allowed))
-        self._now = replace(self._now.moved(closed), carried=carried, closed=True)
+        takes = None if planner.robot.holding is None else body
+        self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=allowed, takes=takes))
+        self._now = replace(now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
         """Open the hand to a pose; the held object stays where it is. It may touch that, or the body it is `around`.
@@ -284,23 +286,22 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, it collides with something else than the object, or it
                 `must_arrive` at a pose that still presses on the object.
         """
+        if handless(self._planner.robot, posture):
+            motion, self._now = freed(self._now)
+            return self._motions.append(motion)
         grip = self._grip(self._posture(posture))
         if grip is None:
             raise no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
-            held = self._now.carried.body
-            there = self._with(grip.joints, grip.target)
-            query = self._planner.grasping(self._now, held)
-            still = pressing(self._planner.robot, query, there, grip.joints) if must_arrive else None
-            if still is not None:
-                message = f"'{still}' still presses on '{held}' with the hand in its pose '{posture}'"
-                raise NotPlannable(message, hint="set a pose in which the hand is open: `posture: POSE`")
-            allowed |= self._planner.hand_contacts(held)
+            if must_arrive:
+                refuse_pressing(self._planner, self._now, self._with(grip.joints, grip.target), grip.joints, posture)
+            allowed |= self._planner.hand_contacts(self._now.carried.body)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
         self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
+        self._motions[-1] = replace(self._motions[-1], lets_go=self._planner.robot.holding is not None)
 
     def dwell(self, label: str, duration: float) -> None:
         """Hold still for `duration` [s], and until the step's `until` holds."""
@@ -332,8 +333,7 @@ class MotionBuilder:
         return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
-        pose = self._planner.robot.pose(name)
-        return dict(zip(pose.joints, pose.positions, strict=True))
+        return posture_values(self._planner.robot, name)
 
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)

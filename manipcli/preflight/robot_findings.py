@@ -13,6 +13,7 @@ from manipcli.model.configuration import configuration
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.self_collision import CLOSE
+from manipcli.preflight.hand_findings import hand_findings
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.located import Located
@@ -25,6 +26,7 @@ def robot_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diag
     """Warnings about what engines with physics refuse and about poses in collision; notes about ignored pairs."""
     yield from _refused(robot)
     yield from _poses(file, robot)
+    yield from hand_findings(file, robot)
 
 
 def _refused(robot: RobotModel) -> Iterator[Diagnostic]:

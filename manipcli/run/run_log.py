@@ -148,6 +148,7 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
         "engine": engine.name,
         "physics": engine.physics,
         "period": repr(simulation.control_period),
+        **({"holding": task.true.robot.holding.kind} if task.true.robot.holding is not None else {}),
         **end,
     }
 

@@ -37,25 +37,25 @@ LEAST_SHARE: Final = 1e-6
 HULL_HINT: Final = "install it: pip install 'manipcli[coacd]'; or use the convex hull: `collision: hull`"
 
 
-def concave(path: Path) -> bool:
-    """Whether a mesh fills less than the share `SOLID` of its convex hull.
+def concave(path: Path, share: float = SOLID) -> bool:
+    """Whether a mesh fills less than this share of its convex hull.
 
     Small holes of a scanned surface count for little: what is behind a hole, seen from the middle, counts as empty. An
     open box fills 5/6, half a sphere without a lid 13/16. False for a file that cannot be used as a mesh, which has no
     parts either.
     """
     try:
-        return _concave(read_mesh(path))
+        return _filled(read_mesh(path)) < share
     except UnusableMesh:
         return False
 
 
 @functools.lru_cache(maxsize=64)
-def _concave(mesh: TriangleMesh) -> bool:
-    """Cached, like `_parts`."""
+def _filled(mesh: TriangleMesh) -> float:
+    """Share of the convex hull that is filled; 1 for a flat mesh. Cached, like `_parts`."""
     points, faces = welded(mesh)
     whole = hull(points)
-    return whole is not None and abs(volume(points, faces, whole[0].mean(axis=0))) < SOLID * whole[2]
+    return 1.0 if whole is None else abs(volume(points, faces, whole[0].mean(axis=0))) / whole[2]
 
 
 def convex_parts(path: Path) -> tuple[ConvexPart, ...]:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from manipcli.core.text import number_of, shorten
 from manipcli.spec.base import Model, problem
+from manipcli.spec.holding import HoldingSpec
 from manipcli.spec.inertials import InertialsSpec
 from manipcli.spec.quantity import (
     JointAcceleration,
@@ -236,6 +237,10 @@ class ToolSpec(Model):
 
     link: str = Field(description="The link that carries the tool.")
     pose: PoseSpec = Field(PoseSpec(), description="Pose of the tool frame in the link. Default: identity.")
+    holding: HoldingSpec | None = Field(
+        None,
+        description="What holds a grasped object: contact and friction, a suction cup, or a weld. Default friction.",
+    )
 
 
 def _relative(packages: dict[str, str]) -> dict[str, str]:

@@ -22,11 +22,13 @@ from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.face_frames import clear_of, face_frames
 from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting
 from manipcli.plan.grasp_margin import carries
+from manipcli.plan.hand import handless
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.planner import CLEARANCE, Planner
+from manipcli.plan.planner import CLEARANCE, NOTHING, Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.grasp import GraspSpec
@@ -132,7 +134,9 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         body, planner.body_pose(state, spec.object), planner.robot.X_WB, planner.tool_pose(state).R,
         direction=spec.approach.direction, yaw=spec.approach.yaw, height=spec.grasp.height,
     )  # fmt: skip
-    usual = frames.usual()
+    fingerless = handless(planner.robot, spec.grasp.posture)
+    touching = planner.hand_contacts(spec.object) if fingerless else NOTHING
+    usual = face_frames(frames, planner.robot) if fingerless else frames.usual()
     out_of_reach: dict[GraspFrame, NotPlannable | None] = {}
     lines: dict[GraspFrame, tuple[float, float, Array]] = {}
     unlikely: set[GraspFrame] = set()  # no approach to these was within reach so far
@@ -143,7 +147,8 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         nonlocal attempts
         builder = MotionBuilder(planner, state)
         if frame not in out_of_reach:  # checked once: it does not depend on distance and slope
-            out_of_reach[frame] = builder.unreachable("approach", frame.X_WT, hand=spec.open)
+            near = MotionBuilder(planner, state, allowed=touching)
+            out_of_reach[frame] = near.unreachable("approach", frame.X_WT, hand=spec.open)
         refusal = out_of_reach[frame]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
@@ -166,7 +171,9 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                 unlikely.add(frame)
                 raise
         try:
-            builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2)
+            builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2, allowed=touching)
+            if fingerless:
+                clear_of(planner, builder.now, spec.object)
         except NotPlannable as bent:
             if bent.reason == "line":
                 lines.setdefault(frame, (distance, slope, builder.now.position))
@@ -212,11 +219,11 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
 
     def grasps() -> Iterator[Candidate]:
         for k, frame in enumerate((*usual, *frames.higher())):
-            if k >= len(usual) and not touched():
+            if k >= len(usual) and (fingerless or not touched()):
                 break  # a higher grasp is not nearer
             for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
                 yield candidate(frame, distance, slope)
-        if not touched() and _beyond(planner, state, usual[0].X_WT):
+        if fingerless or (not touched() and _beyond(planner, state, usual[0].X_WT)):
             return  # no other orientation is nearer
         overlapping = overlaps(planner, state, spec.object, spec.open)
         for frame in first_fitting(frames.further(), lambda X_WT: not overlapping(X_WT), FURTHER):
@@ -230,6 +237,8 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             yield candidate(frame, distance, slope, True, position)
 
     def explain(refusal: NotPlannable) -> NotPlannable:
+        if fingerless:
+            return refusal
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
         hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]

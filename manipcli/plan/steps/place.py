@@ -224,7 +224,7 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
         builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
             builder.carry("carry", above(X_WL, clearance), speed=spec.velocity_scaling)
-        support = planner.touching(builder.with_body(spec.object, X_WL), spec.object)
+        support = planner.touching(put(planner, builder.now, {spec.object: X_WL}), spec.object)
         with _hinted(_LOWER):
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
         return builder

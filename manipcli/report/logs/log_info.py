@@ -88,6 +88,7 @@ def render_text(info: LogInfo) -> str:
     lines += ["", _headline(info), *([str(info.saturations)] if str(info.saturations) else []), _length(info)]
     lines += [f"{name} of the engine: {value}" for name, value in engine_choices(found.metadata)]
     lines += [f"{name}: {value}" for name, value in recorded_inertials(found.metadata)]
+    lines += [f"objects are held by {info.run['holding']}, not by friction"] if "holding" in info.run else []
     return "\n".join([*lines, f"log: {found.path}"])
 
 
