@@ -93,10 +93,20 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class StepPlan:
-    """The motions of one step, and the state after them."""
+    """The motions of one step, and the state after them.
+
+    Attributes:
+        motions: of the step.
+        end: the state after them.
+        placed: the body that it sets down at its pose in `end`; "" for none.
+        poured: the bodies that it pours into the container `into`.
+    """
 
     motions: tuple[Motion, ...]
     end: PlanningState
+    placed: str = ""
+    poured: tuple[str, ...] = ()
+    into: str = ""
 
     @property
     def duration(self) -> float:

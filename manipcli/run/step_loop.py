@@ -23,6 +23,7 @@ from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
+from manipcli.run.step_results import not_placed, not_poured
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -286,6 +287,7 @@ class StepLoop:
         if planned.plan.end.carried is None:
             self._measured.grasp.release()
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
+        left = left or self._without_result(step, planned)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
@@ -327,6 +329,15 @@ class StepLoop:
         motion = planner.tool_pose(end).p - planner.tool_pose(before).p
         why = self._measured.grasp.short_of(motion, self._session.engine.read())
         return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
+
+    def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
+        """A failure where an object is not where the step places or pours it; `until` may define another pour."""
+        if not self._physics:
+            return None
+        plan, planner = planned.plan, self._plan.planner
+        now = self._measured.situation(replace(plan.end, carried=None))
+        why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
+        return MotionEnd("failed", why) if why else None
 
     def _still_held(self, before: PlanningState) -> str:
         """Which links still hold the object that was carried `before`; "" if it was released."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar
 
@@ -47,7 +48,11 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class PourSpec(Model):
-    """Carry a held object over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back."""
+    """Carry a held object over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back.
+
+    A pour of more than 90 deg without `until` is done when all that was in the object is in the container; with `until`,
+    that condition decides. A smaller tilt may leave a part in the object.
+    """
 
     renamed: ClassVar = RENAMED
 
@@ -77,7 +82,8 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
-    poured = frozenset((name, spec.into) for name in planner.contents(state, spec.object))
+    contents = planner.contents(state, spec.object)
+    poured = frozenset((name, spec.into) for name in contents)
 
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
@@ -93,7 +99,8 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         if spec.tilt > math.pi / 2:
             builder.spill(spec.into)
         builder.back("tilt back")
-        return builder.plan()
+        planned = builder.plan()
+        return replace(planned, poured=contents, into=spec.into) if spec.tilt > math.pi / 2 else planned
 
     ways = itertools.product(spread(spec.clearance), YAWS_DEG, _senses(planner, state, mouth, R_WT))
     options = [
