@@ -13,6 +13,8 @@ Strictness = Literal["strict", "best_effort"]
 """Whether a switch of controllers is done as a whole or not at all, or as far as possible."""
 CLOSING = "close"
 """The phase of a step in which the hand closes on something."""
+OPENING = "open"
+"""The phase of a step in which the hand opens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ class Grip:
     joints: tuple[str, ...]
     target: Array
     force: float | None
-    must_hold: bool
+    must_hold: bool = False
     must_arrive: bool = False
 
 

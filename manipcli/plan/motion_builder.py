@@ -23,7 +23,7 @@ from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
-from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
+from manipcli.plan.motion import CLOSING, OPENING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
@@ -81,7 +81,7 @@ class MotionBuilder:
     def joints(
         self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0, free: bool = True
     ) -> None:
-        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time.
+        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time and must arrive.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.
@@ -91,7 +91,7 @@ class MotionBuilder:
         arm = [name for name in names if name not in hand]
         if self._now.closed and len(arm) < len(names):
             raise closed_hand(next(name for name in names if name in hand), self._now.carried)
-        grip = self._grip({name: values[name] for name in names if name in hand})
+        grip = self._grip({name: values[name] for name in names if name in hand}, must_arrive=True)
         if arm:
             goal = np.array([values[name] for name in arm])
             self._free(label, self._limits(arm, speed), goal, grip, (lambda _: goal[None]) if free else None)
@@ -285,7 +285,7 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, it collides with something else than the object, or it
                 `must_arrive` at a pose that still presses on the object.
         """
-        grip = self._grip(self._posture(posture))
+        grip = self._grip(self._posture(posture), must_arrive=must_arrive)
         if grip is None:
             raise no_gripper(posture)
         allowed = NOTHING
@@ -301,7 +301,7 @@ class MotionBuilder:
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
-        self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
+        self._add(OPENING, None, grip, allowed=allowed)
 
     def dwell(self, label: str, duration: float) -> None:
         """Hold still for `duration` [s], and until the step's `until` holds."""
@@ -390,11 +390,11 @@ class MotionBuilder:
         q[self._planner.robot.indices(tuple(names))] = values
         return with_mimics(self._planner.robot, q)
 
-    def _grip(self, targets: dict[str, float], *, force: float | None = None, must_hold: bool = False) -> Grip | None:
-        """A goal for the joints of the gripper controller, or None if no target is one of them."""
+    def _grip(self, targets: dict[str, float], *, force: float | None = None, **must: bool) -> Grip | None:
+        """A goal for the joints of the gripper controller, or None if no target is one of them; `must`: see `Grip`."""
         joints = self._planner.gripper_joints
         if not any(name in targets for name in joints):
             return None
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
-        return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
+        return Grip(joints=joints, target=target, force=force, **must)

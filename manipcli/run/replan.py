@@ -86,6 +86,25 @@ class Measured:
         """Texts of the differences of `now` to the `planned` state of a step, with amounts; () within the limits."""
         return (*self._joints(planned, now), *self._held(planned, now), *self._bodies(planned, now, step))
 
+    def refused(self, planned: PlanningState, now: PlanningState, cause: str, step: StepSpec, *, forced: bool) -> str:
+        """The text of a failed re-planning: a lost or slipped object first, which is the cause of what follows.
+
+        Args:
+            planned: the planned start of the step.
+            now: the measured one.
+            cause: why the step has no plan.
+            step: that has no plan.
+            forced: whether the task cannot choose to keep the original plan.
+        """
+        held = "; ".join(self._held(planned, now))
+        if held and planned.carried is not None and now.carried is None:
+            return f"the grasp was lost before this step: {held}"
+        why = "; ".join(self.differences(planned, now, step))
+        if held:
+            return f"{why}; no plan starts from there: {cause}"
+        hint = "" if forced else "; `replan: false` keeps the original plan"
+        return f"re-planning from the measured state failed{f' ({why})' if why else ''}: {cause}{hint}"
+
     def plan(
         self, step: StepSpec, planned: PlanningState, now: PlanningState, grasps: Sequence[Array] = ()
     ) -> tuple[StepPlan, PlanningState, str]:

@@ -14,7 +14,7 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.collision import Carried
-from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
+from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
 from manipcli.model.state import WorldState
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
@@ -23,7 +23,7 @@ from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
-from manipcli.run.step_results import not_placed, not_poured
+from manipcli.run.step_results import not_placed, not_poured, not_squeezed
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -35,6 +35,8 @@ from manipcli.task.task import Task
 
 DEFAULT_UNTIL_TIME: Final = 30.0
 """[s] Timeout of an `until` on a step without `timeout`."""
+SQUEEZED: Final = 0.3
+"""[s] Within this time after the hand closed, it presses on its object from opposite sides."""
 AFTERMATH: Final = 0.6
 """[s] Simulated after the last step, so that `at_rest` can be judged."""
 
@@ -218,13 +220,13 @@ class StepLoop:
             try:
                 with self._replanning:
                     plan, now, note = self._measured.plan(step, planned_start, now, planned.grasps)
-                planned = replace(planned, plan=plan)
+                poured = plan.poured or planned.plan.poured  # what the cup should hold, even if that is lost
+                planned = replace(planned, plan=replace(plan, poured=poured, into=plan.into or planned.plan.into))
             except NotPlannable as refusal:
                 self._believed = now
-                why = f" ({'; '.join(differences)})" if differences else ""
                 forced = retry or self._failed or self._guards
-                hint = "" if forced else "; `replan: false` keeps the original plan"
-                return MotionEnd("failed", f"re-planning from the measured state failed{why}: {refusal.cause}{hint}")
+                text = self._measured.refused(planned_start, now, refusal.cause, step, forced=forced)
+                return MotionEnd("failed", text)
             why = "; ".join(differences) or ("retry" if retry else "the previous step failed")
             why += note
             self._event("replanned", planned, "", why)
@@ -270,6 +272,8 @@ class StepLoop:
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
                     self._take(planned.plan.end.carried)
+                    if motion.grip.must_hold and (loose := self._loose(planned.plan.end.carried.body)):
+                        return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
@@ -307,6 +311,18 @@ class StepLoop:
         if self._physics:
             self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
 
+    def _loose(self, body: str) -> str:
+        """Why the closed hand does not hold an object, up to `SQUEEZED` after it closed; "" where it does."""
+        if not self._physics:
+            return ""
+
+        def squeezed(_: object) -> bool:
+            return squeeze_force(self._session.touching, body) >= GRIP_FORCE
+
+        if squeezed(None) or self._executor.wait(squeezed, deadline=self._session.time + SQUEEZED).outcome == "done":
+            return ""
+        return not_squeezed(self._session.touching, body)
+
     def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
         """A failure if the hand does not carry the planned object; None if it does."""
         if carried is None or not self._physics:
@@ -332,9 +348,9 @@ class StepLoop:
 
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
         """A failure where an object is not where the step places or pours it; `until` may define another pour."""
-        if not self._physics:
-            return None
         plan, planner = planned.plan, self._plan.planner
+        if not self._physics or not (plan.placed or plan.poured):
+            return None
         now = self._measured.situation(replace(plan.end, carried=None))
         why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
         return MotionEnd("failed", why) if why else None

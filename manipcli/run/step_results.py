@@ -1,11 +1,15 @@
-"""What a step must have done besides its motions, asked of the measured world: objects that it placed or poured."""
+"""What a step must have done besides its motions, asked of the measured world: objects that it grasped, placed or poured."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import radians
 from typing import Final
 
+from manipcli.core.units import readable
+from manipcli.model.grasp import GRIP_FORCE, pressing
+from manipcli.model.state import Contact
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.run.replan import between, deg, mm
@@ -57,6 +61,15 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
     first = missing[0]
     more = f"; {len(missing)} of {len(plan.poured)} bodies are not" if len(plan.poured) > 1 else ""
     return f"'{first}' is not in '{plan.into}', it is {where[first]}{more}"
+
+
+def not_squeezed(contacts: Sequence[Contact], body: str) -> str:
+    """Why a closed hand does not hold a body that it does not squeeze."""
+    links = ", ".join(f"'{link}' ({readable(force, 'N')})" for force, link in pressing(contacts, body))
+    if not links:
+        return f"the hand does not hold '{body}': no robot link presses on it"
+    least = f"expected at least {readable(GRIP_FORCE, 'N')} from opposite sides"
+    return f"the hand does not hold '{body}': pressed by {links}, {least}"
 
 
 def _at(planner: Planner, now: PlanningState, name: str) -> str:
