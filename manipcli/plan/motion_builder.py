@@ -81,7 +81,7 @@ class MotionBuilder:
     def joints(
         self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0, free: bool = True
     ) -> None:
-        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time and must arrive.
+        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time, and arrives.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.

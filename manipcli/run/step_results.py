@@ -1,4 +1,4 @@
-"""What a step must have done besides its motions, asked of the measured world: objects that it grasped, placed or poured."""
+"""What a step must have done besides its motions: whether objects are held, placed or poured in the measured world."""
 
 from __future__ import annotations
 

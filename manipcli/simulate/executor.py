@@ -27,7 +27,7 @@ Alarm = Callable[[WorldState], str]
 UNTIL_TICKS: Final = SLOW
 """Control ticks between two evaluations of an `until`."""
 ARRIVED: Final = 0.05
-"""[rad or m] A joint further than this from the end of its motion has not arrived, whatever its controller tolerates."""
+"""[rad or m] A joint further than this from the end of its motion has not arrived, whatever its controller says."""
 REST: Final = 0.5
 """[s] Time that the robot holds still after a stop."""
 PATIENCE: Final = 30.0

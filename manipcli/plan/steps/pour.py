@@ -50,8 +50,8 @@ UP = np.array([0.0, 0.0, 1.0])
 class PourSpec(Model):
     """Carry a held object over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back.
 
-    A pour of more than 90 deg without `until` is done when all that was in the object is in the container; with `until`,
-    that condition decides. A smaller tilt may leave a part in the object.
+    A pour of more than 90 deg is done when all that was in the object is in the container, or with `until` when that
+    condition holds. A smaller tilt may leave a part in the object.
     """
 
     renamed: ClassVar = RENAMED
