@@ -203,3 +203,37 @@ def test_the_first_failed_step_is_the_first_that_the_world_refused(
     assert (failed.id, refused) == (world.fails, world.fails), verdict.text
     assert "replan: false" not in verdict.text
     assert re.search(world.says, failed.text), failed.text
+
+
+def test_a_jammed_hand_does_not_arrive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World("move", "a jammed hand", "move_1", (), "move_1", lambda world: world.jam())
+    verdict, _, _ = run(world, f"{HEAD}  - move: {{to: {{panda_finger_joint1: 0}}}}\n", tmp_path, monkeypatch)
+    assert "the hand did not reach its target" in verdict.steps[0].text
+
+
+def test_an_arm_at_a_wall_does_not_arrive_although_its_controller_tolerates_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controllers = (ROOT / "controllers" / "panda.yaml").read_text(encoding="utf-8")
+    start, constraints, rest = controllers.partition("    constraints:\n")
+    assert constraints
+    (tmp_path / "loose.yaml").write_text(start + rest[rest.index("  hand_controller") :], encoding="utf-8")
+    text = HEAD.replace(f"{ROOT}/controllers/panda.yaml", str(tmp_path / "loose.yaml"))
+    world = World("move", "a wall", "move_1", (fixed("wall", "40 cm, 2 cm, 60 cm", "0.5, 0.1, 0.5"),))
+    verdict, _, _ = run(world, f"{text}  - move: {{to: {{panda_joint1: 40 deg}}}}\n", tmp_path, monkeypatch)
+    assert re.search(r"joint 'panda_joint1' is 0\.\d+ rad from the end of this motion", verdict.steps[0].text)
+
+
+@pytest.mark.parametrize("on_fail", ["{retry: 1}", "continue"])
+def test_what_follows_a_lost_grasp_names_the_grasp(
+    on_fail: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = f"{HEAD}  - {PICK}\n  - {LIFT}\n    on_fail: {on_fail}\n  - {PLACE}\n".replace(
+        "replan: false", "replan: true"
+    )
+    world = World("lift", "slippery", "lift_1", (), "lift_1", lambda world: world.friction("block", 0.01))
+    verdict, _, _ = run(world, text, tmp_path, monkeypatch)
+    last = [step for step in verdict.steps if step.outcome != "not_run"][-1]
+    assert last.id == ("place_1" if on_fail == "continue" else "lift_1")
+    assert last.text.startswith("the grasp was lost before this step: 'block' is not in the hand: it rose"), last.text
+    assert "replan: false" not in verdict.text
