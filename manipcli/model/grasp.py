@@ -226,12 +226,11 @@ class Grasp:
             return
         if pressing(contacts, self._carried.body):
             self._pressed_at = float(state.time)
-        points = self._points(state)
+        X_WL, X_WO = self._link(state), self._object(state)
         for motion in self._motions:
-            motion.look(*points)
-        directions = self._link(state).R @ self._closing, self._object(state).R
+            motion.look(X_WL.apply(self._p_LC), X_WO.apply(self._p_OC))
         for rotation in self._rotations:
-            rotation.look(*directions)
+            rotation.look(X_WL.R @ self._closing, X_WO.R)
 
     def lost(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> str:
         """Why the hand does not carry this object now; "" if it does."""
