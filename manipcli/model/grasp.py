@@ -1,11 +1,15 @@
-"""Definition of a grasp: pressing links, pinched objects and carried objects.
+"""Definition of a grasp: pressing links, pinched, squeezed and carried objects.
 
 - *pressing*: the links of the robot that touch an object with force.
 - *pinched*: at least two links press, each with at least `GRIP_FORCE`. Used by the conditions `grasped` and
   `slip` and by the end of `release`; needs contacts only.
-- *carried*: a link presses, or it is attached to the tool, and the object has followed at least `FOLLOWS` of the
-  hand's motion, since the hand closed and since the step began. Used by every step that ends with an object in the
-  hand, and by re-planning; needs contacts and poses.
+- *squeezed*: links press on it from opposite sides, with at least `GRIP_FORCE` on each. Used at the end of a grasp that
+  names its object; needs contact points. Fingers on top of a tall object, or one finger at its side, do not squeeze it.
+- *carried*: a link presses, or it is attached to the tool, and the object has followed at least `FOLLOWS` of the hand's
+  motion and rotation, since the hand closed and since the step began. Used by every step that ends with an object in
+  the hand, and by re-planning; needs contacts and poses. The rotation is that of the direction in which the fingers
+  close, so that an object may pivot between the fingers, about that direction; of a round object only the rotation of
+  its axis counts.
 
 The condition `slip` and the grasp intervals of a report build on `pressing`: `slip` measures how far a pinched object
 moved in the hand, an interval is the time in which an object is pressed and has no other support.
@@ -15,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import radians
 from typing import Final, Protocol
 
 import numpy as np
@@ -37,6 +42,8 @@ STILL: Final = 2e-4
 """[m] A hand that moved less has not moved: fingers and arm yield by so much under load."""
 DROPPED: Final = 0.02
 """[m] A lag on the path counts from this motion of the hand on; below it, contacts are still settling."""
+TURNED: Final = radians(10.0)
+"""[rad] The same for a rotation of the hand."""
 MISPLACED: Final = 0.05
 """[m] An object further than this from its planned pose in the hand is not carried."""
 
@@ -65,6 +72,29 @@ def pinch_force(contacts: Sequence[Contact], body: str) -> float:
     """The second largest force [N] of a link on a body; 0 if fewer than two links press."""
     found = pressing(contacts, body)
     return found[1][0] if len(found) > 1 else 0.0
+
+
+def squeeze_force(contacts: Sequence[Contact], body: str) -> float:
+    """The force [N] with which links of the robot press on a body from opposite sides; 0 from one side only.
+
+    For each contact point with the normal n, the normal forces along n and against n are added; the smaller sum counts,
+    of the point where it is largest. Contacts without points count as opposite.
+    """
+    normals, forces = [], []
+    for contact in contacts:
+        other = contact.b if contact.a == body else contact.a if contact.b == body else ""
+        if not other.startswith(LINK):
+            continue
+        if not contact.points and contact.force > 0.0:
+            return pinch_force(contacts, body)
+        side = 1.0 if contact.a == body else -1.0
+        normals += [np.multiply(side, point.normal) for point in contact.points]
+        forces += [point.force for point in contact.points]
+    if not normals:
+        return 0.0
+    along = np.array(normals) @ np.transpose(normals)
+    both = np.maximum(along, 0.0) @ np.array(forces), np.maximum(-along, 0.0) @ np.array(forces)
+    return float(np.minimum(*both).max())
 
 
 @dataclass(slots=True)
@@ -96,6 +126,43 @@ class _Motion:
         if self.travel > STILL and _behind(moved, followed, self.travel):
             return moved, followed
         return self.dropped
+
+
+@dataclass(slots=True)
+class _Rotation:
+    """Rotation since a start of the direction in which the fingers close, on the hand and on the object.
+
+    Attributes:
+        hand: (3,) the direction then, in the world.
+        R_WO: (3, 3) of the object then.
+        kind: of the object.
+        travel: [rad] largest rotation of the hand since.
+        lost: rotations [rad] of the hand and, in the hand, of the object, when it first did not follow.
+    """
+
+    hand: Array
+    R_WO: Array
+    kind: str
+    travel: float = 0.0
+    lost: tuple[float, float] | None = None
+
+    def look(self, hand: Array, R_WO: Array) -> None:
+        """The direction (3,) and the rotation of the object (3, 3), in the world, now."""
+        if self.kind == "sphere":
+            return
+        moved = _angle(self.hand, hand)
+        if self.kind in ("cup", "cylinder"):
+            slipped = abs(_angle(hand, R_WO[:, 2]) - _angle(self.hand, self.R_WO[:, 2]))
+        else:
+            slipped = _angle(hand, R_WO @ (self.R_WO.T @ self.hand))
+        self.travel = max(self.travel, moved)
+        if self.lost is None and self.travel > TURNED and slipped > (1.0 - FOLLOWS) * self.travel:
+            self.lost = self.travel, slipped
+
+
+def _angle(a: Array, b: Array) -> float:
+    """[rad] between two unit vectors (3,)."""
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
 def _behind(hand: Array, body: Array, travel: float) -> bool:
@@ -132,7 +199,9 @@ class Grasp:
         self._carried: Carried | None = None
         self._k = 0
         self._p_LC = self._p_OC = np.zeros(3)
+        self._closing = np.array([0.0, 1.0, 0.0])
         self._motions: list[_Motion] = []
+        self._rotations: list[_Rotation] = []
         self._pressed_at = -np.inf
 
     def close(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> None:
@@ -146,6 +215,9 @@ class Grasp:
             point = self._kinematics.forward(state.position, tool.link).apply(tool.X_LT.p)
         self._p_LC, self._p_OC = X_WL.inverse().apply(point), X_WO.inverse().apply(point)
         self._motions = [_Motion(point, point)]
+        R_WT = X_WL.R if tool is None else (self._kinematics.forward(state.position, tool.link) @ tool.X_LT).R
+        self._closing = X_WL.R.T @ R_WT[:, 1]
+        self._rotations = [self._rotation(state)]
         self._pressed_at = -np.inf
         self.look(state, contacts)
 
@@ -154,6 +226,7 @@ class Grasp:
         if self._carried is None or self._carried.body != carried.body:
             self.close(carried, state, contacts)
         self._motions = [self._motions[0], _Motion(*self._points(state))]
+        self._rotations = [self._rotations[0], self._rotation(state)]
 
     def release(self) -> None:
         """The hand has opened."""
@@ -165,9 +238,11 @@ class Grasp:
             return
         if pressing(contacts, self._carried.body):
             self._pressed_at = float(state.time)
-        points = self._points(state)
+        X_WL, X_WO = self._link(state), self._object(state)
         for motion in self._motions:
-            motion.look(*points)
+            motion.look(X_WL.apply(self._p_LC), X_WO.apply(self._p_OC))
+        for rotation in self._rotations:
+            rotation.look(X_WL.R @ self._closing, X_WO.R)
 
     def lost(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> str:
         """Why the hand does not carry this object now; "" if it does."""
@@ -182,8 +257,12 @@ class Grasp:
                 reasons.append(self._attachment.broken or "it is not attached to the tool")
         elif float(state.time) - self._pressed_at > self._bridged:
             reasons.append("no robot link presses on it")
+        turned = next((each.lost for each in reversed(self._rotations) if each.lost is not None), None)
         if lags:
             reasons.append(_described(*lags[0]))
+        elif turned is not None:
+            hand, slipped = np.degrees(turned)
+            reasons.append(f"it rotated {slipped:.1f} deg in the hand while the hand rotated {hand:.1f} deg")
         off = float(np.linalg.norm(self._pose(state, carried).p - carried.X_LO.p))
         if off > MISPLACED and not lags:
             reasons.append(f"it is {_mm(off)} from its planned pose in the hand")
@@ -205,6 +284,11 @@ class Grasp:
         """The point (3,) [m] at which the object is held, in the world: on the hand, and on the object."""
         return self._link(state).apply(self._p_LC), self._object(state).apply(self._p_OC)
 
+    def _rotation(self, state: WorldState) -> _Rotation:
+        """Rotation from now on."""
+        body = self._scene.movable[self._k]
+        return _Rotation(self._link(state).R @ self._closing, self._object(state).R, body.kind)
+
     def _link(self, state: WorldState) -> Transform:
         assert self._carried is not None  # callers check it first
         return self._kinematics.forward(state.position, self._carried.link)
@@ -219,7 +303,9 @@ class Grasp:
 
 def _described(hand: Array, body: Array) -> str:
     """The motions (3,) [m] of hand and object; upwards where the hand mostly rose."""
-    length = float(np.linalg.norm(hand))
+    length, off = float(np.linalg.norm(hand)), float(np.linalg.norm(hand - body))
+    if length > 0.0 and float(body @ hand) >= FOLLOWS * length**2:  # it followed, and slipped away from the path
+        return f"it slipped {_mm(off)} in the hand while the tool moved {_mm(length)}"
     if hand[2] > 0.7 * length:
         return f"it rose {_mm(float(body[2]))} while the tool rose {_mm(float(hand[2]))}"
     along = float(body @ hand) / length if length > 0.0 else float(np.linalg.norm(body))

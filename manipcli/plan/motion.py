@@ -13,6 +13,8 @@ Strictness = Literal["strict", "best_effort"]
 """Whether a switch of controllers is done as a whole or not at all, or as far as possible."""
 CLOSING = "close"
 """The phase of a step in which the hand closes on something."""
+OPENING = "open"
+"""The phase of a step in which the hand opens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ class Grip:
     joints: tuple[str, ...]
     target: Array
     force: float | None
-    must_hold: bool
+    must_hold: bool = False
     must_arrive: bool = False
 
 
@@ -131,10 +133,20 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class StepPlan:
-    """The motions of one step, and the state after them."""
+    """The motions of one step, and the state after them.
+
+    Attributes:
+        motions: of the step.
+        end: the state after them.
+        placed: the body that it sets down at its pose in `end`; "" for none.
+        poured: the bodies that it pours into the container `into`.
+    """
 
     motions: tuple[Motion, ...]
     end: PlanningState
+    placed: str = ""
+    poured: tuple[str, ...] = ()
+    into: str = ""
 
     @property
     def duration(self) -> float:

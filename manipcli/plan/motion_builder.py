@@ -23,7 +23,7 @@ from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
-from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
+from manipcli.plan.motion import CLOSING, OPENING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
@@ -78,7 +78,7 @@ class MotionBuilder:
     def joints(
         self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0, free: bool = True
     ) -> None:
-        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time.
+        """Move straight in joint space, or with `free` around obstacles; the hand moves at the same time, and arrives.
 
         Raises:
             NotPlannable: joints of the hand are named after it was closed.
@@ -88,7 +88,7 @@ class MotionBuilder:
         arm = [name for name in names if name not in hand]
         if self._now.closed and len(arm) < len(names):
             raise closed_hand(next(name for name in names if name in hand), self._now.carried)
-        grip = self._grip({name: values[name] for name in names if name in hand})
+        grip = self._grip({name: values[name] for name in names if name in hand}, must_arrive=True)
         if arm:
             goal = np.array([values[name] for name in arm])
             self._free(label, self._limits(arm, speed), goal, grip, (lambda _: goal[None]) if free else None)
@@ -289,7 +289,7 @@ class MotionBuilder:
         if handless(self._planner.robot, posture):
             motion, self._now = freed(self._now)
             return self._motions.append(motion)
-        grip = self._grip(self._posture(posture))
+        grip = self._grip(self._posture(posture), must_arrive=must_arrive)
         if grip is None:
             raise no_gripper(posture)
         allowed = NOTHING
@@ -300,7 +300,7 @@ class MotionBuilder:
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
-        self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
+        self._add(OPENING, None, grip, allowed=allowed)
         self._motions[-1] = replace(self._motions[-1], lets_go=self._planner.robot.holding is not None)
 
     def dwell(self, label: str, duration: float) -> None:
@@ -389,11 +389,11 @@ class MotionBuilder:
         q[self._planner.robot.indices(tuple(names))] = values
         return with_mimics(self._planner.robot, q)
 
-    def _grip(self, targets: dict[str, float], *, force: float | None = None, must_hold: bool = False) -> Grip | None:
-        """A goal for the joints of the gripper controller, or None if no target is one of them."""
+    def _grip(self, targets: dict[str, float], *, force: float | None = None, **must: bool) -> Grip | None:
+        """A goal for the joints of the gripper controller, or None if no target is one of them; `must`: see `Grip`."""
         joints = self._planner.gripper_joints
         if not any(name in targets for name in joints):
             return None
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
-        return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
+        return Grip(joints=joints, target=target, force=force, **must)

@@ -19,7 +19,8 @@ from manipcli.record.write.recorder import Recorder
 from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
-from manipcli.run.step_loop import StepLoop, saturations_of
+from manipcli.run.saturation_counts import saturations_of
+from manipcli.run.step_loop import StepLoop
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr

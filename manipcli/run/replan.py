@@ -87,6 +87,25 @@ class Measured:
         """Texts of the differences of `now` to the `planned` state of a step, with amounts; () within the limits."""
         return (*self._joints(planned, now), *self._held(planned, now), *self._bodies(planned, now, step))
 
+    def refused(self, planned: PlanningState, now: PlanningState, cause: str, step: StepSpec, *, forced: bool) -> str:
+        """The text of a failed re-planning: a lost or slipped object first, which is the cause of what follows.
+
+        Args:
+            planned: the planned start of the step.
+            now: the measured one.
+            cause: why the step has no plan.
+            step: that has no plan.
+            forced: whether the task cannot choose to keep the original plan.
+        """
+        held = "; ".join(self._held(planned, now))
+        if held and planned.carried is not None and now.carried is None:
+            return f"the grasp was lost before this step: {held}"
+        why = "; ".join(self.differences(planned, now, step))
+        if held:
+            return f"{why}; no plan starts from there: {cause}"
+        hint = "" if forced else "; `replan: false` keeps the original plan"
+        return f"re-planning from the measured state failed{f' ({why})' if why else ''}: {cause}{hint}"
+
     def plan(
         self, step: StepSpec, planned: PlanningState, now: PlanningState, grasps: Sequence[Array] = ()
     ) -> tuple[StepPlan, PlanningState, str]:
@@ -116,7 +135,7 @@ class Measured:
         before, after = planned.carried, now.carried
         if before is None or after is None or before.body != after.body:
             return None
-        _, rotation = _between(before.X_LO, after.X_LO)
+        _, rotation = between(before.X_LO, after.X_LO)
         if rotation > self._limits.rotation:
             return None
         planner = self._planner
@@ -124,7 +143,7 @@ class Measured:
         X_WO = planner.body_pose(now, after.body)
         shift = planner.kinematics.forward(now.position, after.link) @ X_LO @ X_WO.inverse()
         rotated = replace(self._shifted(now, after.body, shift), carried=replace(after, X_LO=X_LO))
-        return rotated, f"; the arm cannot correct the rotation of '{after.body}' by {_deg(rotation)} in the hand"
+        return rotated, f"; the arm cannot correct the rotation of '{after.body}' by {deg(rotation)} in the hand"
 
     def _shifted(self, now: PlanningState, body: str, shift: Transform) -> PlanningState:
         """`now` with a body and its contents moved in the world."""
@@ -166,14 +185,14 @@ class Measured:
         before, after = planned.carried, now.carried
         if before is not None and (after is None or after.body != before.body):
             away = float(np.linalg.norm(self._pose(now, before.body).p - self._pose(planned, before.body).p))
-            why = self._lost or f"it is {_mm(away)} from its planned pose"
+            why = self._lost or f"it is {mm(away)} from its planned pose"
             yield f"'{before.body}' is not in the hand: {why}"
         elif after is not None and before is None:
             yield f"the hand holds '{after.body}' instead of nothing"
         elif before is not None and after is not None:
-            slip, rotation = _between(before.X_LO, after.X_LO)
+            slip, rotation = between(before.X_LO, after.X_LO)
             if slip > self._limits.slip or rotation > self._limits.rotation:
-                yield f"'{after.body}' slipped {_mm(slip)} and {_deg(rotation)} in the hand"
+                yield f"'{after.body}' slipped {mm(slip)} and {deg(rotation)} in the hand"
 
     def _bodies(self, planned: PlanningState, now: PlanningState, step: StepSpec) -> Iterator[str]:
         """Bodies away from their planned pose. A body inside its planned container is compared only if the step names
@@ -187,9 +206,9 @@ class Measured:
             name = body.name
             if name in held or (name not in named and name in where and where[name] == planned_where.get(name)):
                 continue
-            away, rotation = _between(self._pose(planned, name), self._pose(now, name), round_as=body.kind)
+            away, rotation = between(self._pose(planned, name), self._pose(now, name), round_as=body.kind)
             if away > self._limits.position or rotation > self._limits.rotation:
-                yield f"'{name}' is {_mm(away)} and {_deg(rotation)} from its planned pose"
+                yield f"'{name}' is {mm(away)} and {deg(rotation)} from its planned pose"
 
     def _containers(self, situation: PlanningState) -> dict[str, str]:
         """Body -> the container that it is in."""
@@ -216,7 +235,7 @@ def after(planned: StepPlan, before: PlanningState, *, done: int) -> PlanningSta
     return replace(before, carried=carried, closed=closed)
 
 
-def _between(a: Transform, b: Transform, *, round_as: str = "") -> tuple[float, float]:
+def between(a: Transform, b: Transform, *, round_as: str = "") -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses, without rotations about the symmetry axes of a round body."""
     away = float(np.linalg.norm(a.p - b.p))
     if round_as == "sphere":
@@ -238,9 +257,11 @@ def _texts(value: Plain | tuple[object, ...] | object) -> set[str]:
     return set()
 
 
-def _mm(length: float) -> str:
+def mm(length: float) -> str:
+    """A length [m] in millimetres."""
     return f"{1000.0 * length:.1f} mm"
 
 
-def _deg(angle: float) -> str:
+def deg(angle: float) -> str:
+    """An angle [rad] in degrees."""
     return f"{math.degrees(angle):.1f} deg"

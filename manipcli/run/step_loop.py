@@ -8,13 +8,11 @@ from dataclasses import replace
 from typing import Final
 
 from manipcli.control.action import GoalHandle
-from manipcli.control.saturation import KINDS
 from manipcli.core.errors import NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
-from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.collision import Carried
-from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
+from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
 from manipcli.model.state import WorldState
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
@@ -25,6 +23,8 @@ from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
+from manipcli.run.saturation_counts import saturated_since, saturations_of
+from manipcli.run.step_results import not_placed, not_poured, not_squeezed
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -36,20 +36,10 @@ from manipcli.task.task import Task
 
 DEFAULT_UNTIL_TIME: Final = 30.0
 """[s] Timeout of an `until` on a step without `timeout`."""
+SQUEEZED: Final = 0.3
+"""[s] Within this time after the hand closed, it presses on its object from opposite sides."""
 AFTERMATH: Final = 0.6
 """[s] Simulated after the last step, so that `at_rest` can be judged."""
-
-
-def saturations_of(session: Session) -> Saturations:
-    """The saturations of joints, by limit, and of actuators so far."""
-    names = session.robot.joint_names
-    joints = dict(zip(names, map(int, session.saturations), strict=True))
-    kinds = {
-        kind: dict(zip(names, map(int, counts), strict=True))
-        for kind, counts in zip(KINDS, session.saturations_by_kind, strict=True)
-    }
-    actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return Saturations(joints, actuators, session.ticks, kinds)
 
 
 class StepLoop:
@@ -224,13 +214,13 @@ class StepLoop:
             try:
                 with self._replanning:
                     plan, now, note = self._measured.plan(step, planned_start, now, planned.grasps)
-                planned = replace(planned, plan=plan)
+                poured = plan.poured or planned.plan.poured  # what the cup should hold, even if that is lost
+                planned = replace(planned, plan=replace(plan, poured=poured, into=plan.into or planned.plan.into))
             except NotPlannable as refusal:
                 self._believed = now
-                why = f" ({'; '.join(differences)})" if differences else ""
                 forced = retry or self._failed or self._guards
-                hint = "" if forced else "; `replan: false` keeps the original plan"
-                return MotionEnd("failed", f"re-planning from the measured state failed{why}: {refusal.cause}{hint}")
+                text = self._measured.refused(planned_start, now, refusal.cause, step, forced=forced)
+                return MotionEnd("failed", text)
             why = "; ".join(differences) or ("retry" if retry else "the previous step failed")
             why += note
             self._event("replanned", planned, "", why)
@@ -241,13 +231,13 @@ class StepLoop:
         except Alarmed as alarm:
             return MotionEnd("failed", f"stopped: {alarm}")
         except SimulationFailed as failure:
-            text = str(failure) + _saturated_since(before, self._session)
+            text = str(failure) + saturated_since(before, self._session)
             self._event("step_ended", planned, "failed", text)
             raise
         if end.outcome == "done":
             return end
         found = "" if replanned or not differences else f"; at its start {'; '.join(differences)}"
-        return MotionEnd(end.outcome, end.text + found + _saturated_since(before, self._session))
+        return MotionEnd(end.outcome, end.text + found + saturated_since(before, self._session))
 
     def _motions(self, step: StepSpec, planned: PlannedStep, before: PlanningState) -> MotionEnd:
         """All motions of the plan, which starts in `before`, and the wait for `until`."""
@@ -280,6 +270,8 @@ class StepLoop:
                 if motion.closes and planned.plan.end.carried is not None:
                     self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
                     self._take(planned.plan.end.carried)
+                    if loose := self._loose(motion, planned.plan.end.carried.body):
+                        return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
@@ -297,6 +289,7 @@ class StepLoop:
         if planned.plan.end.carried is None:
             self._measured.grasp.release()
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
+        left = left or self._without_result(step, planned)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
@@ -315,6 +308,18 @@ class StepLoop:
         """The hand has closed on an object."""
         if self._physics:
             self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
+
+    def _loose(self, motion: Motion, body: str) -> str:
+        """Why the closed hand does not hold an object, up to `SQUEEZED` after it closed; "" where it does."""
+        if not self._physics or motion.grip is None or not motion.grip.must_hold or self._attaching.holding is not None:
+            return ""
+
+        def squeezed(_: object) -> bool:
+            return squeeze_force(self._session.touching, body) >= GRIP_FORCE
+
+        if squeezed(None) or self._executor.wait(squeezed, deadline=self._session.time + SQUEEZED).outcome == "done":
+            return ""
+        return not_squeezed(self._session.touching, body)
 
     def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
         """A failure if the hand does not carry the planned object; None if it does."""
@@ -341,6 +346,15 @@ class StepLoop:
         motion = planner.tool_pose(end).p - planner.tool_pose(before).p
         why = self._measured.grasp.short_of(motion, self._session.engine.read())
         return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
+
+    def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
+        """A failure where an object is not where the step places or pours it; `until` may define another pour."""
+        plan, planner = planned.plan, self._plan.planner
+        if not self._physics or not (plan.placed or plan.poured):
+            return None
+        now = self._measured.situation(replace(plan.end, carried=None))
+        why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
+        return MotionEnd("failed", why) if why else None
 
     def _still_held(self, before: PlanningState) -> str:
         """Which links still hold the object that was carried `before`; "" if it was released."""
@@ -377,9 +391,3 @@ def _no_longer(motion: Motion, probe: Probe | None) -> str:
     """By how much the `until` of a guarded motion fails at rest, after a bounce; "" if it holds."""
     missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
     return f"; at rest {missing}" if missing else ""
-
-
-def _saturated_since(before: Saturations, session: Session) -> str:
-    """The saturations since `before`; "" without any."""
-    saturated = str(saturations_of(session).since(before))
-    return f"; {saturated}" if saturated else ""

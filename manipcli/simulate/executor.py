@@ -14,9 +14,9 @@ from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, wrapped
 from manipcli.model.state import WorldState
-from manipcli.plan.motion import GoalTolerances, Grip, Motion
+from manipcli.plan.motion import OPENING, GoalTolerances, Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import SLOW, Session
 
@@ -27,6 +27,8 @@ Alarm = Callable[[WorldState], str]
 
 UNTIL_TICKS: Final = SLOW
 """Control ticks between two evaluations of an `until`."""
+ARRIVED: Final = 0.05
+"""[rad or m] A joint further than this from the end of its motion has not arrived, whatever its controller says."""
 REST: Final = 0.5
 """[s] Time that the robot holds still after a stop."""
 PATIENCE: Final = 30.0
@@ -121,6 +123,9 @@ class Executor:
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
                 return replace(DONE, text=f"stopped {when}: `until` held")
             if not busy and (awaited is None or holds):
+                far = self._far(motion, state)
+                if far:
+                    return MotionEnd("failed", far)
                 return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
@@ -234,6 +239,26 @@ class Executor:
             widened(trajectory.velocities, rest), widened(trajectory.accelerations, rest),
         )  # fmt: skip
 
+    def _far(self, motion: Motion, state: WorldState) -> str:
+        """Which joint did not arrive, although its controller has no goal tolerance that says so; "" if all did.
+
+        A robot that may touch something in this motion may press on it.
+        """
+        trajectory, robot = motion.trajectory, self._session.robot
+        if trajectory is None or motion.guarded or motion.allowed:
+            return ""
+        away = trajectory.positions[-1] - state.position[robot.indices(trajectory.names)]
+        joints = [robot.joint(name) for name in trajectory.names]
+        errors = [
+            abs(float(wrapped(error)) if joint.type == "continuous" else float(error))
+            for joint, error in zip(joints, away, strict=True)
+        ]
+        far, joint = max(zip(errors, joints, strict=True), key=lambda pair: pair[0])
+        if far <= ARRIVED:
+            return ""
+        limit = f"limit {ARRIVED:g} {joint.unit}; its controller has no closer goal tolerance"
+        return f"joint '{joint.name}' is {far:.3g} {joint.unit} from the end of this motion, {limit}"
+
     def _furthest(self) -> str:
         """Text on the joint with an active goal that is furthest from its reference."""
         active = [
@@ -277,7 +302,8 @@ def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> Motio
         if motion.grip.must_hold and touch and "contact" not in stops and "stalled" not in stops:
             return MotionEnd("failed", f"the hand closed on nothing: {text}")
         if motion.grip.must_arrive and "stalled" in stops:
-            return MotionEnd("failed", f"the hand did not open: {text}")
+            what = "open" if motion.label == OPENING else "reach its target"
+            return MotionEnd("failed", f"the hand did not {what}: {text}")
         weak = motion.grip.force is not None and "stalled" in stops
     return MotionEnd("done", text, weak=weak)
 

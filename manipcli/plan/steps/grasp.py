@@ -27,7 +27,9 @@ DEFAULT_FORCE = 8.0
 class GraspSpec(Model):
     """Close the hand until each finger meets `force`; the object is held by friction, or as the tool states.
 
-    The hand stays closed, even if it met nothing, until `release` or `place` opens it.
+    With an `object` and `until: contact`, it is done when the hand presses on the object from opposite sides with at
+    least 0.1 N; less than `force` is reported. The hand stays closed, even if it met nothing, until `release` or
+    `place` opens it.
     """
 
     object: str | None = Field(None, description="The object to grasp, carried from then on. Default: unknown.")

@@ -30,7 +30,12 @@ _LESS = "lift it less, `by: ...`; or use another grasp: `approach: {yaw: ...}` o
 
 
 class LiftSpec(Model):
-    """Raise a held object straight up, by a height in a range whose middle is tried first."""
+    """Raise a held object straight up, by a height in a range whose middle is tried first.
+
+    This step, like all steps that end with an object in the hand, is done when the hand still presses on the object,
+    and the object has followed at least half of the hand's motion and rotation. It may pivot about the direction in
+    which the fingers close.
+    """
 
     renamed: ClassVar = RENAMED
 

@@ -80,7 +80,9 @@ class RegionSpec(Model):
 class PlaceSpec(Model):
     """Set down a held object: carry it above its place, lower it straight, let go, and withdraw upwards.
 
-    At [x, y] the object is placed upright, even if it was picked lying. The step fails if the hand does not let go.
+    At [x, y] the object is placed upright, even if it was picked lying. The step is done when the hand has let go and
+    withdrawn, and the object is within 1 cm and 10 deg of its place then; rotations about the axis of a round object do
+    not matter.
     """
 
     renamed: ClassVar = {**RENAMED, "on": "onto"}
@@ -244,7 +246,7 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
         X_WT = planner.tool_pose(builder.now)
         builder.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.velocity_scaling, grazing=grazing)
         planned = builder.plan()
-        return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
+        return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}), placed=spec.object)
 
     near = planner.distance(MotionBuilder(planner, state).let_go(spec.posture), spec.object) < CLEARANCE
     withdrawals = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]

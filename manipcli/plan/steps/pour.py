@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar
 
@@ -47,7 +48,11 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class PourSpec(Model):
-    """Carry a held object over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back."""
+    """Carry a held object over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back.
+
+    A pour of more than 90 deg is done when all that was in the object is in the container, or with `until` when that
+    condition holds. A smaller tilt may leave a part in the object.
+    """
 
     renamed: ClassVar = RENAMED
 
@@ -77,7 +82,7 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
-    contents = frozenset(planner.contents(state, spec.object))
+    contents = planner.contents(state, spec.object)
     poured = frozenset((name, spec.into) for name in contents)
 
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
@@ -97,10 +102,11 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         try:
             builder.back("tilt back", emptied=over and bool(poured))
         except NotPlannable as refusal:
-            if not refusal.parts & contents:
+            if not refusal.parts & frozenset(contents):
                 raise
             raise refusal.but(hint="pour from higher, `clearance: ...`: what is poured out is in the way") from refusal
-        return builder.plan()
+        planned = builder.plan()
+        return replace(planned, poured=contents, into=spec.into) if over else planned
 
     ways = itertools.product(spread(spec.clearance), YAWS_DEG, _senses(planner, state, mouth, R_WT))
     options = [

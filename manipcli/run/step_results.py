@@ -1,0 +1,77 @@
+"""What a step must have done besides its motions: whether objects are held, placed or poured in the measured world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import radians
+from typing import Final
+
+from manipcli.core.units import readable
+from manipcli.model.grasp import GRIP_FORCE, pressing
+from manipcli.model.state import Contact
+from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.planner import Planner
+from manipcli.run.replan import between, deg, mm
+
+PLACED: Final = 0.01
+"""[m] A placed object further than this from its planned pose is not placed."""
+RIGHTED: Final = radians(10.0)
+"""[rad] The same for its rotation, without rotations about the axes of a round object."""
+
+
+def not_placed(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
+    """Why the object that a step sets down is not at its place; "" where it is, or where the step places nothing.
+
+    Args:
+        planner: of the task.
+        plan: of the step; its `end` has the planned pose.
+        now: the measured poses of all bodies.
+    """
+    if not plan.placed:
+        return ""
+    name = plan.placed
+    X_WG, X_WO = planner.body_pose(plan.end, name), planner.body_pose(now, name)
+    away, rotation = between(X_WG, X_WO, round_as=planner.scene.body(name).kind)
+    if away <= PLACED and rotation <= RIGHTED:
+        return ""
+    drop = float(X_WG.p[2] - X_WO.p[2])
+    lower = f", {mm(drop)} lower" if drop > PLACED else f", {mm(-drop)} higher" if drop < -PLACED else ""
+    limits = f"limits {mm(PLACED)} and {deg(RIGHTED)}"
+    return f"'{name}' is {mm(away)} and {deg(rotation)} from its place{lower}; {limits}"
+
+
+def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
+    """Which bodies that a step pours are not in the receiving container; "" where all are.
+
+    Args:
+        planner: of the task.
+        plan: of the step.
+        now: the measured poses of all bodies, and what the hand carries.
+    """
+    if not plan.poured:
+        return ""
+    inside = planner.contents(replace(now, carried=None), plan.into)
+    missing = [name for name in plan.poured if name not in inside]
+    if not missing:
+        return ""
+    held = plan.end.carried.body if plan.end.carried is not None else ""
+    kept = set(planner.contents(now, held)) if held else set()
+    where = {name: f"still in '{held}'" if name in kept else f"at {_at(planner, now, name)}" for name in missing}
+    first = missing[0]
+    more = f"; {len(missing)} of {len(plan.poured)} bodies are not" if len(plan.poured) > 1 else ""
+    return f"'{first}' is not in '{plan.into}', it is {where[first]}{more}"
+
+
+def not_squeezed(contacts: Sequence[Contact], body: str) -> str:
+    """Why a closed hand does not hold a body that it does not squeeze."""
+    links = ", ".join(f"'{link}' ({readable(force, 'N')})" for force, link in pressing(contacts, body))
+    if not links:
+        return f"the hand does not hold '{body}': no robot link presses on it"
+    least = f"expected at least {readable(GRIP_FORCE, 'N')} from opposite sides"
+    return f"the hand does not hold '{body}': pressed by {links}, {least}"
+
+
+def _at(planner: Planner, now: PlanningState, name: str) -> str:
+    x, y, z = planner.body_pose(now, name).p
+    return f"[{x:.3f}, {y:.3f}, {z:.3f}] m"
