@@ -64,6 +64,7 @@ class GraspFrames:
         R_WT: (3, 3) present orientation of the tool; grasps near it come first.
         direction: from where the hand comes; None for any.
         yaw: [rad] of the approach; None for any.
+        pitch: [rad] of an approach between side (0) and top (pi / 2), downwards; None for any.
         height: [m] of the tool above the object's bottom; None: its middle, or others.
     """
 
@@ -74,6 +75,7 @@ class GraspFrames:
     direction: Direction | None
     yaw: float | None
     height: float | None
+    pitch: float | None = None
 
     @property
     def bottom(self) -> float:

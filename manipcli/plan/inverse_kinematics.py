@@ -20,24 +20,22 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.linalg import _umath_linalg  # type: ignore[attr-defined, unused-ignore]
 
 from manipcli.core.errors import NotPlannable, RefusalReason
-from manipcli.core.geometry import Array, Transform, cross, frozen, matrix_from_axis_angle
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.text import number_of
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.base_move import base_advice
+from manipcli.plan.pose_error import RESOLUTION, Leaving, Open, PoseTolerance, pose_error
 
 # The kernel of numpy's `solve` without its checks, which cost several times as much; H is positive definite.
 _solve: Any = getattr(_umath_linalg, "solve1", np.linalg.solve)
-
-Open = Literal["nothing", "spin", "rotation"]
-"""The part of the tool's orientation that a goal leaves open: nothing, the rotation about its z axis, or all of it."""
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
@@ -71,11 +69,15 @@ class Solution:
     def converged(self) -> bool:
         return self.position_error <= POSITION_TOLERANCE and self.angle_error <= ANGLE_TOLERANCE
 
-    def explain(self) -> str:
+    def within(self, tolerance: PoseTolerance) -> bool:
+        """Whether it is at most this far from the goal."""
+        return self.position_error <= tolerance.distance and self.angle_error <= tolerance.rotation
+
+    def explain(self, tolerance: PoseTolerance = RESOLUTION) -> str:
         """Why this attempt is not a solution, for a message."""
         away, turned = 1000.0 * self.position_error, math.degrees(self.angle_error)
         if away < 0.05 and turned < 0.05:
-            near = f"{1000.0 * POSITION_TOLERANCE:.2g} mm and {math.degrees(ANGLE_TOLERANCE):.2g} deg"
+            near = f"{1000.0 * tolerance.distance:.2g} mm and {math.degrees(tolerance.rotation):.2g} deg"
             text = f"the nearest pose is {away:.2g} mm and {turned:.2g} deg off, the tolerance is {near}"
             return f"{text}: an arm of few joints cannot reach every orientation"
         text = f"the nearest pose is {away:.1f} mm and {turned:.1f} deg off"
@@ -115,12 +117,23 @@ class InverseKinematics:
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
         self._open: Open = "nothing"
+        self._tolerance = RESOLUTION
+        self._near = False
         self._tries = _TRIES
 
-    def leaving(self, open_: Open) -> InverseKinematics:
-        """The same solver for goals that leave this part of the orientation open."""
+    def leaving(self, open_: Leaving) -> InverseKinematics:
+        """The same solver for goals that leave this part of the orientation open, or that have this tolerance."""
         other = copy(self)
-        other._open = open_
+        if isinstance(open_, PoseTolerance):
+            other._tolerance, other._open = open_, open_.open
+        else:
+            other._open = open_
+        return other
+
+    def of(self, X_LT: Transform) -> InverseKinematics:
+        """The same solver for another frame of its link."""
+        other = copy(self)
+        other._X_LT = X_LT
         return other
 
     @contextmanager
@@ -191,6 +204,9 @@ class InverseKinematics:
                 best = attempt
         if found:
             return min(found, key=lambda solution: float(np.linalg.norm(solution.q - seed))).q
+        tolerated, refusal = self._tolerated(best, X_WT, seed, rng, refuse, refusal)
+        if tolerated is not None:
+            return tolerated
         distance = float(np.linalg.norm(X_WT.p - self._kinematics.robot.X_WB.p))
         place = ", ".join(f"{value:.3f}" for value in X_WT.p)
         rotate = "" if self._open == "rotation" else ", or change the orientation of the tool"
@@ -215,12 +231,32 @@ class InverseKinematics:
             hint += f"; an arm of {few} reaches few orientations: leave it open with `move: {{point: ...}}`"
         nearest = ", ".join(f"{value:.3f}" for value in self.forward(best.q).p)
         raise NotPlannable(
-            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}, "
-            f"with the tool at ({nearest}) m",
+            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: "
+            f"{best.explain(self._tolerance)}, with the tool at ({nearest}) m",
             hint=hint,
             reason=kind,
             remedy=None if distance > _FAR else partial(base_advice, self, X_WT, seed),
         )
+
+    def _tolerated(
+        self,
+        best: Solution,
+        X_WT: Transform,
+        seed: Array,
+        rng: np.random.Generator,
+        refuse: Callable[[Array], object | None] | None,
+        refusal: object | None,
+    ) -> tuple[Array | None, object | None]:
+        """Positions (n) within the tolerance of a goal that none reaches, the `best` ones if they are; else why not."""
+        starts = () if self._tolerance is RESOLUTION else (seed, *self.random_configurations(seed, rng, self._tries))
+        for attempt in (best, *(self.near(X_WT, start) for start in starts)):
+            if attempt.within(self._tolerance):
+                attempt = self._unwound(attempt, seed)
+                reason = None if refuse is None else refuse(attempt.q)
+                if reason is None:
+                    return attempt.q, None
+                refusal = refusal or reason
+        return None, refusal
 
     def random_configurations(self, seed: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
         """`count` copies of `seed` (n), each with the solver's joints uniform inside their limits, drawn as needed."""
@@ -260,6 +296,22 @@ class InverseKinematics:
         error, _, axis_error = self._linearise(X_WT, q)
         return self._solution(q, float(np.linalg.norm(error[:3])), axis_error)
 
+    def near(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
+        """As `track`; where the goal is out of reach, any pose within the tolerance, and else the nearest."""
+        exact = self.track(X_WT, seed)
+        if exact.converged or exact.within(self._tolerance) or self._tolerance is RESOLUTION:
+            return exact
+        forgiving = copy(self)
+        forgiving._near = True
+        found = forgiving.track(X_WT, seed)
+        error, _, angle = self._linearise(X_WT, np.array(found.q))
+        return replace(found, position_error=float(np.linalg.norm(error[:3])), angle_error=angle)
+
+    @property
+    def tolerance(self) -> PoseTolerance:
+        """Of a goal."""
+        return self._tolerance
+
     def unit(self, joint: int) -> str:
         """Unit of the position of the solver's joint with this index."""
         return "rad" if self._turning[joint] else "m"
@@ -291,52 +343,31 @@ class InverseKinematics:
     def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
-        error, angle = _pose_error(X_WT, R, p, self._open)
+        error, free, angle = pose_error(X_WT, R, p, self._open, self._tolerance)
         J = np.asfortranarray(whole[:, self._columns])
-        if self._open == "spin":
-            z = X_WT.R[:, 2]
-            J[3:] -= np.outer(z, z @ J[3:])
+        if free is not None:
+            J[3:] -= np.outer(free, free @ J[3:])
         elif self._open == "rotation":
             J[3:] = 0.0
+        if self._near:
+            _forgive(error[:3], J[:3], self._tolerance.distance - POSITION_TOLERANCE)
+            angle = _forgive(error[3:], J[3:], self._tolerance.rotation - ANGLE_TOLERANCE)
         return error, J, angle
 
 
-def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array, open_: Open) -> tuple[Array, float]:
-    """Pose error (6) in the world, without the part left open, and its angle [rad]."""
-    error = np.zeros(6)
-    error[:3] = X_WG.p - p_WT
-    if open_ == "nothing":
-        error[3:] = rotation_vector(X_WG.R @ R_WT.T)
-    elif open_ == "spin":
-        error[3:] = rotation_vector(pointed(R_WT, X_WG.R[:, 2]) @ R_WT.T)
-    x, y, z = error.tolist()[3:]
-    return error, math.sqrt(x * x + y * y + z * z)
+def _forgive(error: Array, J: Array, tolerance: float) -> float:
+    """Take a `tolerance` off an error (3), in place, and return its new size.
 
-
-def pointed(R: Array, z: Array) -> Array:
-    """R (3, 3) after the smallest rotation that aligns its z axis with the unit vector `z` (3,)."""
-    axis, cosine = cross(R[:, 2], z), float(R[:, 2] @ z)
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return R if cosine > 0.0 else np.column_stack([R[:, 0], -R[:, 1], -R[:, 2]])
-    return np.asarray(matrix_from_axis_angle(axis / sine, math.atan2(sine, cosine)) @ R)
-
-
-def rotation_vector(R: Array) -> Array:
-    """log(R) (3,): axis times angle in [0, pi], of a rotation matrix (3, 3)."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()  # floats of Python: one by one they cost less than numpy's
-    x, y, z = zy - yz, xz - zx, yx - xy
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, 0.5 * (xx + yy + zz - 1.0))
-    if sine > 1e-7:
-        scale = 0.5 * angle / sine
-        return np.array([x * scale, y * scale, z * scale])
-    if angle < 1.0:
-        return np.array([x, y, z]) * 0.5
-    # Near pi the antisymmetric part vanishes; the axis is the largest column of R + I = 2 a a^T, normalised.
-    columns = R + np.eye(3)
-    axis = columns[:, int(np.argmax(np.diag(columns)))]
-    return np.asarray(axis / np.linalg.norm(axis) * angle)
+    Only its size counts then: J (3, m) becomes the part along it, or 0 where nothing is left.
+    """
+    size = float(np.linalg.norm(error))
+    if size <= tolerance:
+        error[:], J[:] = 0.0, 0.0
+        return 0.0
+    along = error / size
+    error *= 1.0 - tolerance / size
+    J[:] = np.outer(along, along @ J)
+    return size - tolerance
 
 
 def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array) -> Array:

@@ -20,13 +20,14 @@ from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
 from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
-from manipcli.plan.inverse_kinematics import InverseKinematics, Open
+from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
+from manipcli.plan.pose_error import Leaving
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import JointTrajectory
@@ -119,7 +120,7 @@ class MotionBuilder:
         hand: str | None = None,
         free: bool = False,
         searched: bool = True,
-        leaving: Open = "nothing",
+        leaving: Leaving = "nothing",
         avoid: Sequence[Array] = (),
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
@@ -162,7 +163,13 @@ class MotionBuilder:
             self.straight(label, X_WT, speed=speed)  # for its refusal
 
     def straight(
-        self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
+        self,
+        label: str,
+        X_WT: Transform,
+        *,
+        speed: float,
+        allowed: Pairs = NOTHING,
+        leaving: Leaving = "nothing",
     ) -> None:
         """Move the tool on a straight line to a pose; part of the orientation may be left open along the whole line.
 
@@ -173,7 +180,7 @@ class MotionBuilder:
             trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
 
-    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Open = "nothing") -> None:
+    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Leaving = "nothing") -> None:
         """Move the tool through near poses, from the present one; part of the orientation may be left open."""
         with self._labelled(label):
             walk = partial(follow_poses, q=self._now.position, poses=poses)
@@ -356,7 +363,7 @@ class MotionBuilder:
             self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)
 
     def _timed(
-        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Leaving = "nothing"
     ) -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
         return timed.tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)

@@ -25,11 +25,11 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
-from manipcli.plan.inverse_kinematics import Open, pointed
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import NOTHING, Planner
+from manipcli.plan.pose_error import Open, pointed
 from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import StepMember
 from manipcli.plan.tool_path import arc, blended
