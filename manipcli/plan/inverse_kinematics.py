@@ -226,7 +226,7 @@ class InverseKinematics:
             hint = f"remove `pointing`: the tool then reaches the point, pointing {off:.0f} deg off"
         elif best.angle_error > _TURNED:
             hint, kind = "change the orientation of the tool: the arm cannot reach it here", "orientation"
-        if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
+        if self.few and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
             hint += f"; an arm of {few} reaches few orientations: leave it open with `move: {{point: ...}}`"
         nearest = ", ".join(f"{value:.3f}" for value in self.forward(best.q).p)
@@ -268,6 +268,11 @@ class InverseKinematics:
             yield start
 
     @property
+    def few(self) -> bool:
+        """Whether there are too few joints for an arbitrary pose."""
+        return len(self.joints) < _ALL
+
+    @property
     def base(self) -> Transform:
         """X_WB."""
         return self._kinematics.robot.X_WB
@@ -295,6 +300,11 @@ class InverseKinematics:
             q[columns] = np.minimum(np.maximum(here + step, lower), upper)
         error, _, axis_error = self._linearise(X_WT, q)
         return self._solution(q, float(np.linalg.norm(error[:3])), axis_error)
+
+    def reaches(self, X_WT: Transform, q: npt.ArrayLike) -> bool:
+        """Whether the tool is at `X_WT` with the joints at `q` (n), within the tolerance."""
+        error, _, angle = self._linearise(X_WT, np.asarray(q, dtype=np.float64))
+        return self._solution(np.array(q), float(np.linalg.norm(error[:3])), angle).within(self._tolerance)
 
     def near(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
         """As `track`; where the goal is out of reach, any pose within the tolerance, and else the nearest."""

@@ -151,7 +151,7 @@ class MotionBuilder:
         search = None if self._now.carried is None else planner.searching(obstructed=False)
         if search is None or line_blocked(planner, self._now, X_WT, self._query()) is None:
             try:
-                return self.straight(label, X_WT, speed=speed)
+                return self._straight_or_yawed(label, X_WT, speed)
             except NotPlannable:
                 if self._now.carried is None or planner.searching() is None:
                     raise
@@ -161,6 +161,23 @@ class MotionBuilder:
             if other.reason == "in_the_way":
                 raise
             self.straight(label, X_WT, speed=speed)  # for its refusal
+
+    def _straight_or_yawed(self, label: str, X_WT: Transform, speed: float) -> None:
+        """On a straight line; an arm of few joints that has another yaw on it than between the poses may use that.
+
+        It must have the yaw of the goal at its end.
+        """
+        solver = self._planner.solver
+        try:
+            return self.straight(label, X_WT, speed=speed)
+        except NotPlannable as refusal:
+            if not solver.few or refusal.reason != "line":
+                raise
+            other = self.copy()
+            other.straight(label, X_WT, speed=speed, leaving="yaw")
+            if not solver.reaches(X_WT, other.now.position):
+                raise
+        self._motions, self._now = other._motions, other._now
 
     def straight(
         self,

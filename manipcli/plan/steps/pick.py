@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar, get_args
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
@@ -28,14 +28,15 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.ranges import Range, spread
+from manipcli.plan.reached_frames import reached_frames
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
-from manipcli.spec.base import Model
-from manipcli.spec.quantity import Length, Turn
+from manipcli.spec.base import Model, problem
+from manipcli.spec.quantity import Angle, Length, Turn
 
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Candidate slopes of the straight approach: along the hand's axis, or from above it, which folds the arm less."""
@@ -77,11 +78,25 @@ class ApproachSpec(Model):
         description="Direction of the approach about the vertical [rad]; from the top: the yaw of the hand. Default: "
         "away from the robot's base; from the top: the yaw of the object, plus quarter turns.",
     )
+    pitch: Annotated[Angle, Field(ge=-math.pi / 2, le=math.pi / 2)] | None = Field(
+        None,
+        description="Angle of the approach below the horizontal, instead of `from` [rad]: 0 is `from: side`, 90 deg is "
+        "`from: top`.",
+    )
     distance: Annotated[Range, Field(description="Length of the straight approach [m].")] = (0.08, 0.14)
+
+    @model_validator(mode="after")
+    def _one(self) -> ApproachSpec:
+        if self.from_ is not None and self.pitch is not None:
+            message = f"`pitch` and `from: {self.from_}` both set the angle of the approach"
+            raise problem("conflict", message, at=("pitch",), hint="remove one of them", key=True)
+        return self
 
     @property
     def direction(self) -> Direction | None:
-        """From where the hand comes; None if not set."""
+        """From where the hand comes; None if not set, or at an angle."""
+        if self.pitch is not None:
+            return {0: "side", 90: "top"}.get(round(math.degrees(self.pitch), 6))
         return "side" if self.from_ is None and self.yaw is not None else self.from_
 
 
@@ -102,7 +117,8 @@ class PickSpec(Model):
     The tool's +z is the direction of approach, its y the direction in which the fingers close. If a later step cannot
     be planned with this grasp, other grasps are tried, as far as `approach` and `height` leave them open: with the hand
     rotated by half a turn, from above, from the other sides, sloping from above, higher and lower, with other rolls of
-    the hand; at a mesh also at opposite points of its surface.
+    the hand; at a mesh also at opposite points of its surface. An arm of four or five joints also tries each pitch
+    between side and top at the yaw that it has there.
     """
 
     renamed: ClassVar = RENAMED
@@ -131,6 +147,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     frames = GraspFrames(
         body, planner.body_pose(state, spec.object), planner.robot.X_WB, planner.tool_pose(state).R,
         direction=spec.approach.direction, yaw=spec.approach.yaw, height=spec.grasp.height,
+        pitch=None if spec.approach.direction is not None else spec.approach.pitch,
     )  # fmt: skip
     usual = frames.usual()
     out_of_reach: dict[GraspFrame, NotPlannable | None] = {}
@@ -219,6 +236,12 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         if not touched() and _beyond(planner, state, usual[0].X_WT):
             return  # no other orientation is nearer
         overlapping = overlaps(planner, state, spec.object, spec.open)
+        reached = reached_frames(frames, planner.solver, state.position, planner.rng)
+        for frame in reached:
+            if overlapping(frame.X_WT):
+                continue
+            for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
+                yield candidate(frame, distance, slope)
         for frame in first_fitting(frames.further(), lambda X_WT: not overlapping(X_WT), FURTHER):
             for distance, slope in _brief(spec.approach.distance):
                 if attempts >= ATTEMPTS:

@@ -112,7 +112,7 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     what = f"cannot place '{spec.object}'"
     if spec.region is None:
         X_WG = _goal(spec, planner, state)
-        return Candidates(_ways(spec, planner, state, X_WG), what=what, decides="place")
+        return Candidates(_at(spec, planner, state, X_WG), what=what, decides="place")
     region = spec.region.box
 
     def in_region() -> Iterator[Candidate]:
@@ -127,8 +127,9 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
             free += 1
             if free > PLACES:
                 return
-            for way in itertools.islice(_ways(spec, planner, state, X_WG), WAYS):
-                yield replace(way, name=f"{where}, {way.name}")
+            for X_WO in _yaws(spec, planner, state, X_WG):
+                for way in itertools.islice(_ways(spec, planner, state, X_WO), WAYS):
+                    yield replace(way, name=f"{where}, {way.name}")
 
     return Candidates(in_region(), what=what, decides="place")
 
@@ -159,6 +160,29 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
         return planner.scene.body(spec.object).X_WO
     assert spec.onto is not None  # `check` asks for it
     return standing(planner, state, spec.object, spec.onto, spec.at, spec.yaw)
+
+
+def _at(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Candidate]:
+    """The ways to set the object down at `X_WG`, then those at the yaw that an arm of few joints has there."""
+    for X_WO in _yaws(spec, planner, state, X_WG):
+        turned = "" if X_WO is X_WG else f"at a yaw of {math.degrees(X_WO.rpy[2]):.0f} deg, "
+        for way in _ways(spec, planner, state, X_WO):
+            yield replace(way, name=turned + way.name)
+
+
+def _yaws(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Transform]:
+    """`X_WG`, and the same pose at the yaw that an arm of few joints has there, if no yaw is stated."""
+    yield X_WG
+    if not planner.solver.few or spec.yaw is not None or (spec.at == "start" and spec.region is None):
+        return
+    carried, tool = state.carried, planner.robot.tool
+    assert carried is not None and tool is not None  # `held` asks for it
+    solver = planner.solver.of(tool.X_LT @ planner.held_in_tool(state)).leaving("yaw")
+    try:
+        q = solver.solve(X_WG, state.position, planner.rng)
+    except NotPlannable:
+        return
+    yield Transform.of(xyz=X_WG.p, R=solver.forward(q).R)
 
 
 def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Candidate]:
