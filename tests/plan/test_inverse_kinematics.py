@@ -95,7 +95,7 @@ def test_a_point_that_is_reached_and_not_in_that_direction_is_told_so(solver: In
     assert refused.value.hint == "remove `pointing`: the tool then reaches the point, pointing 57 deg off"
 
 
-@pytest.mark.parametrize("leaving", ["nothing", "spin", "rotation"])
+@pytest.mark.parametrize("leaving", ["nothing", "spin", "yaw", "rotation"])
 def test_the_jacobian_is_that_of_the_error_at_the_goal(solver: InverseKinematics, middle: Array, leaving: Open) -> None:
     """Central differences of the error; away from the goal the one of a rotation vector is another."""
     own = solver.leaving(leaving)

@@ -1,0 +1,78 @@
+"""Arms of four and five joints pick, carry and place a block: they decide the yaw of the hand, often its pitch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.pipeline import run_task
+from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import plan_task
+
+Write = Callable[..., Path]
+FAR = {"at": (0.4, 0.16), "to": (0.32, -0.2)}
+"""Out of reach from straight above."""
+NEAR = {"at": (0.3, 0.16), "to": (0.25, -0.2)}
+
+
+@pytest.mark.parametrize(("kind", "places"), [("five", FAR), ("four", FAR), ("scara", NEAR)])
+def test_a_block_is_picked_carried_and_placed_in_physics(
+    few_joints: Write, kind: str, places: dict[str, tuple[float, float]], tmp_path: Path
+) -> None:
+    report = run_task(few_joints(kind, **places), log=tmp_path / "run.mcap")
+    assert report.verdict.verdict == "passed", report.verdict
+
+
+@pytest.mark.parametrize("pitch", [20, 60])
+def test_the_hand_comes_at_the_stated_pitch_and_holds_the_block_level(few_joints: Write, pitch: int) -> None:
+    task = load_task(few_joints("five", at=(0.3, 0.1), to=(0.3, -0.1), approach=f"{{pitch: {pitch} deg}}"))
+    pick = plan_task(task).steps[0].plan
+    closes, approach = pick.motions[-1], next(motion for motion in pick.motions if motion.label == "approach")
+    assert closes.begins is not None and approach.begins is not None
+    X_WT = tool(task.robot, closes.begins.position)
+    assert np.degrees(np.arcsin(-X_WT.R[2, 2])) == pytest.approx(pitch, abs=0.1)
+    assert X_WT.R[2, 1] == pytest.approx(0.0, abs=1e-3)
+    before = tool(task.robot, approach.begins.position)
+    away = (before.p - X_WT.p) / np.linalg.norm(before.p - X_WT.p)
+    assert away @ X_WT.R[:, 2] < -0.49  # straight out of the hand, or up to 60 deg above that
+
+
+def tool(robot: RobotModel, q: Array) -> Transform:
+    """X_WT at the positions (n) of all joints."""
+    assert robot.tool is not None
+    return Kinematics(robot).forward(q, robot.tool.link) @ robot.tool.X_LT
+
+
+@pytest.mark.parametrize("kind", ["five", "four"])
+def test_no_yaw_reaches_what_the_open_yaw_does_not(few_joints: Write, kind: str) -> None:
+    """Brute force: the goal at each of 60 yaws, from random starts, with all of its orientation stated."""
+    robot = load_task(few_joints(kind, **FAR)).robot
+    assert robot.tool is not None
+    joints = tuple(name for name in robot.joint_names if name.startswith("joint"))
+    solver = InverseKinematics(Kinematics(robot), joints, robot.tool.link, X_LT=robot.tool.X_LT)
+    rng, home = np.random.default_rng(3), np.zeros(len(robot.joint_names))
+    counted = []
+    for _ in range(12):
+        p, pitch = rng.uniform((0.1, -0.3, 0.0), (0.55, 0.3, 0.4)), rng.uniform(0.0, 1.5)
+        goals = [Transform.of(xyz=p, rpy=(0.0, np.pi / 2 + pitch, yaw)) for yaw in np.linspace(-np.pi, np.pi, 61)]
+        try:
+            q = solver.leaving("yaw").solve(goals[0], home, rng)
+        except NotPlannable:
+            starts = [*solver.random_configurations(home, rng, 2)]
+            assert not any(solver.track(goal, start).converged for goal in goals for start in starts)
+            counted.append(False)
+            continue
+        reached = solver.forward(q)
+        assert np.linalg.norm(reached.p - p) <= 1e-4
+        assert reached.R[2] == pytest.approx(goals[0].R[2], abs=1e-3)  # the same up to a rotation about the vertical
+        assert solver.reaches(reached, solver.solve(reached, home, rng))
+        counted.append(True)
+    assert any(counted) and not all(counted)
