@@ -100,12 +100,14 @@ class GraspFrames:
         )
 
     def pitches(self) -> Iterator[GraspFrame]:
-        """Frames between side and top whose yaw only begins a search, by pitch and by roll of the hand."""
+        """Frames between side and top whose yaw only begins a search, by pitch, height and roll of the hand."""
         straight = {"side": (0.0,), "top": (90.0,), None: STRAIGHT_FIRST_DEG}[self.direction]
         pitches = np.radians(straight) if self.pitch is None else (self.pitch,)
-        for rolls in ((0.0, 180.0), (90.0, -90.0)):
+        shares = HIGHER if self.height is None and self._tall else ()
+        heights = [self._middle, *(self.bottom + share * float(self.body.size[2]) for share in shares)]
+        for rolls, z in itertools.product(((0.0, 180.0), (90.0, -90.0)), heights):
             for pitch in pitches:
-                yield from self._level(self._middle, self._nominal, rolls, float(pitch))
+                yield from self._level(z, self._nominal, rolls, float(pitch))
 
     def further(self) -> Iterator[GraspFrame]:
         """All other frames."""
