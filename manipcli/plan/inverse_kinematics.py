@@ -20,11 +20,9 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numpy.linalg import _umath_linalg  # type: ignore[attr-defined, unused-ignore]
 
 from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Array, Transform, frozen
@@ -32,10 +30,8 @@ from manipcli.core.text import number_of
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.base_move import base_advice
-from manipcli.plan.pose_error import RESOLUTION, Leaving, Open, PoseTolerance, pose_error
-
-# The kernel of numpy's `solve` without its checks, which cost several times as much; H is positive definite.
-_solve: Any = getattr(_umath_linalg, "solve1", np.linalg.solve)
+from manipcli.plan.damped_step import damped_step
+from manipcli.plan.pose_error import RESOLUTION, Leaving, Open, PoseTolerance, forgive, pose_error
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
@@ -218,7 +214,7 @@ class InverseKinematics:
                 parts=getattr(refusal, "parts", frozenset()),
             )
         hint = f"move the goal nearer{rotate}"
-        kind: RefusalReason | None = None
+        kind: RefusalReason = "reach"
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
         elif self._open == "spin" and (alone := self.leaving("rotation").track(X_WT, seed)).converged:
@@ -229,6 +225,8 @@ class InverseKinematics:
         if self.few and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
             hint += f"; an arm of {few} reaches few orientations: leave it open with `move: {{point: ...}}`"
+            if self.leaving("yaw").track(X_WT, best.q).converged:
+                hint += ", or only its yaw, with which it is reached: `tolerance: {about: {axis: [0, 0, 1]}}`"
         nearest = ", ".join(f"{value:.3f}" for value in self.forward(best.q).p)
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: "
@@ -296,7 +294,7 @@ class InverseKinematics:
                 return self._solution(q, position_error, axis_error)
             previous = cost
             here = q[columns]
-            step = _damped_step(J, error, cost + 1e-9, here, lower, upper)
+            step = damped_step(J, error, cost + 1e-9, here, lower, upper)
             q[columns] = np.minimum(np.maximum(here + step, lower), upper)
         error, _, axis_error = self._linearise(X_WT, q)
         return self._solution(q, float(np.linalg.norm(error[:3])), axis_error)
@@ -305,6 +303,14 @@ class InverseKinematics:
         """Whether the tool is at `X_WT` with the joints at `q` (n), within the tolerance."""
         error, _, angle = self._linearise(X_WT, np.asarray(q, dtype=np.float64))
         return self._solution(np.array(q), float(np.linalg.norm(error[:3])), angle).within(self._tolerance)
+
+    def reachable(self, X_WT: Transform, seed: npt.ArrayLike) -> bool:
+        """Whether some joint positions reach `X_WT`, collisions aside; the same answer for the same arguments."""
+        try:
+            self.solve(X_WT, seed, np.random.default_rng(0))
+        except NotPlannable:
+            return False
+        return True
 
     def near(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
         """As `track`; where the goal is out of reach, any pose within the tolerance, and else the nearest."""
@@ -360,52 +366,6 @@ class InverseKinematics:
         elif self._open == "rotation":
             J[3:] = 0.0
         if self._near:
-            _forgive(error[:3], J[:3], self._tolerance.distance - POSITION_TOLERANCE)
-            angle = _forgive(error[3:], J[3:], self._tolerance.rotation - ANGLE_TOLERANCE)
+            forgive(error[:3], J[:3], self._tolerance.distance - POSITION_TOLERANCE)
+            angle = forgive(error[3:], J[3:], self._tolerance.rotation - ANGLE_TOLERANCE)
         return error, J, angle
-
-
-def _forgive(error: Array, J: Array, tolerance: float) -> float:
-    """Take a `tolerance` off an error (3), in place, and return its new size.
-
-    Only its size counts then: J (3, m) becomes the part along it, or 0 where nothing is left.
-    """
-    size = float(np.linalg.norm(error))
-    if size <= tolerance:
-        error[:], J[:] = 0.0, 0.0
-        return 0.0
-    along = error / size
-    error *= 1.0 - tolerance / size
-    J[:] = np.outer(along, along @ J)
-    return size - tolerance
-
-
-def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array) -> Array:
-    """The step dq (m); 0 for joints that are held at their limits."""
-    n = len(q)
-    H = J.T @ J
-    H.flat[:: n + 1] += damping
-    gradient = J.T @ error
-    step: Array = _solve(H, gradient)
-    if not _outward(q, step, lower, upper):
-        return np.asarray(step)
-    held = np.zeros(n, dtype=bool)
-    for _ in range(n):
-        outward = ((q <= lower) & (step < 0.0)) | ((q >= upper) & (step > 0.0))
-        if not outward.any():
-            break
-        held |= outward
-        free = np.flatnonzero(~held)
-        step = np.zeros(n)
-        if not len(free):
-            break
-        step[free] = _solve(H[free[:, None], free], gradient[free])
-    return np.asarray(step)
-
-
-def _outward(q: Array, step: npt.NDArray[np.floating], lower: Array, upper: Array) -> bool:
-    """Whether a joint at its limit would be pushed further out; for a few joints quicker than with arrays."""
-    for x, dx, low, high in zip(q.tolist(), step.tolist(), lower.tolist(), upper.tolist(), strict=True):
-        if (dx < 0.0 and x <= low) or (dx > 0.0 and x >= high):
-            return True
-    return False

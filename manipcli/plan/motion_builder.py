@@ -18,7 +18,7 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
-from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
+from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
 from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limit_check import verify
@@ -68,6 +68,10 @@ class MotionBuilder:
         other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
+
+    def adopt(self, other: MotionBuilder) -> None:
+        """Continue where a copy has led."""
+        self._motions, self._now = other._motions, other._now
 
     def with_body(self, name: str, X_WO: Transform) -> PlanningState:
         """The present state with one body moved to `X_WO`."""
@@ -138,46 +142,9 @@ class MotionBuilder:
         limits = self._limits(solver.joints, speed)
 
         def goals(rng: np.random.Generator) -> Array:
-            return branches(solver, X_WT, goal, rng, query=self._query(), limits=limits)
+            return branches(solver, X_WT, goal, rng, query=self.query(), limits=limits)
 
         self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=X_WT)
-
-    def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
-        """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
-
-        What has contents stays upright there, too, see `motion_constraints`.
-        """
-        planner = self._planner
-        search = None if self._now.carried is None else planner.searching(obstructed=False)
-        if search is None or line_blocked(planner, self._now, X_WT, self._query()) is None:
-            try:
-                return self._straight_or_yawed(label, X_WT, speed)
-            except NotPlannable:
-                if self._now.carried is None or planner.searching() is None:
-                    raise
-        try:
-            self.reach(label, X_WT, speed=speed)
-        except NotPlannable as other:
-            if other.reason == "in_the_way":
-                raise
-            self.straight(label, X_WT, speed=speed)  # for its refusal
-
-    def _straight_or_yawed(self, label: str, X_WT: Transform, speed: float) -> None:
-        """On a straight line; an arm of few joints that has another yaw on it than between the poses may use that.
-
-        It must have the yaw of the goal at its end.
-        """
-        solver = self._planner.solver
-        try:
-            return self.straight(label, X_WT, speed=speed)
-        except NotPlannable as refusal:
-            if not solver.few or refusal.reason != "line":
-                raise
-            other = self.copy()
-            other.straight(label, X_WT, speed=speed, leaving="yaw")
-            if not solver.reaches(X_WT, other.now.position):
-                raise
-        self._motions, self._now = other._motions, other._now
 
     def straight(
         self,
@@ -289,7 +256,7 @@ class MotionBuilder:
             )
         stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
         try:
-            refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), CLOSING, None, stopped)
+            refuse_collision(planner, self._now, self.query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
             raise refusal.but(hint=roomier or None) from refusal
         link = planner.tool_link
@@ -350,10 +317,11 @@ class MotionBuilder:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        refuse = refusing(planner, self._query(), seed, free=free, avoid=avoid)
+        refuse = refusing(planner, self.query(), seed, free=free, avoid=avoid)
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
-    def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
+    def query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
+        """What the next motion must not touch, but for these pairs."""
         return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
@@ -371,7 +339,7 @@ class MotionBuilder:
 
         `line`: the tool pose at the target, if the arm may arrive there in another configuration.
         """
-        query, end = self._query(), self._with(limits.names, target)
+        query, end = self.query(), self._with(limits.names, target)
         with self._labelled(label):
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
         free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
@@ -389,7 +357,7 @@ class MotionBuilder:
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
         """Accept a motion if it is free of collisions."""
-        query, move = self._query(allowed), self._verb == "move"
+        query, move = self.query(allowed), self._verb == "move"
         with tried(*self._motions, Motion(label, trajectory, None, 0.0, begins=self._now)):
             refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         self._accept(label, trajectory, grip, allowed=allowed)

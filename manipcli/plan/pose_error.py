@@ -113,3 +113,18 @@ def rotation_vector(R: Array) -> Array:
     columns = R + np.eye(3)
     axis = columns[:, int(np.argmax(np.diag(columns)))]
     return np.asarray(axis / np.linalg.norm(axis) * angle)
+
+
+def forgive(error: Array, J: Array, tolerance: float) -> float:
+    """Take a `tolerance` off an error (3), in place, and return its new size.
+
+    Only its size counts then: J (3, m) becomes the part along it, or 0 where nothing is left.
+    """
+    size = float(np.linalg.norm(error))
+    if size <= tolerance:
+        error[:], J[:] = 0.0, 0.0
+        return 0.0
+    along = error / size
+    error *= 1.0 - tolerance / size
+    J[:] = np.outer(along, along @ J)
+    return size - tolerance

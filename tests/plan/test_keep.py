@@ -13,6 +13,7 @@ import pytest
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.plan import constrained_motion, kept_path, kept_problem
+from manipcli.plan.carrying import carry
 from manipcli.plan.keep import Kept, reserving
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -235,7 +236,9 @@ def test_a_cup_with_contents_is_carried_upright_around_an_obstacle(bench: Callab
     searching = told.planner.searching_paths()
     assert searching is not None
     builder = MotionBuilder(searching, told.now)
-    builder.carry("carry", Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now), speed=0.5)
+    carry(
+        told.planner, builder, "carry", Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now), speed=0.5
+    )
     (carry,) = builder.plan().motions
     assert carry.label == "carry" and carry.trajectory is not None
     q = np.tile(told.now.position, (len(carry.trajectory.positions), 1))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
@@ -14,6 +15,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.pipeline import run_task
 from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.pose_error import PoseTolerance
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
@@ -55,9 +57,7 @@ def tool(robot: RobotModel, q: Array) -> Transform:
 def test_no_yaw_reaches_what_the_open_yaw_does_not(few_joints: Write, kind: str) -> None:
     """Brute force: the goal at each of 60 yaws, from random starts, with all of its orientation stated."""
     robot = load_task(few_joints(kind, **FAR)).robot
-    assert robot.tool is not None
-    joints = tuple(name for name in robot.joint_names if name.startswith("joint"))
-    solver = InverseKinematics(Kinematics(robot), joints, robot.tool.link, X_LT=robot.tool.X_LT)
+    solver = arm_solver(robot)
     rng, home = np.random.default_rng(3), np.zeros(len(robot.joint_names))
     counted = []
     for _ in range(12):
@@ -76,3 +76,74 @@ def test_no_yaw_reaches_what_the_open_yaw_does_not(few_joints: Write, kind: str)
         assert solver.reaches(reached, solver.solve(reached, home, rng))
         counted.append(True)
     assert any(counted) and not all(counted)
+
+
+@pytest.mark.parametrize(
+    ("distance", "rotation", "axis", "within"),
+    [
+        (0.02, 1e-3, None, 0.0),
+        (1e-4, 0.2, None, 0.0),
+        (0.01, 0.1, None, 0.0),
+        (1e-4, 1e-3, (0.0, 0.0, 1.0), 0.5),
+        (5e-3, 0.05, (0.6, 0.0, 0.8), 3.0),
+    ],
+)
+def test_a_goal_beside_a_reachable_pose_is_reached_within_the_tolerance(
+    few_joints: Write, distance: float, rotation: float, axis: tuple[float, ...] | None, within: float
+) -> None:
+    """The goals are poses of the arm, displaced by up to the tolerance: most of them it cannot reach exactly."""
+    robot = load_task(few_joints("five", **FAR)).robot
+    solver, rng = arm_solver(robot), np.random.default_rng(8)
+    about = None if axis is None else np.array(axis)
+    tolerant = solver.leaving(PoseTolerance(distance, rotation, "nothing", about, within))
+    displaced = 0
+    for start in solver.random_configurations(np.zeros(len(robot.joint_names)), rng, 5):
+        made, away, turn = solver.forward(start), direction(rng), direction(rng)
+        R = Rotation.from_rotvec(0.9 * rotation * turn) * Rotation.from_matrix(made.R)
+        if about is not None:
+            R = Rotation.from_rotvec(rng.uniform(-0.9, 0.9) * within * about) * R
+        goal = Transform.of(xyz=made.p + 0.9 * distance * away, R=R.as_matrix())
+        reached = solver.forward(tolerant.solve(goal, np.zeros(len(robot.joint_names)), rng))
+        assert np.linalg.norm(reached.p - goal.p) <= distance + 1e-9
+        turns = np.linspace(-within, within, 2001)[:, None] * (np.zeros(3) if about is None else about)
+        left = Rotation.from_rotvec(turns) * R * Rotation.from_matrix(reached.R).inv()
+        assert left.magnitude().min() <= rotation + 2e-3 * (about is not None) + 1e-9
+        displaced += not solver.track(goal, start).converged
+    assert displaced >= 2
+
+
+def test_a_tolerance_is_used_by_free_and_linear_moves(few_joints: Write) -> None:
+    path = few_joints("five", **NEAR)
+    pose = "pose: {xyz: [0.3, 0.1, 0.2], rpy: [0, 120 deg, 0]}"
+    vertical = "tolerance: {about: {axis: [0, 0, 1], within: 30 deg}}"
+    path.write_text(
+        "task: move\nrobot: robot.yaml\ncontrollers: controllers.yaml\nstart: home\nsteps:\n"
+        f"  - move: {{{pose}, {vertical}}}\n"
+        f"  - move: {{{pose.replace('0.1, 0.2', '0.05, 0.25')}, {vertical}, path: linear}}\n"
+        f"  - move: {{{pose}, tolerance: {{distance: 5 cm, rotation: 10 deg}}}}\n"
+    )
+    task = load_task(path)
+    ends = [tool(task.robot, step.plan.end.position) for step in plan_task(task).steps]
+    for end, p in zip(ends[:2], [(0.3, 0.1, 0.2), (0.3, 0.05, 0.25)], strict=True):
+        np.testing.assert_allclose(end.p, p, atol=1e-4)
+        assert np.degrees(np.arcsin(-end.R[2, 2])) == pytest.approx(30.0, abs=0.06)
+        assert abs(np.degrees(np.arctan2(end.R[1, 2], end.R[0, 2]))) <= 30.06
+    assert np.linalg.norm(ends[2].p - (0.3, 0.1, 0.2)) <= 0.05
+    left = Rotation.from_euler("y", 120, degrees=True).inv() * Rotation.from_matrix(ends[2].R)
+    assert np.degrees(left.magnitude()) <= 10.0
+    path.write_text(path.read_text().replace("within: 30 deg", "within: 5 deg"))
+    with pytest.raises(NotPlannable, match="the nearest pose is"):
+        plan_task(load_task(path))
+
+
+def direction(rng: np.random.Generator) -> Array:
+    """A random unit vector (3,)."""
+    vector = rng.normal(size=3)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def arm_solver(robot: RobotModel) -> InverseKinematics:
+    """Inverse kinematics of the tool over the joints of the arm."""
+    assert robot.tool is not None
+    joints = tuple(name for name in robot.joint_names if name.startswith("joint"))
+    return InverseKinematics(Kinematics(robot), joints, robot.tool.link, X_LT=robot.tool.X_LT)

@@ -48,6 +48,8 @@ FEW = 8
 """Restarts of the inverse kinematics for a further frame, of which there are many."""
 BRANCHES = 6
 """Maximum number of frames that are tried in another configuration of the arm, if it cannot follow the approach."""
+LEVEL = 1e-6
+"""[rad] A pitch this near to 0 or 90 deg is one from the side or from the top."""
 
 WEAK = 6
 """Grasps that seem unable to hold the weight are tried last, and at once after so many of them."""
@@ -96,7 +98,8 @@ class ApproachSpec(Model):
     def direction(self) -> Direction | None:
         """From where the hand comes; None if not set, or at an angle."""
         if self.pitch is not None:
-            return {0: "side", 90: "top"}.get(round(math.degrees(self.pitch), 6))
+            level, down = abs(self.pitch) < LEVEL, abs(self.pitch - math.pi / 2) < LEVEL
+            return "side" if level else "top" if down else None
         return "side" if self.from_ is None and self.yaw is not None else self.from_
 
 
@@ -155,6 +158,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     unlikely: set[GraspFrame] = set()  # no approach to these was within reach so far
     attempts = 0
     weak: list[Candidate] = []
+    starts: list[tuple[float, Transform]] = []  # of approaches, out of reach
 
     def attempt(frame: GraspFrame, distance: float, slope: float, further: bool, avoid: Array | None) -> StepPlan:
         nonlocal attempts
@@ -179,9 +183,15 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                     hand=spec.open,
                     avoid=() if avoid is None else (avoid,),
                 )
-            except NotPlannable:
+            except NotPlannable as far:
                 unlikely.add(frame)
-                raise
+                if far.reason not in ("reach", "orientation"):
+                    raise
+                starts.append((distance, before_approach))
+                raise far.but(
+                    cause=f"the approach of {readable(distance, 'm')} starts out of reach: {far.cause}",
+                    hint=_shorter(spec.object, distance, before_approach),
+                ) from far
         try:
             builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2)
         except NotPlannable as bent:
@@ -255,10 +265,18 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     def explain(refusal: NotPlannable) -> NotPlannable:
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
-        hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
+        nearer = _shorter(spec.object, *min(starts, key=lambda start: start[0])) if starts else None
+        hints = dict.fromkeys(hint for hint in (amiss or wide, nearer, refusal.hint) if hint is not None)
         return refusal.but(hint="; or ".join(hints) or None)
 
     return Candidates(options(), what=f"cannot pick '{spec.object}'", decides="grasp", explain=explain)
+
+
+def _shorter(body: str, distance: float, X_WT: Transform) -> str:
+    """The hint for an approach that starts out of reach of an arm that reaches the object."""
+    x, y, z = X_WT.p
+    where = f"({x:.3f}, {y:.3f}, {z:.3f}) m, {readable(distance, 'm')} before it"
+    return f"shorten `approach: {{distance: ...}}`: the arm reaches '{body}', but not the start at {where}"
 
 
 def _brief(distance: Range) -> tuple[tuple[float, float], ...]:

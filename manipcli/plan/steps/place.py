@@ -24,6 +24,7 @@ from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
+from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.free_motion import line_blocked
 from manipcli.plan.motion import PlanningState, StepPlan
@@ -59,6 +60,7 @@ _LOWER = (
     "else place it elsewhere, `at: [x, y]`, or rotate it, `yaw: ...`"
 )
 _WITHIN = "place it within reach, `at: [x, y]`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
+_RETREAT = "withdraw the hand less, `retreat: ...`; or place it where the arm has more room, `at: [x, y]`"
 _ROOMIER = "place it where the opening fingers have room, rotate it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
@@ -112,7 +114,8 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     what = f"cannot place '{spec.object}'"
     if spec.region is None:
         X_WG = _goal(spec, planner, state)
-        return Candidates(_at(spec, planner, state, X_WG), what=what, decides="place")
+        explain = partial(_explained, spec, planner, state, X_WG)
+        return Candidates(_at(spec, planner, state, X_WG), what=what, decides="place", explain=explain)
     region = spec.region.box
 
     def in_region() -> Iterator[Candidate]:
@@ -170,6 +173,24 @@ def _at(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform
             yield replace(way, name=turned + way.name)
 
 
+def _explained(
+    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform, refusal: NotPlannable
+) -> NotPlannable:
+    """The refusal, with a hint if the arm reaches the place but not the point from which the object is lowered."""
+    X_OT = planner.held_in_tool(state).inverse()
+    low = spec.clearance[0]
+
+    def reached(height: float) -> bool:
+        goals = [Transform.of(xyz=(0.0, 0.0, height)) @ X_WO @ X_OT for X_WO in _yaws(spec, planner, state, X_WG)]
+        return any(planner.solver.reachable(goal, state.position) for goal in goals)
+
+    if not reached(0.0) or reached(low):
+        return refusal
+    above = f"{readable(low, 'm')} above it"
+    hint = f"lower it from less high, `clearance: ...`: the arm reaches the place, but not the point {above}"
+    return refusal.but(hint=hint if refusal.hint is None else f"{hint}; or {refusal.hint}")
+
+
 def _yaws(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Transform]:
     """`X_WG`, and the same pose at the yaw that an arm of few joints has there, if no yaw is stated."""
     yield X_WG
@@ -219,7 +240,7 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
         X_WT = X_WL @ X_OT
         builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
-            builder.carry("carry", above(X_WL, clearance), speed=spec.velocity_scaling)
+            carry(planner, builder, "carry", above(X_WL, clearance), speed=spec.velocity_scaling)
         support = planner.touching(builder.with_body(spec.object, X_WL), spec.object)
         with _hinted(_LOWER):
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
@@ -238,7 +259,9 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
         with _hinted(_ROOMIER):
             builder.open(spec.posture, must_arrive=True)
         X_WT = planner.tool_pose(builder.now)
-        builder.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.velocity_scaling, grazing=grazing)
+        back = backed_off(X_WT, retreat, slope)
+        with _hinted(None, _RETREAT):
+            builder.withdraw(back, spec.object, speed=spec.velocity_scaling, grazing=grazing)
         planned = builder.plan()
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
@@ -259,12 +282,12 @@ def _name(tilt: float, grazing: bool, clearance: float, retreat: float, slope: f
 
 
 @contextmanager
-def _hinted(hint: str) -> Iterator[None]:
+def _hinted(hint: str | None, line: str = _WITHIN) -> Iterator[None]:
     """Gives refusals inside this hint for a collision, and a hint on reach for an unreachable line."""
     try:
         yield
     except NotPlannable as refusal:
-        better = {"in_the_way": hint, "line": _WITHIN}.get(refusal.reason or "", refusal.hint)
+        better = {"in_the_way": hint or refusal.hint, "line": line}.get(refusal.reason or "", refusal.hint)
         raise refusal.but(hint=better) from refusal
 
 
