@@ -236,13 +236,12 @@ def test_a_cup_with_contents_is_carried_upright_around_an_obstacle(bench: Callab
     searching = told.planner.searching_paths()
     assert searching is not None
     builder = MotionBuilder(searching, told.now)
-    carry(
-        told.planner, builder, "carry", Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now), speed=0.5
-    )
-    (carry,) = builder.plan().motions
-    assert carry.label == "carry" and carry.trajectory is not None
-    q = np.tile(told.now.position, (len(carry.trajectory.positions), 1))
-    q[:, told.robot.indices(carry.trajectory.names)] = carry.trajectory.positions
+    X_WT = Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now)
+    carry(searching, builder, "carry", X_WT, speed=0.5)
+    (moved,) = builder.plan().motions
+    assert moved.label == "carry" and moved.trajectory is not None
+    q = np.tile(told.now.position, (len(moved.trajectory.positions), 1))
+    q[:, told.robot.indices(moved.trajectory.names)] = moved.trajectory.positions
     X_TO = np.linalg.inv(told.tool(told.now.position)) @ told.body("cup").matrix
     X_WO = np.array([told.tool(row) @ X_TO for row in q[::10]])
     assert tilt(X_WO) <= 20.0
