@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from manipcli.core.errors import NotPlannable
+from manipcli.core.errors import InvalidInput, NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
@@ -147,3 +147,30 @@ def arm_solver(robot: RobotModel) -> InverseKinematics:
     assert robot.tool is not None
     joints = tuple(name for name in robot.joint_names if name.startswith("joint"))
     return InverseKinematics(Kinematics(robot), joints, robot.tool.link, X_LT=robot.tool.X_LT)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        (
+            "approach: {}",
+            "approach: {from: top, distance: 40 cm}",
+            "shorten `approach: {distance: ...}`: the arm reaches 'block', but not the start at (0.300, 0.160, 0.420) m",
+        ),
+        ("onto: table", "onto: table, clearance: 50 cm", "`clearance: ...`: the arm reaches the place, but not 500 mm"),
+        ("onto: table", "onto: table, retreat: 50 cm", "withdraw the hand less, `retreat: ...`"),
+    ],
+)
+def test_hints_name_the_field_and_the_point_that_is_out_of_reach(
+    few_joints: Write, old: str, new: str, hint: str
+) -> None:
+    path = few_joints("five", at=(0.3, 0.16), to=(0.3, 0.1))
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(NotPlannable) as refused:
+        plan_task(load_task(path))
+    assert hint in (refused.value.hint or "")
+
+
+def test_a_pitch_and_a_side_are_not_stated_together(few_joints: Write) -> None:
+    with pytest.raises(InvalidInput, match="both set the angle of the approach"):
+        load_task(few_joints("five", **NEAR, approach="{from: top, pitch: 30 deg}"))

@@ -188,8 +188,9 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                 if far.reason not in ("reach", "orientation"):
                     raise
                 starts.append((distance, before_approach))
+                where = f"reach: the approach of {readable(distance, 'm')} starts out of reach: "
                 raise far.but(
-                    cause=f"the approach of {readable(distance, 'm')} starts out of reach: {far.cause}",
+                    cause=where + far.cause.removeprefix("reach: "),
                     hint=_shorter(spec.object, distance, before_approach),
                 ) from far
         try:

@@ -60,7 +60,8 @@ _LOWER = (
     "else place it elsewhere, `at: [x, y]`, or rotate it, `yaw: ...`"
 )
 _WITHIN = "place it within reach, `at: [x, y]`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
-_RETREAT = "withdraw the hand less, `retreat: ...`; or place it where the arm has more room, `at: [x, y]`"
+_LOWER_FROM = "lower it from less high, `clearance: ...`: the arm reaches the place, but not {}"
+_RETREAT = "withdraw the hand less, `retreat: ...`"
 _ROOMIER = "place it where the opening fingers have room, rotate it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
@@ -114,8 +115,9 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     what = f"cannot place '{spec.object}'"
     if spec.region is None:
         X_WG = _goal(spec, planner, state)
-        explain = partial(_explained, spec, planner, state, X_WG)
-        return Candidates(_at(spec, planner, state, X_WG), what=what, decides="place", explain=explain)
+        held_back: list[NotPlannable] = []
+        explain = partial(_explained, spec, planner, state, X_WG, held_back)
+        return Candidates(_at(spec, planner, state, X_WG, held_back), what=what, decides="place", explain=explain)
     region = spec.region.box
 
     def in_region() -> Iterator[Candidate]:
@@ -131,7 +133,7 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
             if free > PLACES:
                 return
             for X_WO in _yaws(spec, planner, state, X_WG):
-                for way in itertools.islice(_ways(spec, planner, state, X_WO), WAYS):
+                for way in itertools.islice(_ways(spec, planner, state, X_WO, []), WAYS):
                     yield replace(way, name=f"{where}, {way.name}")
 
     return Candidates(in_region(), what=what, decides="place")
@@ -165,30 +167,36 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     return standing(planner, state, spec.object, spec.onto, spec.at, spec.yaw)
 
 
-def _at(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Candidate]:
+def _at(
+    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform, held_back: list[NotPlannable]
+) -> Iterator[Candidate]:
     """The ways to set the object down at `X_WG`, then those at the yaw that an arm of few joints has there."""
     for X_WO in _yaws(spec, planner, state, X_WG):
         turned = "" if X_WO is X_WG else f"at a yaw of {math.degrees(X_WO.rpy[2]):.0f} deg, "
-        for way in _ways(spec, planner, state, X_WO):
+        for way in _ways(spec, planner, state, X_WO, held_back):
             yield replace(way, name=turned + way.name)
 
 
 def _explained(
-    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform, refusal: NotPlannable
+    spec: PlaceSpec,
+    planner: Planner,
+    state: PlanningState,
+    X_WG: Transform,
+    held_back: list[NotPlannable],
+    refusal: NotPlannable,
 ) -> NotPlannable:
-    """The refusal, with a hint if the arm reaches the place but not the point from which the object is lowered."""
+    """The refusal, with hints if the arm reaches the place but not a point above it, or cannot withdraw from it."""
     X_OT = planner.held_in_tool(state).inverse()
-    low = spec.clearance[0]
 
     def reached(height: float) -> bool:
         goals = [Transform.of(xyz=(0.0, 0.0, height)) @ X_WO @ X_OT for X_WO in _yaws(spec, planner, state, X_WG)]
         return any(planner.solver.reachable(goal, state.position) for goal in goals)
 
-    if not reached(0.0) or reached(low):
-        return refusal
-    above = f"{readable(low, 'm')} above it"
-    hint = f"lower it from less high, `clearance: ...`: the arm reaches the place, but not the point {above}"
-    return refusal.but(hint=hint if refusal.hint is None else f"{hint}; or {refusal.hint}")
+    hints = [_RETREAT] if held_back else []
+    high = next((height for height in spread(spec.clearance) if not reached(height)), None)
+    if high is not None and reached(0.0):
+        hints.insert(0, _LOWER_FROM.format(f"{readable(high, 'm')} above it"))
+    return refusal.but(hint="; or ".join(dict.fromkeys([*hints, *filter(None, [refusal.hint])])) or None)
 
 
 def _yaws(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Transform]:
@@ -206,10 +214,13 @@ def _yaws(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
     yield Transform.of(xyz=X_WG.p, R=solver.forward(q).R)
 
 
-def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Candidate]:
+def _ways(
+    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform, held_back: list[NotPlannable]
+) -> Iterator[Candidate]:
     """The ways to set the object down at `X_WG`.
 
-    The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
+    The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`. Withdrawals that the arm cannot follow are
+    appended to `held_back`.
 
     Paths on which the hand withdraws clear of the object are tried first, then those on which it may graze it; only the
     latter if the open hand is too near to it anyway, as around an object that sits deep in the hand. If the arm comes
@@ -260,8 +271,13 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
             builder.open(spec.posture, must_arrive=True)
         X_WT = planner.tool_pose(builder.now)
         back = backed_off(X_WT, retreat, slope)
-        with _hinted(None, _RETREAT):
+        try:
             builder.withdraw(back, spec.object, speed=spec.velocity_scaling, grazing=grazing)
+        except NotPlannable as refusal:
+            if refusal.reason != "line":
+                raise
+            held_back.append(refusal)
+            raise refusal.but(hint=_RETREAT) from refusal
         planned = builder.plan()
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
@@ -282,12 +298,12 @@ def _name(tilt: float, grazing: bool, clearance: float, retreat: float, slope: f
 
 
 @contextmanager
-def _hinted(hint: str | None, line: str = _WITHIN) -> Iterator[None]:
+def _hinted(hint: str) -> Iterator[None]:
     """Gives refusals inside this hint for a collision, and a hint on reach for an unreachable line."""
     try:
         yield
     except NotPlannable as refusal:
-        better = {"in_the_way": hint or refusal.hint, "line": line}.get(refusal.reason or "", refusal.hint)
+        better = {"in_the_way": hint, "line": _WITHIN}.get(refusal.reason or "", refusal.hint)
         raise refusal.but(hint=better) from refusal
 
 
