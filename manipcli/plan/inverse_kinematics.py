@@ -110,6 +110,12 @@ class InverseKinematics:
         adjacent = self.columns == tuple(range(first, first + len(self.columns)))
         # A slice of adjacent joints costs a fraction of an array of their indices.
         self._columns = slice(first, first + len(self.columns)) if adjacent else np.array(self.columns, dtype=np.intp)
+        # Joints of the chain that mimic the solver's: index among all joints, leader, multiplier, offset.
+        self._followers = tuple(
+            (k, self.joints.index(joint.mimic.joint), joint.mimic.multiplier, joint.mimic.offset)
+            for k, joint in enumerate(robot.moving_joints)
+            if joint.mimic is not None and joint.mimic.joint in self.joints and link in robot.descendants(joint.child)
+        )
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
         self._open: Open = "nothing"
@@ -279,7 +285,7 @@ class InverseKinematics:
         """One attempt from `seed` (n), without restarts, for the next point of a path."""
         q = np.array(seed, dtype=np.float64)
         columns, lower, upper = self._columns, self._lower, self._upper
-        q[columns] = np.minimum(np.maximum(q[columns], lower), upper)
+        self._put(q, np.minimum(np.maximum(q[columns], lower), upper))
         previous = math.inf
         stalled = 0
         for _ in range(_ITERATIONS):
@@ -295,7 +301,7 @@ class InverseKinematics:
             previous = cost
             here = q[columns]
             step = damped_step(J, error, cost + 1e-9, here, lower, upper)
-            q[columns] = np.minimum(np.maximum(here + step, lower), upper)
+            self._put(q, np.minimum(np.maximum(here + step, lower), upper))
         error, _, axis_error = self._linearise(X_WT, q)
         return self._solution(q, float(np.linalg.norm(error[:3])), axis_error)
 
@@ -338,8 +344,21 @@ class InverseKinematics:
 
     def least_singular_value(self, q: npt.ArrayLike) -> float:
         """Of the tool's Jacobian over the solver's joints at `q` (n); metres and radians weighed alike."""
-        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
+        J = self._own(self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT))
         return float(np.linalg.svd(J, compute_uv=False)[-1])
+
+    def _put(self, q: Array, values: Array) -> None:
+        """Write the solver's joints (m), and those that mimic them, into q (n)."""
+        q[self._columns] = values
+        for k, leader, multiplier, offset in self._followers:
+            q[k] = multiplier * values[leader] + offset
+
+    def _own(self, whole: Array) -> Array:
+        """(6, m) The Jacobian over the solver's joints, with what mimics them, of that over all joints (6, n)."""
+        J = np.asfortranarray(whole[:, self._columns])
+        for k, leader, multiplier, _ in self._followers:
+            J[:, leader] += multiplier * whole[:, k]
+        return J
 
     def _solution(self, q: Array, position_error: float, angle_error: float) -> Solution:
         here = q[self._columns]
@@ -353,14 +372,14 @@ class InverseKinematics:
         turned = here - 2.0 * np.pi * np.round((here - seed[self._columns]) / (2.0 * np.pi))
         inside = self._turning & (turned >= self._lower) & (turned <= self._upper)
         q = np.array(solution.q)
-        q[self._columns] = np.where(inside, turned, here)
+        self._put(q, np.where(inside, turned, here))
         return replace(solution, q=frozen(q))
 
     def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
         error, free, angle = pose_error(X_WT, R, p, self._open, self._tolerance)
-        J = np.asfortranarray(whole[:, self._columns])
+        J = self._own(whole)
         if free is not None:
             J[3:] -= np.outer(free, free @ J[3:])
         elif self._open == "rotation":

@@ -21,6 +21,14 @@ _WRIST: Final = ("revolute", "0 1 0", (0.0, 0.0, 0.2), 2.2)
 ARMS: Final[dict[str, tuple[Row, ...]]] = {
     "five": (_TURN, _SHOULDER, _ELBOW, _WRIST, ("revolute", "0 0 1", (0.0, 0.0, 0.04), 2.9)),
     "four": (_TURN, _SHOULDER, _ELBOW, _WRIST),
+    "palletizer": (
+        _TURN,
+        _SHOULDER,
+        ("mimic joint_2", "0 1 0", (0.0, 0.0, 0.2), 2.0),
+        ("revolute", "0 1 0", (0.0, 0.0, 0.03), 2.6),
+        ("mimic joint_4", "0 1 0", (0.0, 0.0, 0.2), 2.6),
+        ("revolute", "0 0 1", (0.03, 0.0, 0.0), 2.9),
+    ),
     "scara": (
         ("revolute", "0 0 1", (0.0, 0.0, 0.26), 2.9),
         ("revolute", "0 0 1", (0.2, 0.0, 0.0), 2.6),
@@ -28,15 +36,18 @@ ARMS: Final[dict[str, tuple[Row, ...]]] = {
         ("revolute", "0 0 1", (0.0, 0.0, -0.06), 2.9),
     ),
 }
-"""The first two are upright in their zero pose, the last points its hand down."""
+"""The first two are upright in their zero pose; the others always point the hand down. A joint `mimic JOINT` turns
+against that joint, as the rods of a palletizer do."""
 HOME: Final = {
     "five": [0.0, 0.0, 1.57, 1.57, 0.0],
     "four": [0.0, 0.0, 1.57, 1.57],
+    "palletizer": [0.0, -0.3, 1.6, 0.0],
     "scara": [-0.6, 1.2, 0.05, 0.0],
 }
 STIFFNESS: Final = {
     "five": (120.0, 120.0, 60.0, 20.0, 3.0),
     "four": (120.0, 120.0, 60.0, 20.0),
+    "palletizer": (120.0, 120.0, 60.0, 3.0),
     "scara": (120.0, 60.0, 2000.0, 3.0),
 }
 """[N m/rad or N/m] Of the joints, from the base."""
@@ -64,12 +75,12 @@ expect:
 def write_arm(folder: Path, kind: str) -> None:
     """`arm.urdf`, `robot.yaml` and `controllers.yaml` of one of `ARMS`."""
     rows = ARMS[kind]
-    names = [f"joint_{k}" for k in range(1, len(rows) + 1)]
-    down = -1.0 if kind == "scara" else 1.0
+    names = [f"joint_{k}" for k, row in enumerate(rows, start=1) if not row[0].startswith("mimic")]
+    down = -1.0 if kind in ("palletizer", "scara") else 1.0
     parts = [_link("base", (0.0, 0.0, 0.04), 1.0, 0.1)]
     for k, (type_, axis, at, half) in enumerate(rows, start=1):
         ahead = rows[k][2] if k < len(rows) else (0.0, 0.0, down * HAND)
-        parts.append(_joint(names[k - 1], type_, f"link_{k - 1}" if k > 1 else "base", f"link_{k}", axis, at, half))
+        parts.append(_joint(f"joint_{k}", type_, f"link_{k - 1}" if k > 1 else "base", f"link_{k}", axis, at, half))
         parts.append(_link(f"link_{k}", ahead, 0.2))
     last = f"link_{len(rows)}"
     for side, sign in (("left", 1), ("right", -1)):
@@ -88,7 +99,8 @@ def write_arm(folder: Path, kind: str) -> None:
             "closed": {"hand": [0.0, 0.0]},
         },
         "tool": {"link": last, "pose": {"xyz": [0, 0, down * (HAND + 0.04)], "rpy": [math.acos(down), 0, 0]}},
-        "limits": {name: {"acceleration": 8} for name in names} | {name: {"acceleration": 2} for name in hand},
+        "limits": {f"joint_{k + 1}": {"acceleration": 8} for k in range(len(rows))}
+        | {name: {"acceleration": 2} for name in hand},
     }
     controllers = {
         "arm_controller": {
@@ -139,10 +151,13 @@ def _link(name: str, ahead: tuple[float, float, float], mass: float, thick: floa
 def _joint(
     name: str, type_: str, parent: str, child: str, axis: str, at: tuple[float, float, float], half: float
 ) -> str:
+    leader = type_.removeprefix("mimic ") if type_.startswith("mimic") else ""
+    mimic = f'<mimic joint="{leader}" multiplier="-1"/>' if leader else ""
+    type_ = "revolute" if leader else type_
     lower = 0.0 if name.startswith("finger") else -half
     xyz = " ".join(f"{value:g}" for value in at)
     return (
         f' <joint name="{name}" type="{type_}">\n  <parent link="{parent}"/><child link="{child}"/>\n'
         f'  <origin xyz="{xyz}"/><axis xyz="{axis}"/>\n'
-        f'  <limit lower="{lower}" upper="{half}" velocity="2" effort="40"/>\n </joint>\n'
+        f'  <limit lower="{lower}" upper="{half}" velocity="2" effort="40"/>{mimic}\n </joint>\n'
     )

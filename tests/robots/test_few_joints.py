@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from manipcli.core.errors import InvalidInput, NotPlannable
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.configuration import with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.pipeline import run_task
@@ -25,7 +26,7 @@ FAR = {"at": (0.4, 0.16), "to": (0.32, -0.2)}
 NEAR = {"at": (0.3, 0.16), "to": (0.25, -0.2)}
 
 
-@pytest.mark.parametrize(("kind", "places"), [("five", FAR), ("four", FAR), ("scara", NEAR)])
+@pytest.mark.parametrize(("kind", "places"), [("five", FAR), ("four", FAR), ("palletizer", NEAR), ("scara", NEAR)])
 def test_a_block_is_picked_carried_and_placed_in_physics(
     few_joints: Write, kind: str, places: dict[str, tuple[float, float]], tmp_path: Path
 ) -> None:
@@ -155,7 +156,7 @@ def arm_solver(robot: RobotModel) -> InverseKinematics:
         (
             "approach: {}",
             "approach: {from: top, distance: 40 cm}",
-            "shorten `approach: {distance: ...}`: the arm reaches 'block', but not the start at (0.300, 0.160, 0.420) m",
+            "shorten `approach: {distance: ...}`: the arm reaches 'block', but not the start at (0.300, 0.160, 0.420)",
         ),
         ("onto: table", "onto: table, clearance: 50 cm", "`clearance: ...`: the arm reaches the place, but not 500 mm"),
         ("onto: table", "onto: table, retreat: 50 cm", "withdraw the hand less, `retreat: ...`"),
@@ -174,3 +175,23 @@ def test_hints_name_the_field_and_the_point_that_is_out_of_reach(
 def test_a_pitch_and_a_side_are_not_stated_together(few_joints: Write) -> None:
     with pytest.raises(InvalidInput, match="both set the angle of the approach"):
         load_task(few_joints("five", **NEAR, approach="{from: top, pitch: 30 deg}"))
+
+
+def test_joints_that_mimic_those_of_the_arm_follow_in_every_solution(few_joints: Write) -> None:
+    """The Jacobian is checked by central differences over the leading joints, the mimics at their multiple of these."""
+    robot = load_task(few_joints("palletizer", **NEAR)).robot
+    leaders = [joint.name for joint in robot.moving_joints if joint.name.startswith("joint") and joint.mimic is None]
+    assert robot.tool is not None
+    solver = InverseKinematics(Kinematics(robot), leaders, robot.tool.link, X_LT=robot.tool.X_LT)
+    goal = Transform.of(xyz=(0.3, 0.1, 0.1), rpy=(np.pi, 0.0, 0.4))
+    q = solver.solve(goal, np.zeros(len(robot.joint_names)), np.random.default_rng(2))
+    np.testing.assert_array_equal(with_mimics(robot, q), q)
+    reached = solver.forward(q)
+    np.testing.assert_allclose(reached.p, goal.p, atol=1e-5)
+    np.testing.assert_allclose(reached.R, goal.R, atol=1e-4)
+    _, J, _ = solver._linearise(reached, q)
+    for k, column in enumerate(solver.columns):
+        ahead, behind = np.array(q), np.array(q)
+        ahead[column], behind[column] = q[column] + 1e-6, q[column] - 1e-6
+        moved = solver.forward(with_mimics(robot, ahead)).p - solver.forward(with_mimics(robot, behind)).p
+        np.testing.assert_allclose(moved / 2e-6, J[:3, k], atol=1e-6)

@@ -99,7 +99,11 @@ class PlaceSpec(Model):
         None,
         description="Where on the body `onto` it may stand, instead of `at`; the nearest to its centre is tried first.",
     )
-    yaw: Turn | None = Field(None, description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held.")
+    yaw: Turn | None = Field(
+        None,
+        description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held, or as an arm of few joints "
+        "can reach.",
+    )
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The named pose to which the hand opens.")
