@@ -154,8 +154,8 @@ def arm_solver(robot: RobotModel) -> InverseKinematics:
     ("old", "new", "hint"),
     [
         (
-            "approach: {}",
-            "approach: {from: top, distance: 40 cm}",
+            "approach: {from: top, yaw: 0}",
+            "approach: {from: top, yaw: 0, distance: 40 cm}",
             "shorten `approach: {distance: ...}`: the arm reaches 'block', but not the start at (0.300, 0.160, 0.420)",
         ),
         ("onto: table", "onto: table, clearance: 50 cm", "`clearance: ...`: the arm reaches the place, but not 500 mm"),
@@ -165,8 +165,8 @@ def arm_solver(robot: RobotModel) -> InverseKinematics:
 def test_hints_name_the_field_and_the_point_that_is_out_of_reach(
     few_joints: Write, old: str, new: str, hint: str
 ) -> None:
-    path = few_joints("five", at=(0.3, 0.16), to=(0.3, 0.1))
-    path.write_text(path.read_text().replace(old, new))
+    path = few_joints("five", at=(0.3, 0.16), to=(0.3, 0.1), approach="{from: top, yaw: 0}")
+    path.write_text("planner: {samples: 0}\n" + path.read_text().replace(old, new))
     with pytest.raises(NotPlannable) as refused:
         plan_task(load_task(path))
     assert hint in (refused.value.hint or "")
