@@ -25,6 +25,7 @@ from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
+from manipcli.spec.inertials import EstimateSpec, InertialsSpec, LinkInertialSpec
 from manipcli.spec.plan import PlanSpec
 from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Unit
@@ -66,6 +67,9 @@ ELSEWHERE: dict[type, str] = {
     TransmissionSpec: "[transmissions](robot.md#transmissions-and-actuators)",
     ActuatorSpec: "[actuators](robot.md#transmissions-and-actuators)",
     AttachSpec: "[mappings](robot.md#attach)",
+    InertialsSpec: "`estimate`, or a [mapping](robot.md#inertials)",
+    EstimateSpec: "a mapping",
+    LinkInertialSpec: "mappings",
     GainsSpec: "[gains](controllers.md#gains)",
     ConstraintsSpec: "a [mapping](controllers.md#constraints)",
 }
@@ -215,6 +219,8 @@ def _default(value: object, unit: str) -> str:
         return f"`{str(value).lower() if isinstance(value, bool) else value}`"
     if isinstance(value, tuple) and value:
         return f"`[{', '.join(_default(one, unit).strip('`') for one in value)}]`"
+    if isinstance(value, int | float) and not unit:
+        return f"`{value:g}`"
     return f"`{readable(value, unit)}`" if isinstance(value, int | float) else "-"
 
 

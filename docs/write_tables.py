@@ -24,13 +24,13 @@ from manipcli.control.controller import ControllerMember
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.plan.path_planners import PATH_PLANNERS
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec import agree, baseline, clearance, controllers, plan, reactions, robot, task, vary
+from manipcli.spec import agree, baseline, clearance, controllers, inertials, plan, reactions, robot, task, vary
 from manipcli.spec.base import about
 from manipcli.spec.controllers import ControllerSpec, GainsSpec
 from manipcli.task.vocabulary import task_spec
 
 PAGES: Final = tuple(Path(__file__).with_name(name) for name in ("task.md", "robot.md", "controllers.md"))
-_MODULES: Final = (task, clearance, robot, controllers, reactions, vary, baseline, agree, plan)
+_MODULES: Final = (task, clearance, robot, controllers, reactions, vary, baseline, agree, plan, inertials)
 _TABLE: Final = re.compile(r"(<!-- fields of (\w+) -->\n)(?:\|.*\n)*")
 _TYPES: Final = re.compile(r"(<!-- types of controllers -->\n)(?:\|.*\n)*")
 _SECTIONS: Final = re.compile(r"(<!-- begin of controllers -->\n).*(<!-- end of controllers -->)", re.DOTALL)

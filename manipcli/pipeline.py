@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Unpack
 
-from manipcli.core.errors import Diagnostic, NotPlannable
+from manipcli.core.errors import Diagnostic, InvalidInput, NotPlannable
 from manipcli.core.stopwatch import timed
 from manipcli.judge.agreement import compare
 from manipcli.judge.measured_run import Variant
@@ -22,7 +22,7 @@ from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import LinkInertial, RobotModel
 from manipcli.model.self_collision import SelfCollisionMatrix
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
@@ -31,14 +31,16 @@ from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.logs.verification import Verification
+from manipcli.report.ros2.files import robot_files, task_files
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
 from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
-from manipcli.task.controller_rows import controllers_of
-from manipcli.task.load_task import LoadOptions, load_task
+from manipcli.spec.simulation import SimulationSpec
+from manipcli.task.controller_rows import checked_controllers, controllers_of
+from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
 from manipcli.task.task import Task
@@ -52,6 +54,7 @@ __all__ = [
     "check_files",
     "compare_runs",
     "controllers_of",
+    "inertials",
     "judge_log",
     "kind_of",
     "load_sight",
@@ -59,6 +62,7 @@ __all__ = [
     "meanings",
     "plan_task",
     "refused",
+    "ros2_files",
     "run_task",
     "schema",
     "self_collisions",
@@ -67,6 +71,17 @@ __all__ = [
     "verify_log",
     "words",
 ]
+
+
+def inertials(
+    path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> tuple[LinkInertial, ...]:
+    """Where the inertials of a robot file's links come from, if not from its description.
+
+    Raises:
+        InvalidInput: all errors of the file.
+    """
+    return load_sight(path, package_path=package_path, allow_outside=allow_outside).robot.inertials
 
 
 def self_collisions(
@@ -79,6 +94,39 @@ def self_collisions(
     """
     robot = load_sight(path, package_path=package_path, allow_outside=allow_outside).robot
     return robot, self_collision_matrix(robot)
+
+
+def ros2_files(
+    path: Path, *, controllers: Path | None = None, **options: Unpack[FileOptions]
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """A robot file, a description or a planned task as files for ROS 2: texts by path, and notes on what differs.
+
+    Args:
+        path: the file.
+        controllers: controllers file of a robot; a task names its own.
+        options: how the files are read.
+
+    Raises:
+        InvalidInput: all errors of the files.
+        NotPlannable: a step of the task has no plan.
+    """
+    kind = kind_of(path)
+    if kind == "task":
+        if controllers is not None:
+            raise InvalidInput([Diagnostic("USE091", f"task '{path}' names its controllers: remove --controllers")])
+        task = load_task(path, **options)
+        return task_files(task, plan_task(task), self_collision_matrix(task.robot))
+    if kind == "controllers":
+        message = f"'{path}' is a controllers file; expected a robot or a task"
+        raise InvalidInput([Diagnostic("USE091", message, hint="give the task that uses it")])
+    if options.get("overrides") or options.get("seed") is not None:
+        raise InvalidInput([Diagnostic("USE091", f"--set and --seed need a task; '{path}' is not one")])
+    sight = load_sight(
+        path, package_path=options.get("package_path", ()), allow_outside=options.get("allow_outside", False)
+    )
+    period = SimulationSpec().control_period
+    spec = None if controllers is None else checked_controllers(controllers, sight.robot, period)
+    return robot_files(sight.robot, sight.q, self_collision_matrix(sight.robot), spec, period=period)
 
 
 def run_task(

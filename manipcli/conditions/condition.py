@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from manipcli.conditions.robustness import Robustness
 from manipcli.conditions.state_window import StateWindow
-from manipcli.core.errors import Loc
+from manipcli.core.errors import Loc, Severity
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -95,12 +95,14 @@ class Problem:
         message: what is wrong.
         hint: what to write instead, for example the nearest name.
         code: only for problems with a code of their own.
+        severity: `warning` only for problems of controllers.
     """
 
     loc: Loc
     message: str
     hint: str | None = None
     code: str = ""
+    severity: Severity = "error"
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +149,15 @@ def untouchable(world: World) -> str | None:
     if not world.physics:
         return "the engine has no physics, so there are no contacts"
     return world.unrecorded.get("contacts")
+
+
+def unpinched(context: CheckContext, condition: str) -> tuple[Problem, ...]:
+    """A problem for a robot that holds by an attachment: no fingers pinch the object, so the condition never holds."""
+    holding = context.robot.holding
+    if holding is None:
+        return ()
+    message = f"`{condition}` needs two fingers that press: '{context.robot.name}' holds by {holding.kind}"
+    return (Problem((), message, "ask where the object is: `above`, `near`"),)
 
 
 def effortless(world: World) -> str | None:

@@ -14,7 +14,8 @@ from manipcli.control.limit_laws import limit_acceleration, limit_effort, limit_
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Pid
-from manipcli.control.trajectory_goal import JointTolerance, TrajectoryGoal
+from manipcli.control.trajectory_goal import TrajectoryGoal
+from manipcli.plan.motion import JointTolerance
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, JointConstraintSpec
 

@@ -42,6 +42,16 @@ class GoalRejected(InvalidArgument):
         self.error_code = error_code
 
 
+def refuse_inactive(controller: str, accepts_goals: bool) -> None:
+    """
+    Raises:
+        GoalRejected: the controller is inactive.
+    """
+    if not accepts_goals:
+        hint = "activate it first: `switch_controllers` in a task, `manager.switch(activate=...)` in Python"
+        raise GoalRejected("CTRL122", f"controller '{controller}' is not active and accepts no goals", hint=hint)
+
+
 @dataclass(frozen=True, slots=True)
 class GoalResult:
     """How a goal ended: code, a text that names joint, value, limit and time, and the `time` [s].

@@ -12,10 +12,11 @@ import numpy as np
 
 from manipcli.control.action import ErrorCode, GoalHandle
 from manipcli.control.active_trajectory import INSTANT
-from manipcli.control.trajectory_goal import JointFacts, JointTolerance, TrajectoryGoal
+from manipcli.control.trajectory_goal import JointFacts, TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
+from manipcli.plan.motion import JointTolerance
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
 
@@ -165,6 +166,7 @@ class ActiveGoal:
         controller: name, for texts.
         timeout: [s] after its end, when it is aborted.
         begin: [s] of its time 0 in the clock of the active trajectory, once it is followed.
+        unchecked: whether its way from the measured state is not checked yet, because that was unknown.
     """
 
     controller: str
@@ -175,6 +177,7 @@ class ActiveGoal:
     start_time: float
     timeout: float
     begin: float = 0.0
+    unchecked: bool = False
     _before: tuple[float, Array] | None = None
     _now: tuple[float, Array] | None = None
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from manipcli.control.chain import resources
 from manipcli.control.command import may_go_together
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import did_you_mean, listed
@@ -34,7 +35,7 @@ class Claims:
         """The claims of these controllers; of two that claim the same, the first owns it."""
         owners: dict[tuple[str, Interface], str] = {}
         for controller in controllers:
-            for joint in controller.joints:
+            for joint in resources(controller):
                 for interface in controller.interfaces:
                     owners.setdefault((joint, interface), controller.name)
         return Claims(owners)
@@ -63,8 +64,8 @@ def conflicts(
     twice: dict[tuple[str, str], list[str]] = {}
     excluded: dict[tuple[tuple[Interface, str], ...], dict[str, None]] = {}
     for controller in controllers:
-        for joint in controller.joints:
-            unfit = _unfit(controller, joint, joints, following)
+        for own, joint in zip(controller.joints, resources(controller), strict=True):
+            unfit = _unfit(controller, own, joints, following)
             if unfit is not None:
                 findings.append(unfit)
                 continue

@@ -181,7 +181,8 @@ class ControllerMember(Generic[S]):
     Attributes:
         name: the word under `type`.
         spec: what the user writes.
-        build: (name of the controller, spec, context) -> the controller, for a spec without problems.
+        build: (name of the controller, spec, context) -> the controller, for a spec without errors; None if it is left
+            out, which `check` reports.
         check: (spec, robot) -> problems of the spec with this robot.
         loop: (spec) -> its control law, for preflight checks and `manipcli tune`.
         hand: (spec) -> its limits; only for the role `hand`.
@@ -189,7 +190,7 @@ class ControllerMember(Generic[S]):
 
     name: str
     spec: type[S]
-    build: Callable[[str, S, BuildContext], Controller]
+    build: Callable[[str, S, BuildContext], Controller | None]
     check: Callable[[S, RobotModel], Iterable[Problem]]
     loop: Callable[[S], ControlLoop]
     hand: Callable[[S], HandSettings] | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from functools import cache
 
+from manipcli.control.chain import chain_finding, target_of
 from manipcli.control.command import may_go_together
 from manipcli.control.controller import BuildContext
 from manipcli.control.controllers import CONTROLLERS
@@ -56,7 +57,8 @@ def build_controllers(
     if errors:
         raise InvalidInput(errors)
     context = BuildContext(robot, cache(lambda: kinematics or Kinematics(robot)), compat, stop_planner)
-    built = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
+    every = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
+    built = {name: controller for name, controller in every.items() if controller is not None}
     wanted = any(controller.feed_forward != "none" for controller in built.values())
     manager = ControllerManager(
         joints=robot.joint_names,
@@ -67,7 +69,7 @@ def build_controllers(
     for name, controller in built.items():
         manager.load(controller, update_rate=spec.controllers[name].update_rate)
         manager.configure(name)
-    manager.switch(activate=[name for name, own in spec.controllers.items() if own.active])
+    manager.switch(activate=[name for name in built if spec.controllers[name].active])
     return manager
 
 
@@ -94,15 +96,16 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
         for k, joint in enumerate(own.joints):
             where = place((*at, "joints", k))
             yield from _joint_findings(name, own, joint, robot, where)
-            if own.active:
+            if own.active and not target_of(own):
                 before = set(owners.get(joint, {}).values())
                 yield from _claim_findings(name, own, joint, owners, where)
                 together |= {(other, name, joint) for other in before if name in owners[joint].values()}
-        commanded.update(own.joints if own.interfaces else ())
+        commanded.update(own.joints if own.interfaces and not target_of(own) else ())
+        yield from chain_finding(name, own, spec.controllers, place((*at, "chained_to")))
         yield from _rate_findings(name, own, robot, period, place((*at, "update_rate")))
         for problem in CONTROLLERS[own.type].check(own, robot):
-            message = f"controller '{name}': {problem.message}"
-            yield Diagnostic(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
+            message, where = f"controller '{name}': {problem.message}", place((*at, *problem.loc))
+            yield Diagnostic(problem.code or "CTRL100", message, where, problem.hint, problem.severity)
     yield from _rivals(spec, together, place)
     idle = [joint.name for joint in robot.moving_joints if joint.independent and joint.name not in commanded]
     if idle:
@@ -131,7 +134,7 @@ def _rate_findings(
         for joint in robot.moving_joints
         if joint.name in spec.joints and joint.limits.acceleration is not None
     ]
-    if ticks > 1 and "position" in spec.interfaces and limited:
+    if ticks > 1 and "position" in spec.interfaces and limited and not target_of(spec):
         message = f"controller '{name}' commands positions only every {ticks} control ticks: the acceleration limits "
         message += f"of {listed(limited, most=3)} saturate such steps, and the joints lag"
         hint = "remove `update_rate`; positions are then commanded at every tick"

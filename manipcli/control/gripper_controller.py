@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal
+from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal, refuse_inactive
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains
 from manipcli.control.tracking_error import TrackingError
@@ -88,6 +88,7 @@ class GripperController:
     ) -> None:
         self.name = name
         self.joints = distinct(name, joints)
+        self.accepts_goals = True
         self._units = ["m" if kind == "prismatic" else "rad" for kind in types or ["revolute"] * len(self.joints)]
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
@@ -156,9 +157,10 @@ class GripperController:
         """Accept a goal, which begins at the next update; the previous goal is aborted.
 
         Raises:
-            InvalidArgument: a target of another length or not finite, fingers that are not a partition of the joints, a
-                force or an effort that is not positive.
+            InvalidArgument: the controller is inactive, a target of another length or not finite, fingers that are
+                not a partition of the joints, a force or an effort that is not positive.
         """
+        refuse_inactive(self.name, self.accepts_goals)
         n = len(self.joints)
         target = np.array(goal.target, dtype=np.float64)
         if target.shape == ():

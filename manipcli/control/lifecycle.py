@@ -9,9 +9,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from manipcli.control.chain import broken_chains, resources, target_of
 from manipcli.control.claims import Claimant, conflicts
 from manipcli.control.controller import Controller, JointState
 from manipcli.control.feed_forward import Index
+from manipcli.control.roles import takes_goals
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
@@ -42,7 +44,7 @@ class ControllerInfo:
     @staticmethod
     def of(controller: Claimant, state: ControllerState) -> ControllerInfo:
         """The info of a controller in this state."""
-        wants = tuple(f"{joint}/{interface}" for joint in controller.joints for interface in controller.interfaces)
+        wants = tuple(f"{joint}/{interface}" for joint in resources(controller) for interface in controller.interfaces)
         return ControllerInfo(controller.name, state, wants, wants if state == "active" else ())
 
 
@@ -55,8 +57,8 @@ class Slot:
     """
 
     __slots__ = (
-        "contact_force", "controller", "every", "first", "gathered", "index", "measured", "period",
-        "scattered", "state",
+        "_state", "contact_force", "controller", "every", "first", "gathered", "index", "measured", "period",
+        "scattered",
     )  # fmt: skip
 
     def __init__(self, controller: Controller, index: Index, every: int, period: float) -> None:
@@ -71,6 +73,17 @@ class Slot:
         self.measured = JointState(none, none, none)
         self.contact_force: Array | None = None
         self.gathered: list[tuple[Array, Array]] = []
+
+    @property
+    def state(self) -> ControllerState:
+        """Its state, which decides whether it accepts goals."""
+        return self._state
+
+    @state.setter
+    def state(self, state: ControllerState) -> None:
+        self._state = state
+        if takes_goals(self.controller):
+            self.controller.accepts_goals = state == "active"
 
     def look(self, vectors: Sequence[Array], contact_force: Array | None) -> None:
         """Set the measured vectors: position, velocity, effort."""
@@ -121,7 +134,8 @@ def decided(
     wanted = {name: controllers[name][0] for name in request.activated}
     if switch.strictness == "best_effort":
         return _without_clashes(request, kept, wanted, joints, following)
-    clashes = conflicts([*kept, *wanted.values()], joints, following)
+    together = [*kept, *wanted.values()]
+    clashes = (*conflicts(together, joints, following), *broken_chains(together))
     if clashes:
         return SwitchResult(False, (*request.messages, *(finding.message for finding in clashes)))
     return request
@@ -141,8 +155,13 @@ def _without_clashes(
         clashes = conflicts([*chosen, controller], joints, following)
         messages += [f"cannot activate '{name}': {finding.message}" for finding in clashes]
         chosen += [] if clashes else [controller]
+    while broken := tuple(broken_chains(chosen)):
+        messages += [finding.message for finding in broken]
+        chosen = [own for own in chosen if target_of(own) in ("", *(other.name for other in chosen))]
     names = {controller.name for controller in chosen}
-    return SwitchResult(True, tuple(messages), tuple(name for name in wanted if name in names), request.deactivated)
+    dropped = tuple(own.name for own in kept if own.name not in names)
+    activated = tuple(name for name in wanted if name in names)
+    return SwitchResult(True, tuple(messages), activated, (*request.deactivated, *dropped))
 
 
 def requested(

@@ -19,6 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
+from manipcli.control.chain import broken_chains, depth_of, takes_references, target_of
 from manipcli.control.claims import Claims, conflicts
 from manipcli.control.command import JointCommand, mode_of
 from manipcli.control.compiled import bind
@@ -92,7 +93,7 @@ class ControllerManager:
         self._tick = 0
         self._references = False
         self._copy = self._copier(())
-        findings = conflicts(controllers, self.joints, self.following)
+        findings = (*conflicts(controllers, self.joints, self.following), *broken_chains(controllers))
         if findings:
             raise InvalidInput(findings)
         for controller in controllers:
@@ -240,7 +241,7 @@ class ControllerManager:
             InvalidArgument: no active controller does.
         """
         active = [slot.controller for slot in self._active]
-        for controller in active:
+        for controller in active:  # a chain has its first controller first
             if controller.interfaces and set(joints) <= set(controller.joints):
                 return controller
         claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "no controller is active"
@@ -254,7 +255,11 @@ class ControllerManager:
 
     def _rearrange(self) -> None:
         """Update the modes of the joints and the work per tick, after a change of loaded or active controllers."""
-        self._active = tuple(slot for slot in self._slots.values() if slot.state == "active")
+        active = [slot for slot in self._slots.values() if slot.state == "active"]
+        targets = {slot.controller.name: target_of(slot.controller) for slot in active}
+        # Those that precede others are updated first.
+        self._active = tuple(sorted(active, key=lambda slot: -depth_of(slot.controller, targets)))
+        self._chain()
         claimed = Claims.of([slot.controller for slot in self._active])
         modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
         self.command.obey(modes)
@@ -262,6 +267,19 @@ class ControllerManager:
         self._copy = self._copier([copy for slot in self._active for copy in self._copies(slot)])
         self._seen = self._felt = None
         self.outputs = tuple(s.controller.output if s.state == "active" else None for s in self._slots.values())
+
+    def _chain(self) -> None:
+        """Connect the commands of each active controller that precedes another with the references of that one."""
+        preceding = {target_of(slot.controller): slot.controller for slot in self._active}
+        for slot in self._slots.values():
+            controller, source = slot.controller, preceding.get(slot.controller.name)
+            if not takes_references(controller):
+                continue
+            if source is None or slot.state != "active":
+                controller.chain(None)
+                continue
+            order = [source.joints.index(joint) for joint in controller.joints]
+            controller.chain(dict(zip(source.interfaces, source.output.commands, strict=True)), order)
 
     def _copier(self, copies: Sequence[tuple[Array, Index, Array]]) -> Callable[[], object]:
         """Copies (target, index, source) in one compiled call if possible."""
@@ -283,10 +301,15 @@ class ControllerManager:
             "acceleration": command.acceleration,
             "effort": command.effort,
         }
-        copies = [
-            (commands[i], slot.index, row) for i, row in zip(slot.controller.interfaces, output.commands, strict=True)
-        ]
-        if self._references and slot.controller.interfaces:
+        copies = (
+            []
+            if target_of(slot.controller)
+            else [
+                (commands[i], slot.index, row)
+                for i, row in zip(slot.controller.interfaces, output.commands, strict=True)
+            ]
+        )
+        if self._references and slot.controller.interfaces and not target_of(slot.controller):
             copies.append((command.reference_position, slot.index, output.position))
             copies.append((command.reference_velocity, slot.index, output.velocity))
         return tuple(copies)
@@ -333,6 +356,10 @@ class ControllerManager:
         self.faults += (Diagnostic("CTRL162", text),)
         slot.controller.deactivate(time, text)
         slot.state = "inactive"
+        for other in self._active:
+            if other.state == "active" and target_of(other.controller) == slot.controller.name:
+                other.controller.deactivate(time, text)
+                other.state = "inactive"
         self._rearrange()
 
     def stop_non_finite(self, time: float) -> None:

@@ -7,6 +7,7 @@ from typing import Protocol, TypeGuard
 
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.controller import Controller
+from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
 
@@ -14,7 +15,7 @@ from manipcli.plan.trajectory import JointTrajectory
 class Follower(Controller, Protocol):
     """Follows joint trajectories, on any interface."""
 
-    def send_goal(self, trajectory: JointTrajectory) -> GoalHandle:
+    def send_goal(self, trajectory: JointTrajectory | TrajectoryGoal) -> GoalHandle:
         """Accept a trajectory of all its joints, which starts at the next update; the previous goal is aborted.
 
         Raises:
@@ -35,6 +36,12 @@ class Hand(Controller, Protocol):
         ...
 
 
+class GoalTaker(Controller, Protocol):
+    """Executes goals; `accepts_goals` is False while its manager has it inactive."""
+
+    accepts_goals: bool
+
+
 class SensorReader(Controller, Protocol):
     """Reads sensors."""
 
@@ -51,6 +58,11 @@ def is_follower(controller: Controller) -> TypeGuard[Follower]:
 def is_hand(controller: Controller) -> TypeGuard[Hand]:
     """Whether it moves a hand, for `grasp` and `release` steps."""
     return controller.role == "hand"
+
+
+def takes_goals(controller: Controller) -> TypeGuard[GoalTaker]:
+    """Whether it executes goals."""
+    return hasattr(controller, "accepts_goals")
 
 
 def reads_sensors(controller: Controller) -> TypeGuard[SensorReader]:

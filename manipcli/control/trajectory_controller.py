@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from manipcli.control.action import ErrorCode, Feedback, GoalHandle
+from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejected, refuse_inactive
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
@@ -85,6 +85,7 @@ class JointTrajectoryController:
         speed_scaling: initial trajectory seconds per second.
         positions_upsampling: points with only positions get the velocities of a spline.
         stop_planner: plans stops without `compat`; None: they have a constant deceleration. See `stopping.py`.
+        chained_to: the controller whose references it commands; None: it commands the joints.
 
     Attributes:
         notes: arguments that have no effect, and why.
@@ -122,8 +123,9 @@ class JointTrajectoryController:
         speed_scaling: float = 1.0,
         positions_upsampling: bool = False,
         stop_planner: StopPlanner | None = None,
+        chained_to: str | None = None,
     ) -> None:
-        self.name = name
+        self.name, self.chained_to = name, chained_to
         self.joints = distinct(name, joints)
         if isinstance(command_interfaces, str):
             command_interfaces = (command_interfaces,)
@@ -140,6 +142,7 @@ class JointTrajectoryController:
             if not 0.0 <= value < np.inf:
                 raise InvalidArgument("CTRL108", f"controller '{name}': {what} is {value}; expected 0 or more")
         self._compat = compat
+        self.accepts_goals = True
         self._facts = JointFacts.of(self.joints, limits, types)
         self._constraints = constraints if constraints is not None else ConstraintsSpec()
         self._accepted = Acceptance(
@@ -220,10 +223,11 @@ class JointTrajectoryController:
             constraints: for this goal, instead of the controller's.
 
         Raises:
-            GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities above the limits (also
-                on the path to the next point, once it is active), points with different or forbidden fields, a velocity
-                at the end, an end in the past. The previous goal then continues.
+            GoalRejected: the controller is inactive; unknown or missing joints, waypoints beyond position limits,
+                velocities above the limits (also on the path to the next point, once it is active), points with
+                forbidden fields, a velocity at the end, an end in the past. The previous goal then continues.
         """
+        refuse_inactive(self.name, self.accepts_goals)
         goal = trajectory if isinstance(trajectory, TrajectoryGoal) else TrajectoryGoal(trajectory)
         ordered = check_goal(goal, self._facts, self._accepted, self._time)
         if self._activated:
@@ -238,7 +242,10 @@ class JointTrajectoryController:
                 old.preempt(self._time, as_canceled=self._compat == "ros1")
         self._goal = None
         handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes)
-        self._next = ActiveGoal(self.name, self._facts, handle, ordered, tolerances, goal.start_time, self._timeout)
+        self._next = ActiveGoal(
+            self.name, self._facts, handle, ordered, tolerances, goal.start_time, self._timeout,
+            unchecked=not self._activated,
+        )  # fmt: skip
         self._waiting = True
         return handle
 
@@ -335,6 +342,8 @@ class JointTrajectoryController:
         reference = self._reference
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
         at = (measured.position, measured.velocity)
+        if goal.unchecked and not self._reachable(goal, time, period, measured):
+            return
         active = self._transitions.to_goal(goal.trajectory, later, reference, time, self._speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)
@@ -347,6 +356,18 @@ class JointTrajectoryController:
         self._bound = goal.tolerances.bound
         reference.follow(active, samples, time=time, period=period, speed=self._speed)
         reference.advance(time, period)
+
+    def _reachable(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> bool:
+        """Whether the first point of a goal that was sent before activation can be reached; if not, it is aborted."""
+        try:
+            self._transitions.check_way(
+                goal.trajectory, goal.start_time, self._reference, time - period, period, measured.position
+            )
+        except GoalRejected as refused:
+            text = f"controller '{self.name}': {refused.findings[0].message}"
+            goal.handle.end("aborted", ErrorCode.INVALID_GOAL, text, time)
+            return False
+        return True
 
     def _come_to_rest(self, row: Array, time: float, period: float) -> None:
         active = self._stopping.to_rest(row, period)

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from typing import Final, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.control.limit_laws import limit_array
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, distinguished
 from manipcli.description.elements import JointLimits, JointType
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.motion import JointTolerance
+from manipcli.plan.trajectory import LINEAR, JointTrajectory
 from manipcli.spec.controllers import Interface
 
 REST = 1.2e-7
@@ -72,19 +74,6 @@ class JointFacts:
         )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class JointTolerance:
-    """control_msgs/JointTolerance: rad or m, per second, per second squared.
-
-    Each: above 0 is the tolerance, 0 leaves the controller's own, -1 means that it is not enforced.
-    """
-
-    name: str
-    position: float = 0.0
-    velocity: float = 0.0
-    acceleration: float = 0.0
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class TrajectoryGoal:
     """A trajectory with its start time and tolerances: the goal of control_msgs/FollowJointTrajectory.
@@ -123,13 +112,6 @@ def check_goal(goal: TrajectoryGoal, facts: JointFacts, accepted: Acceptance, no
     if not isinstance(trajectory, JointTrajectory):
         raise GoalRejected("CTRL129", f"the goal is a {type(trajectory).__name__}; expected a JointTrajectory")
     names = _check_joints(trajectory, facts, accepted)
-    if trajectory.orders is not None:
-        k = int(np.flatnonzero(trajectory.orders != trajectory.orders[0])[0])
-        raise GoalRejected(
-            "CTRL122",
-            f"point {k} has other fields than point 0",
-            hint="give velocities (and accelerations) at every point, or at none",
-        )
     if trajectory.integrated and not accepted.allow_integration_in_goal_trajectories:
         message = "the trajectory has points without positions, and integrating them is not allowed"
         hint = "give positions, or set allow_integration_in_goal_trajectories: true"
@@ -190,16 +172,22 @@ def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
             k, j = (int(index) for index in np.argwhere(beyond)[0])
             raise GoalRejected("CTRL124", _beyond(facts, j, float(positions[k, j]), f"point {k}"))
     if trajectory.velocities is not None:
-        velocities, what, first = trajectory.velocities, "at point", 0
-    elif trajectory.interpolation == "splines":
-        velocities = np.diff(trajectory.positions, axis=0) / np.diff(trajectory.times)[:, None]
-        what, first = "on the path to point", 1
-    else:
-        return
+        _check_speeds(trajectory.velocities, np.arange(len(trajectory.times)), facts, "at point")
+    if trajectory.interpolation == "splines":
+        straight = np.flatnonzero(np.minimum(trajectory.order_of_points[:-1], trajectory.order_of_points[1:]) == LINEAR)
+        slopes = np.diff(trajectory.positions, axis=0)[straight] / np.diff(trajectory.times)[straight, None]
+        _check_speeds(slopes, straight + 1, facts, "on the path to point")
+
+
+def _check_speeds(velocities: Array, points: npt.NDArray[np.intp], facts: JointFacts, what: str) -> None:
+    """
+    Raises:
+        GoalRejected: a velocity (K, n) is above its limit; names the point (K) that it belongs to.
+    """
     fast = np.abs(velocities) > facts.velocity * (1.0 + VELOCITY_SLACK)
     if fast.any():
         k, j = (int(index) for index in np.argwhere(fast)[0])
-        raise too_fast(facts, j, float(velocities[k, j]), f"{what} {k + first}")
+        raise too_fast(facts, j, float(velocities[k, j]), f"{what} {points[k]}")
 
 
 def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalRejected:

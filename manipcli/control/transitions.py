@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.control.active_trajectory import (
     ACCELERATION,
@@ -176,10 +177,17 @@ def lead_in(
             trajectory.names, np.concatenate([[0.0], trajectory.times]) if leads else trajectory.times,
             np.vstack([start[0], positions]) if leads else positions,
             after(start[1], trajectory.velocities), after(start[2], trajectory.accelerations),
-            after(start[3], trajectory.efforts), interpolation=trajectory.interpolation,
+            after(start[3], trajectory.efforts), orders=_led(trajectory, leads), interpolation=trajectory.interpolation,
             led_in=leads or trajectory.led_in,
         )  # fmt: skip
     return whole.with_spline_velocities(start[1] if leads else None) if smooth else whole
+
+
+def _led(trajectory: JointTrajectory, leads: bool) -> npt.NDArray[np.int8] | None:
+    """The orders of the points, after that of a start that gives everything."""
+    if trajectory.orders is None or not leads:
+        return trajectory.orders
+    return np.concatenate([[np.int8(trajectory.order)], trajectory.orders])
 
 
 def first_to_come(times: Array, ago: float) -> int:
@@ -197,5 +205,6 @@ def _remaining(trajectory: JointTrajectory, ago: float) -> JointTrajectory:
     return JointTrajectory.of_arrays(
         trajectory.names, np.maximum(trajectory.times[first:] - ago, 0.0), trajectory.positions[first:],
         kept(trajectory.velocities), kept(trajectory.accelerations), kept(trajectory.efforts),
+        orders=None if trajectory.orders is None else trajectory.orders[first:],
         interpolation=trajectory.interpolation,
     )  # fmt: skip

@@ -124,7 +124,7 @@ class NotPlannable(ManipcliError):
         place: of the value that is the cause, or of the step.
         loc: path of that value below the step's verb; empty if no single value is the cause.
         reason: for code that decides what to try next.
-        parts: bodies and links (`robot/<link>`) that are in the way.
+        parts: bodies and links (`robot/<link>`) that are in the way, and the object that cannot be picked where it is.
         remedy: searches for a change with which it could be planned; as a hint. Slow, so only called for the refusal
             that is reported.
         candidates: of the whole task, if it has no plan.
@@ -167,6 +167,7 @@ class NotPlannable(ManipcliError):
         hint: str | None = None,
         step: str | None = None,
         place: Place | None = None,
+        parts: frozenset[str] | None = None,
         candidates: tuple[RefusedCandidates, ...] | None = None,
         motions: tuple[object, ...] | None = None,
     ) -> NotPlannable:
@@ -178,7 +179,7 @@ class NotPlannable(ManipcliError):
             place=self.place if place is None else place,
             loc=self.loc,
             reason=self.reason,
-            parts=self.parts,
+            parts=self.parts if parts is None else parts,
             remedy=self.remedy,
             candidates=self.candidates if candidates is None else candidates,
             motions=self.motions if motions is None else motions,

@@ -11,7 +11,7 @@ class RefusedCandidates:
 
     Attributes:
         step: id of the step.
-        stage: the motion that was refused: `reach`, `approach`, `close`, ...; `start` before any motion.
+        stage: the motion that was refused: `reach`, `approach`, `close`, ...; `-` where none is named.
         count: number of candidates.
         cause: of the first of them; the others differ in numbers only.
         names: of the candidates that have a name, at most a few.

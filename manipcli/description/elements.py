@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from manipcli.core.errors import Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import Array, Transform
 from manipcli.shapes.primitives import Geometry
 
@@ -26,14 +26,28 @@ class Inertial:
 
 
 @dataclass(frozen=True, slots=True)
+class UnusableInertial:
+    """An inertial that no engine can use: the findings about it, and what of it is usable (None: unknown)."""
+
+    findings: tuple[Diagnostic, ...]
+    mass: float | None = None
+    X_LI: Transform | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Link:
-    """A link; `place`: its position in the description file."""
+    """A link; `place`: its position in the description file.
+
+    `unusable`: an inertial that was refused. `missing`: the errors about collision meshes that cannot be used.
+    """
 
     name: str
     inertial: Inertial | None
     visuals: tuple[Geometry, ...]
     collisions: tuple[Geometry, ...]
     place: Place | None = field(default=None, compare=False)
+    unusable: UnusableInertial | None = field(default=None, compare=False)
+    missing: tuple[Diagnostic, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

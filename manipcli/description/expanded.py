@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from xml.dom import minidom
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
@@ -12,6 +14,10 @@ from manipcli.description.located_xml import Element, element_of, invalid, parse
 from manipcli.description.packages import Packages, Unread
 
 XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro", "http://wiki.ros.org/xacro")
+
+
+_USES = re.compile(r"<xacro:|\sxacro:|\$\{|\$\(")
+"""An element, an attribute or an expression of xacro."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +44,7 @@ def read_description(
     """Reads and expands a description.
 
     Args:
-        path: URDF or xacro; xacro is recognised by the suffix or by the namespace of its root element.
+        path: URDF or xacro; xacro is recognised by the suffix, or by the namespace of its root element and its use.
         packages: finds the packages and files it names.
         arguments: for `<xacro:arg>`.
         allow_env: environment variables that `$(env NAME)` and `$(optenv NAME)` may read.
@@ -47,16 +53,16 @@ def read_description(
         InvalidInput: with file, line and column.
     """
     document = read_document(path)
-    top = document.documentElement
-    declared = top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
+    declared = _declares_xacro(document)
+    uses = declared and _USES.search(path.read_text(encoding="utf-8", errors="replace")) is not None
     findings: tuple[Diagnostic, ...] = ()
-    expanded = path.suffix == ".xacro" or declared
+    expanded = path.suffix == ".xacro" or uses
     if expanded:
         from manipcli.description.xacro.expand import expand
 
         words = {name: argument_text(value) for name, value in arguments.items()}
         document, findings = expand(path, words, packages, allow_env=allow_env)
-    elif arguments:
+    elif arguments and not declared:
         names = ", ".join(arguments)
         raise invalid("XACRO003", f"'{path.name}' is plain URDF and takes no arguments; given: {names}")
     assert document.documentElement is not None  # a document without a root element is not well-formed
@@ -64,6 +70,19 @@ def read_description(
     if root.tag != "robot":
         raise _other_format(root)
     return Description(path=path, root=root, packages=packages, findings=findings, expanded=expanded)
+
+
+def _declares_xacro(document: minidom.Document) -> bool:
+    top = document.documentElement
+    return top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
+
+
+def is_plain(path: Path) -> bool:
+    """Whether this is readable plain URDF, which takes no arguments."""
+    try:
+        return path.suffix != ".xacro" and not _declares_xacro(read_document(path))
+    except InvalidInput:
+        return False
 
 
 def unread_description(urdf: bytes, name: str) -> Description:

@@ -13,7 +13,7 @@ import pkgutil
 import re
 import stat
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
@@ -96,6 +96,7 @@ class Packages:
         description: the file with the URIs; None searches only `package_path` and installed packages.
         package_path: folders that contain packages (or are one), searched first.
         allow_outside: permits files anywhere.
+        named: folders of packages by name, before all others.
 
     Attributes:
         reads: whether the named files can be read.
@@ -104,15 +105,26 @@ class Packages:
     reads = True
 
     def __init__(
-        self, description: Path | None, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+        self,
+        description: Path | None,
+        *,
+        package_path: Sequence[Path] = (),
+        allow_outside: bool = False,
+        named: Mapping[str, Path] = {},
     ) -> None:
         self._package_path = tuple(Path(os.path.realpath(folder)) for folder in package_path)
         self._allow_outside = allow_outside
         self._folder = Path(os.path.realpath(description)).parent if description is not None else None
         self._own = own_root(description) if description is not None else None
-        self._found: dict[str, Path] = {}
+        self._named = {name: Path(os.path.realpath(folder)) for name, folder in named.items()}
+        self._found = dict(self._named)
         self._below: dict[str, Path] | None = None
         self._meant: dict[Path, str | None] = {}
+
+    @property
+    def found(self) -> Mapping[str, Path]:
+        """The packages that were asked for so far, by name."""
+        return dict(self._found)
 
     def root(self, name: str) -> Path:
         """The folder of package `name`.
@@ -135,7 +147,8 @@ class Packages:
         meant = f"did you mean {any_of(near)}? Otherwise " if near else ""
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
-            hint=f"{meant}add the folder that contains '{name}' with --package-path DIR",
+            hint=f"{meant}add the folder that contains '{name}' with --package-path DIR, "
+            f"or to the robot file: packages: {{{name}: FOLDER}}",
         )
 
     def _candidates(self, name: str) -> list[Path]:
@@ -163,9 +176,16 @@ class Packages:
                 self._below = packages_below(folder) | self._below
         return self._below.get(name)
 
+    def found_by_name(self, uri: str) -> bool:
+        """Whether a `file://` URI is in a package that was found by its name, as `file://$(find NAME)/...` gives it."""
+        path = Path("/" + unquote(uri.removeprefix("file://").removeprefix("localhost")).lstrip("/"))
+        return any(path.is_relative_to(root) for root in self._found.values())
+
     def below(self, description: Path) -> Packages:
         """For the URIs in a file that was found here: the same search path and rules, relative to that file."""
-        return Packages(description, package_path=self._package_path, allow_outside=self._allow_outside)
+        return Packages(
+            description, package_path=self._package_path, allow_outside=self._allow_outside, named=self._named
+        )
 
     def resolve(self, uri: str, *, relative_to: Path | None = None, anywhere: bool = False) -> Path:
         """The regular file that `uri` names, symbolic links resolved; relative paths start at the folder `relative_to`.

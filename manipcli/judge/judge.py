@@ -66,6 +66,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         drawn=_drawn(recording),
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
+        holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
     )
 
 

@@ -111,6 +111,7 @@ class Verdict:
         drawn: the sample of the task's `vary:`; None: the task as written.
         saturations: saturation of joints and actuators.
         self_contacts: the pairs of links of the robot that pressed on each other.
+        holding: what held objects by an attachment instead of friction, one text per object and kind.
         candidates: the refused candidates of a task without a plan.
     """
 
@@ -126,6 +127,7 @@ class Verdict:
     drawn: Drawn | None = None
     saturations: Saturations = field(default_factory=Saturations)
     self_contacts: tuple[SelfContact, ...] = ()
+    holding: tuple[str, ...] = ()
     candidates: tuple[RefusedCandidates, ...] = ()
 
     @property

@@ -28,6 +28,7 @@ class MeshSearch:
         embedded: files embedded in the log, by URI.
         known: files of the run by URI, if it was just run.
         package_path, allow_outside: see `Packages`.
+        robot: path of the robot file as the task names it, and its `packages:`, whose folders start there.
 
     Attributes:
         folder: temporary folder of the embedded files, removed together with this object.
@@ -42,13 +43,17 @@ class MeshSearch:
         known: Mapping[str, Path] = {},
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
+        robot: tuple[str, Mapping[str, str]] = ("", {}),
     ) -> None:
         here = Path.cwd()
         beside = log.resolve().parent
         # The parent of any other folder can be / or /home, which is too large to search.
         project = _folders(beside.parent) if beside.name == RUNS.name else []
         places = [*package_path, *project, *_folders(beside), here, *_folders(here)]
-        self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
+        tasks = [*([beside.parent] if project else []), beside, *places]
+        self._packages = Packages(
+            log, package_path=places, allow_outside=allow_outside, named=_named_packages(tasks, *robot)
+        )
         self._hashes = hashes
         self._known = known
         self.folder = TemporaryDirectory(prefix="manipcli-") if embedded else None
@@ -103,6 +108,22 @@ class MeshSearch:
         if digest is not None and hashlib.sha256(path.read_bytes()).hexdigest() != digest:
             self._notes.setdefault(f"mesh '{uri}' differs from the file of the run")
         return path
+
+
+def _named_packages(tasks: Sequence[Path], robot: str, packages: Mapping[str, str]) -> dict[str, Path]:
+    """The folders of `packages:` of a robot file, if it lies where a task in one of the folders `tasks` names it.
+
+    By their names, and by the names of the folders, which the URIs of a log use for a package without `package.xml`.
+    """
+    found: dict[str, Path] = {}
+    for file in dict.fromkeys(folder / robot for folder in tasks) if packages else ():
+        if file.is_file():
+            for name, folder in packages.items():
+                place = (file.parent / folder).resolve()
+                if place.is_dir():
+                    found.setdefault(name, place)
+                    found.setdefault(place.name, place)
+    return found
 
 
 def _unpacked(embedded: Mapping[str, bytes], folder: Path) -> dict[str, Path]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.link_parts import LINK_PARTS
-from manipcli.model.robot import RobotModel
-from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
+from manipcli.model.robot import LinkInertial, RobotModel
+from manipcli.record.attachments import CONTROLLERS, INERTIALS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.recording import Recording
 from manipcli.scene.scene import Scene
 from manipcli.scene.scene_file import scene_from_json
@@ -41,9 +42,20 @@ def recorded_robot(recording: Recording, path: Path) -> RobotModel:
     return robot_of(recording, path, recorded_robot_file(recording, path).spec)
 
 
+def recorded_packages(recording: Recording, path: Path) -> tuple[str, dict[str, str]]:
+    """Path of the robot file as the task of a log names it, and its `packages:`."""
+    packages = recorded_robot_file(recording, path).spec.packages or {}
+    return (recorded_task_file(recording, path).spec.robot, packages) if packages else ("", {})
+
+
 def robot_of(recording: Recording, path: Path, spec: RobotSpec) -> RobotModel:
     """The robot of a log with this robot file, without mesh files."""
-    return rebuild_robot(spec, attached(recording, path, URDF), link_parts=recording.attachments.get(LINK_PARTS))
+    robot = rebuild_robot(spec, attached(recording, path, URDF), link_parts=recording.attachments.get(LINK_PARTS))
+    try:
+        inertials = [LinkInertial.read(link, text) for link, text in recording.metadata.get(INERTIALS, {}).items()]
+    except ValueError as error:
+        raise InvalidInput([Diagnostic("LOG103", f"{path.name}: {error}")]) from error
+    return replace(robot, inertials=tuple(inertials))
 
 
 def recorded_scene(recording: Recording, path: Path) -> Scene:

@@ -15,6 +15,7 @@ from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.recorded_files import (
     attached,
     recorded_controllers_file,
+    recorded_packages,
     recorded_robot,
     recorded_robot_file,
     recorded_scene,
@@ -74,6 +75,7 @@ def recorded_task(
         embedded=recording.embedded_meshes(),
         package_path=package_path,
         allow_outside=allow_outside,
+        robot=recorded_packages(recording, path),
     )
     robot = meshes.robot(recorded_robot(recording, path))
     # Scene bodies can come from files that the log does not hold; then the recorded scene is used.

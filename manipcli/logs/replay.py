@@ -15,7 +15,7 @@ from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.other_log import open_other
-from manipcli.logs.recorded_files import recorded_robot, recorded_scene
+from manipcli.logs.recorded_files import recorded_packages, recorded_robot, recorded_scene
 from manipcli.record.channels import TF
 from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.foreign.origin import is_own
@@ -71,6 +71,7 @@ def _open_own(
         known=known,
         package_path=package_path,
         allow_outside=allow_outside,
+        robot=recorded_packages(recording, path),
     )
     robot, scene = meshes.robot(robot), meshes.scene(scene)
     notes = meshes.notes

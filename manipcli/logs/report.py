@@ -24,6 +24,7 @@ from manipcli.record.recording import Recording
 from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import RATE, Playback
 from manipcli.report.display_quantity import quantity
+from manipcli.report.inertials import recorded_inertials
 from manipcli.report.logs.engine_choice import engine_choices
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
@@ -250,6 +251,7 @@ def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tup
         *recording.metadata.get("versions", {}).items(),
         ("engine", verdict.engine),
         *engine_choices(recording.metadata),
+        *recorded_inertials(recording.metadata),
         ("seed", str(verdict.seed)),
         ("control period", f"{1e3 * recording.period:g} ms"),
         ("run", run.get("status", "") or "did not finish"),

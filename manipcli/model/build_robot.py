@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
-from manipcli.description.elements import Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
-from manipcli.description.expanded import unread_description
+from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
+from manipcli.description.expanded import is_plain, unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.joint import UNSTATED
+from manipcli.description.urdf.link import MISSING_VISUAL, REGULARISED
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
+from manipcli.model.build_limits import with_limits
+from manipcli.model.holding import CUP_RADIUS, Holding
+from manipcli.model.inertials import ESTIMATE, repaired_links, with_inertials
 from manipcli.model.joint_units import misread_units
+from manipcli.model.link_collisions import REMEDY, replaced_meshes, with_collisions
 from manipcli.model.link_parts import LINK_PARTS, link_parts_from_json, split_links, with_parts
-from manipcli.model.named_poses import build_groups, build_poses, interval
+from manipcli.model.named_poses import build_groups, build_poses
 from manipcli.model.normalised_urdf import portable_urdf
 from manipcli.model.reporter import Reporter
 from manipcli.model.robot import Group, RobotModel, Tool
+from manipcli.spec.holding import HoldingSpec
 from manipcli.spec.located import Source
-from manipcli.spec.robot import AttachSpec, LimitsSpec, RobotSpec
+from manipcli.spec.robot import AttachSpec, RobotSpec
 
 
 def build_robot(
@@ -50,11 +58,11 @@ def build_robot(
         InvalidInput: all errors of the descriptions at once; if these are valid, all errors of the robot file.
     """
     reporter = Reporter(source)
-    sources = Packages(file, package_path=package_path, allow_outside=True)
-    read = _Descriptions(reporter, sources, file, tuple(package_path), allow_outside)
+    read = _Descriptions(reporter, spec, file, tuple(package_path), allow_outside)
     main = read.parts(spec.description, spec.args, ("description",))
     attached = [
-        read.parts(each.description, each.args, ("attach", k, "description")) for k, each in enumerate(spec.attach)
+        read.parts(each.description, each.args, ("attach", k, "description"), each.prefix)
+        for k, each in enumerate(spec.attach)
     ]
     reporter.stop()
     assert main is not None
@@ -63,9 +71,12 @@ def build_robot(
         assert parts is not None
         body.weld(reporter, each, parts, k)
     reporter.stop()
+    body.links = with_collisions(reporter, spec.collision, body.links)
+    body.links, inertials = with_inertials(reporter, spec.inertials, body.links, body.ordered())
     names = [name for k, name in enumerate(spec.collision_parts) if _known(reporter, name, body, k)]
     body.links = list(split_links(reporter, body.links, names))
-    return _assembled(reporter, spec, body), tuple(reporter.findings)
+    robot = dataclasses.replace(_assembled(reporter, spec, body), inertials=inertials)
+    return robot, tuple(reporter.findings)
 
 
 def rebuild_robot(spec: RobotSpec, urdf: bytes, *, link_parts: bytes | None = None) -> RobotModel:
@@ -109,7 +120,7 @@ def bare_robot(parts: Parts) -> RobotModel:
 
 def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     """The robot of welded descriptions and a robot file."""
-    joints = _with_limits(reporter, spec, body.ordered())
+    joints = with_limits(reporter, spec, body.ordered())
     links = tuple(body.links)
     moving = {joint.name: joint for joint in joints if joint.moves}
     groups = build_groups(reporter, spec, links, joints)
@@ -141,34 +152,77 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     )
 
 
+def package_folders(spec: RobotSpec, file: Path) -> dict[str, Path]:
+    """The folders of `packages:` by name; relative ones start at the folder of the robot file."""
+    return {name: file.resolve().parent / folder for name, folder in (spec.packages or {}).items()}
+
+
 class _Descriptions:
     """Reads the description files that a robot file names."""
 
     def __init__(
-        self, reporter: Reporter, sources: Packages, file: Path, package_path: tuple[Path, ...], allow_outside: bool
+        self, reporter: Reporter, spec: RobotSpec, file: Path, package_path: tuple[Path, ...], allow_outside: bool
     ) -> None:
         self._reporter = reporter
-        self._sources = sources
+        self._spec = spec
         self._folder = file.resolve().parent
         self._package_path = package_path
         self._allow_outside = allow_outside
+        self._named = package_folders(spec, file)
+        for name, folder in self._named.items():
+            if not folder.is_dir():
+                message = f"package '{name}': there is no folder '{(spec.packages or {})[name]}'"
+                reporter.error("ROBOT309", message, ("packages", name), hint="write it relative to this file")
+        self._sources = Packages(file, package_path=package_path, allow_outside=True, named=self._named)
 
-    def parts(self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc) -> Parts | None:
-        """The parts of a description, or None; findings go to the reporter."""
+    def parts(
+        self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc, prefix: str = ""
+    ) -> Parts | None:
+        """The parts of a description, or None; findings go to the reporter, but those that the robot file mends."""
         try:
             path = self._sources.resolve(uri, relative_to=self._folder)
         except NotFound as error:
             self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
-        packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
+        packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside, named=self._named)
+        if arguments and is_plain(path):
+            message = f"'{path.name}' is plain URDF: `args` only fill `$(var NAME)` of the controllers file"
+            self._reporter.note("XACRO003", message, (*loc[:-1], "args"), hint=None)
+            arguments = {}
         errors_only = tuple(check for check in CHECKS if check.severity == "error")  # others also read visual meshes
         examination = examine(path, packages=packages, arguments=arguments, checks=errors_only)
-        self._reporter.findings += examination.errors
-        if examination.parts is not None:
-            # Notes are for the author of a description, not for its users.
-            read = [finding for finding in examination.parts.findings if finding.severity == "warning"]
-            self._reporter.findings += list(dict.fromkeys(read))
-        return examination.parts
+        parts = examination.parts
+        links = parts.links if parts is not None else ()
+        mended = {
+            *repaired_links(self._spec.inertials, links, prefix),
+            *replaced_meshes(self._spec.collision, links, prefix),
+        }
+        remedies = {finding: ESTIMATE for link in links if link.unusable for finding in link.unusable.findings}
+        remedies |= {finding: REMEDY.format(link=prefix + link.name) for link in links for finding in link.missing}
+        for finding in examination.errors:
+            if finding not in mended:
+                hint = "; or ".join(filter(None, (remedies.get(finding), finding.hint)))
+                self._reporter.findings.append(dataclasses.replace(finding, hint=hint or None))
+        if parts is not None:
+            # Other notes are for the author of a description, not for its users.
+            read = [
+                each
+                for each in parts.findings
+                if (each.severity == "warning" and each.code != UNSTATED) or each.code == REGULARISED
+            ]
+            self._reporter.findings += _grouped(list(dict.fromkeys(read)))
+        return parts
+
+
+def _grouped(findings: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """The findings, with all visual meshes that are missing in one."""
+    missing = [finding for finding in findings if finding.code == MISSING_VISUAL]
+    if len(missing) < 2:
+        return list(findings)
+    first, more = missing[0], len(missing) - 1
+    message = f"{first.message} (and {more} more): the robot is simulated as before, and drawn without them"
+    hint = "`manipcli check-urdf` lists them all"
+    return [dataclasses.replace(first, message=message, hint=hint), *(each for each in findings if each not in missing)]
 
 
 class _Body:
@@ -240,89 +294,6 @@ def _prefixed(joint: Joint, prefix: str) -> Joint:
     )
 
 
-def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
-    """The joints with the robot file's limits: positions narrowed only, acceleration as written or the default."""
-    moving = [joint.name for joint in joints if joint.moves]
-    for name in spec.limits:
-        if name not in moving:
-            message = f"limits: joint '{name}' is not a moving joint of the robot"
-            reporter.error("ROBOT304", message, ("limits", name), hint=did_you_mean(name, moving))
-    without: list[str] = []
-    result = []
-    for joint in joints:
-        if not joint.moves:
-            result.append(joint)
-            continue
-        limits = _overridden(reporter, joint, spec.limits.get(joint.name))
-        if limits.acceleration is None and joint.mimic is None:
-            without.append(joint.name)
-            limits = dataclasses.replace(limits, acceleration=spec.default_acceleration)
-        result.append(dataclasses.replace(joint, limits=limits))
-    if without:
-        many = ", ".join(without[:6]) + (", ..." if len(without) > 6 else "")
-        message = (
-            f"no acceleration limit for {many}; using default_acceleration, "
-            f"{spec.default_acceleration:g} rad/s2 or m/s2"
-        )
-        hint = f"add it to the robot file: limits: {{{without[0]}: {{acceleration: ...}}}}"
-        reporter.note("ROBOT330", message, ("limits",), hint=hint)
-    return tuple(result)
-
-
-def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> JointLimits:
-    base = joint.limits
-    if own is None:
-        return base
-    lower, upper = base.lower, base.upper
-    for key, bound in (("lower", own.lower), ("upper", own.upper)):
-        if bound is None:
-            continue
-        outside = (base.lower is not None and bound < base.lower) or (base.upper is not None and bound > base.upper)
-        if outside:
-            within = interval(base.lower, base.upper)
-            message = f"joint '{joint.name}': {key} {bound:g} is outside the description's {within}"
-            hint = joint.meant(bound) or "choose a value inside: the robot file may only narrow the range"
-            reporter.error("ROBOT305", message, ("limits", joint.name, key), hint=hint)
-        elif key == "lower":
-            lower = bound
-        else:
-            upper = bound
-    return JointLimits(
-        lower=lower,
-        upper=upper,
-        velocity=own.velocity if own.velocity is not None else base.velocity,
-        effort=own.effort if own.effort is not None else base.effort,
-        acceleration=own.acceleration if own.acceleration is not None else base.acceleration,
-        jerk=own.jerk if own.jerk is not None else base.jerk,
-        soft=_soft(reporter, joint.name, own, base, lower, upper),
-    )
-
-
-def _soft(
-    reporter: Reporter, joint: str, own: LimitsSpec, base: JointLimits, lower: float | None, upper: float | None
-) -> SoftLimits | None:
-    """The description's soft limits, overridden by the robot file; they must be inside the hard limits."""
-    written = (own.soft_lower, own.soft_upper, own.k_position, own.k_velocity)
-    if all(value is None for value in written):
-        return base.soft
-    before = base.soft or SoftLimits()
-    soft = SoftLimits(*(o if o is not None else b for o, b in zip(written, dataclasses.astuple(before), strict=True)))
-    for key, value in (("soft_lower", own.soft_lower), ("soft_upper", own.soft_upper)):
-        if value is None:
-            continue
-        if (lower is not None and value < lower) or (upper is not None and value > upper):
-            message = f"joint '{joint}': {key} {value:g} is outside its limits {interval(lower, upper)}"
-            reporter.error("ROBOT307", message, ("limits", joint, key), hint="choose a value inside the limits")
-        elif soft.k_position == 0.0:
-            message = f"joint '{joint}': {key} has no effect without k_position"
-            hint = "add k_position, a velocity per distance [1/s]; 20 is a usual value"
-            reporter.error("ROBOT308", message, ("limits", joint, key), hint=hint)
-    if soft.lower is not None and soft.upper is not None and soft.lower >= soft.upper:
-        message = f"joint '{joint}': soft lower limit {soft.lower:g} is not below soft upper limit {soft.upper:g}"
-        reporter.error("ROBOT307", message, ("limits", joint))
-    return soft
-
-
 def _known(reporter: Reporter, name: str, body: _Body, k: int) -> bool:
     return _known_link(reporter, name, body.links, ("collision_parts", k))
 
@@ -341,4 +312,17 @@ def _tool(reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], links: S
         return None if tip is None else Tool(link=tip, X_LT=Transform.identity())
     if not _known_link(reporter, spec.tool.link, links, ("tool", "link")):
         return None
-    return Tool(link=spec.tool.link, X_LT=spec.tool.pose.transform)
+    return Tool(link=spec.tool.link, X_LT=spec.tool.pose.transform, holding=_holding(spec.tool.holding))
+
+
+def _holding(spec: HoldingSpec | None) -> Holding | None:
+    if spec is None:
+        return None
+    if spec.suction is not None:
+        force = spec.suction.force
+        torque = CUP_RADIUS * force if spec.suction.torque is None else spec.suction.torque
+        return Holding("suction", force, torque, spec.suction.reach)
+    if spec.weld is not None:
+        limits = (math.inf if limit is None else limit for limit in (spec.weld.force, spec.weld.torque))
+        return Holding("weld", *limits)
+    return None

@@ -9,8 +9,8 @@ body and the allowed contacts, and returns a `CollisionQuery` for any number of 
 
 Parts are named as in contacts: `robot/<link>`, or the body. A carried body is part of the robot: it moves with its
 link and is checked against the scene and the other links. Never checked: links with at most one moving joint between
-them; links that overlap with all joints at zero and in most configurations (`self_collision.lasting_overlaps`); bodies
-of the scene against each other.
+them; links that overlap with all joints at zero and in most configurations (`self_collision.lasting_overlaps`), or are
+within 4 mm there with one link between them; bodies of the scene against each other.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision_pairs import Part, checked_pairs, margins_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.motion_bound import MotionBound, Mover
-from manipcli.model.self_collision import lasting_overlaps
+from manipcli.model.self_collision import CLOSE, lasting_overlaps, spaced_by_one
 from manipcli.scene.scene import Scene
 from manipcli.shapes.proximity import bounding_ball, coal_shape
 
@@ -76,7 +76,7 @@ def pairs(links: Iterable[str], *bodies: str) -> frozenset[Pair]:
 
 
 class CollisionChecker:
-    """The shapes of a robot and a scene."""
+    """The shapes of a robot and a scene. `spaced`: pairs of links that are never checked, see `spaced_by_one`."""
 
     def __init__(self, kinematics: Kinematics, scene: Scene, *, ignore: Iterable[Pair] = ()) -> None:
         """
@@ -98,8 +98,11 @@ class CollisionChecker:
                     Part(f"robot/{link.name}", "link", frame.parentJoint, placement, coal_shape(g.shape))
                 )
         self._near = _neighbours(model)
-        self._ignored = {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in ignore}
-        self._ignored |= self._touching_at_zero()
+        self._ignored = _of_links(ignore)
+        self._ignored |= _of_links(lasting_overlaps(kinematics.robot, self._at_zero(0.0)))
+        close = self._at_zero(CLOSE)
+        self.spaced = spaced_by_one(model, [pair for pair, distance in close.items() if distance >= 0.0])
+        self._ignored |= _of_links(self.spaced)
 
     def at(
         self,
@@ -147,13 +150,15 @@ class CollisionChecker:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
         return CollisionQuery(self._kinematics, parts, self._near, allowed, margin, margins=margins, only=only)
 
-    def _touching_at_zero(self) -> set[frozenset[str]]:
-        """Links modelled into each other, of those that touch with every joint at zero or at its nearest limit."""
-        robot = self._kinematics.robot
-        zero = CollisionQuery(self._kinematics, self._links, self._near, self._ignored, 0.0)
-        hits = zero.every([joint.limits.nearest(0.0) for joint in robot.moving_joints])
-        links = {(hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")): hit.distance for hit in hits}
-        return {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in lasting_overlaps(robot, links)}
+    def _at_zero(self, margin: float) -> dict[Pair, float]:
+        """Distance [m] of the links closer than `margin` with every joint at zero, or at its nearest limit."""
+        zero = CollisionQuery(self._kinematics, self._links, self._near, self._ignored, margin)
+        hits = zero.every([joint.limits.nearest(0.0) for joint in self._kinematics.robot.moving_joints])
+        return {(hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")): hit.distance for hit in hits}
+
+
+def _of_links(pairs: Iterable[Pair]) -> set[frozenset[str]]:
+    return {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in pairs}
 
 
 class CollisionQuery:

@@ -3,9 +3,9 @@
 - *pressing*: the links of the robot that touch an object with force.
 - *pinched*: at least two links press, each with at least `GRIP_FORCE`. Used by the conditions `grasped` and
   `slip` and by the end of `release`; needs contacts only.
-- *carried*: a link presses, and the object has followed at least `FOLLOWS` of the hand's motion, since
-  the hand closed and since the step began. Used by every step that ends with an object in the hand, and by re-planning;
-  needs contacts and poses.
+- *carried*: a link presses, or it is attached to the tool, and the object has followed at least `FOLLOWS` of the
+  hand's motion, since the hand closed and since the step began. Used by every step that ends with an object in the
+  hand, and by re-planning; needs contacts and poses.
 
 The condition `slip` and the grasp intervals of a report build on `pressing`: `slip` measures how far a pinched object
 moved in the hand, an interval is the time in which an object is pressed and has no other support.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -102,6 +102,13 @@ def _behind(hand: Array, body: Array, travel: float) -> bool:
     return float(np.linalg.norm(hand - body)) > (1.0 - FOLLOWS) * travel
 
 
+class Attachment(Protocol):
+    """What is attached to the tool; "" without an object, and why the last attachment broke, or ""."""
+
+    attached: str
+    broken: str
+
+
 class Grasp:
     """Tracks the object in the hand to decide whether the hand carries it.
 
@@ -112,9 +119,13 @@ class Grasp:
     Args:
         kinematics, scene: of the world that is measured.
         period: [s] between two calls of `look`.
+        attachment: of objects to the tool; None: contact and friction hold them.
     """
 
-    def __init__(self, kinematics: Kinematics, scene: Scene, *, period: float = 0.0) -> None:
+    def __init__(
+        self, kinematics: Kinematics, scene: Scene, *, period: float = 0.0, attachment: Attachment | None = None
+    ) -> None:
+        self._attachment = attachment
         self._kinematics = kinematics
         self._scene = scene
         self._bridged = max(BRIDGED, 2.0 * period)
@@ -166,7 +177,10 @@ class Grasp:
         points = self._points(state)
         lags = [lag for motion in reversed(self._motions) if (lag := motion.lag(*points)) is not None]
         reasons = []
-        if float(state.time) - self._pressed_at > self._bridged:
+        if self._attachment is not None:
+            if self._attachment.attached != carried.body:
+                reasons.append(self._attachment.broken or "it is not attached to the tool")
+        elif float(state.time) - self._pressed_at > self._bridged:
             reasons.append("no robot link presses on it")
         if lags:
             reasons.append(_described(*lags[0]))

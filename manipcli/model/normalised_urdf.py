@@ -14,10 +14,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput, Severity
 from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Inertial, Joint, Link, TransmissionTag
 from manipcli.description.urdf.joint import UNBOUNDED
+from manipcli.model.inertials import ESTIMATE, massless_bodies
 from manipcli.model.robot import RobotModel
 from manipcli.shapes.mesh import clean_mesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere, drawn_once
@@ -83,21 +84,18 @@ MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)
 
 def massless_joints(robot: RobotModel) -> tuple[str, ...]:
     """Moving joints whose child link has no mass, including all links fixed to it."""
-    massive = {link.name for link in robot.links if link.inertial is not None}
-    for joint in reversed(robot.joints):  # children come after parents
-        if joint.type == "fixed" and joint.child in massive:
-            massive.add(joint.parent)
-    return tuple(joint.name for joint in robot.moving_joints if joint.child not in massive)
+    massless = massless_bodies(robot.joints, {link.name for link in robot.links if link.inertial is not None})
+    return tuple(joint.name for joint in robot.moving_joints if joint.child in massless)
 
 
-def massless_links(robot: RobotModel, code: str) -> tuple[Diagnostic, ...]:
-    """An error for each child link of `massless_joints`: no engine with physics can simulate it."""
+def massless_links(robot: RobotModel, code: str, *, severity: Severity = "error") -> tuple[Diagnostic, ...]:
+    """A finding for each child link of `massless_joints`: no engine with physics can simulate it."""
     found = []
     for name in massless_joints(robot):
         link = robot.link(robot.joint(name).child)
         message = f"link '{link.name}' has no mass (nor the links fixed to it) and is moved by joint '{name}'"
-        hint = "add an <inertial> with a mass, or use an engine without physics"
-        found.append(Diagnostic(code, message, link.place, hint))
+        hint = f"{ESTIMATE}, add an <inertial> to the link, or use an engine without physics"
+        found.append(Diagnostic(code, message, link.place, hint, severity))
     return tuple(found)
 
 

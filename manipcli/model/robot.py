@@ -5,16 +5,19 @@ Frames: L link, J joint (coincides with its child link), P parent link, B robot 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Final, Literal
 
 from manipcli.core.geometry import Transform
+from manipcli.core.text import digits
 from manipcli.description.elements import (
     Joint,
     Link,
     TransmissionTag,
 )
+from manipcli.model.holding import Holding
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +40,14 @@ class NamedPose:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """The tool frame T at `X_LT` in `link`: +z is the approach direction, y the direction in which fingers close."""
+    """The tool frame T at `X_LT` in `link`: +z is the approach direction, y the direction in which fingers close.
+
+    `holding`: the attachment that holds objects; None: contact and friction do.
+    """
 
     link: str
     X_LT: Transform
+    holding: Holding | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +74,56 @@ class Actuator:
     latency: int = 0
 
 
+_INERTIAL: Final = re.compile(
+    r"(?P<kind>given|estimated|repaired): (?P<mass>\S+) kg, centre \[(?P<centre>[^]]+)\] m, "
+    r"principal moments \[(?P<moments>[^]]+)\] kg m2, from (?P<source>.*)"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkInertial:
+    """Where the inertial of a link comes from, if not from its description.
+
+    Attributes:
+        link: name.
+        kind: `given` by the robot file; `estimated`; `repaired`: the mass is the description's, the inertia estimated.
+        mass: [kg].
+        centre: (3,) [m] centre of mass in the link.
+        moments: (3,) [kg m2] principal moments of inertia, increasing.
+        source: what was measured: "collision shapes (closed mesh)"; "robot file".
+    """
+
+    link: str
+    kind: Literal["given", "estimated", "repaired"]
+    mass: float
+    centre: tuple[float, ...]
+    moments: tuple[float, ...]
+    source: str
+
+    def __str__(self) -> str:
+        centre, moments = (
+            ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in values) for values in (self.centre, self.moments)
+        )
+        return (
+            f"{self.kind}: {digits(self.mass)} kg, centre [{centre}] m, principal moments [{moments}] kg m2, "
+            f"from {self.source}"
+        )
+
+    @classmethod
+    def read(cls, link: str, text: str) -> LinkInertial:
+        """From its text, as a log has it; of 3 to 4 digits.
+
+        Raises:
+            ValueError: it is not such a text.
+        """
+        found = _INERTIAL.fullmatch(text)
+        if found is None:
+            raise ValueError(f"not an inertial: {text}")
+        centre, moments = (tuple(map(float, found[key].split(", "))) for key in ("centre", "moments"))
+        kind: Literal["given", "estimated", "repaired"] = found["kind"]  # type: ignore[assignment]
+        return cls(link, kind, float(found["mass"]), centre, moments, found["source"])
+
+
 @dataclass(frozen=True, eq=False)
 class RobotModel:
     """The robot, with joints in depth-first order from the root: parent links come before child links.
@@ -74,7 +131,7 @@ class RobotModel:
     `urdf`: normalised description with package:// mesh URIs, as stored in logs. `X_WB`: pose of the root link in the
     world. `friction`: friction coefficient of its surfaces. `collision_ignore`: pairs of links that planning never
     checks against each other. `compat`: convention of four-bar linkages, which differ between ROS 1 and ROS 2.
-    `actuators`: those with known parameters.
+    `actuators`: those with known parameters. `inertials`: those that are not the description's.
     """
 
     name: str
@@ -91,6 +148,12 @@ class RobotModel:
     friction: float = 1.0
     compat: Literal["ros1", "ros2"] = "ros2"
     actuators: tuple[Actuator, ...] = ()
+    inertials: tuple[LinkInertial, ...] = ()
+
+    @property
+    def holding(self) -> Holding | None:
+        """The attachment that holds objects in the tool; None: contact and friction do."""
+        return None if self.tool is None else self.tool.holding
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:

@@ -5,20 +5,20 @@ Every pair of links with collision shapes has one kind, as in MoveIt's setup ass
 - `adjacent`: at most one moving joint between them; never checked.
 - `ignored`: named under `collision_ignore`; never checked.
 - `always`: they overlap in every sample and with all joints at zero; never checked.
-- `default`: they overlap with all joints at zero, by no more than `TOUCHING` or in most configurations too; never
-  checked.
+- `default`: they overlap with all joints at zero, by no more than `TOUCHING` or in most configurations too; or they are
+  closer than `CLOSE` there, with one link between them; never checked.
 - `sometimes`: they overlap in some samples; checked.
 - `never`: they overlap in no sample; checked all the same, because samples are no proof, and because leaving these
   pairs out makes a query no faster (the broad phase sorts them out). `proven` marks the pairs that cannot come near
   each other anywhere within the joint limits.
 
-What planning checks does not depend on the matrix: `lasting_overlaps` is the rule of both.
+What planning checks does not depend on the matrix: `lasting_overlaps` and `spaced_by_one` are the rules of both.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, count
@@ -50,6 +50,10 @@ PROBES: Final = 100
 """Configurations that decide whether links that overlap at zero belong together or can come apart."""
 TOUCHING: Final = 1e-3
 """[m] Overlap up to which two links only touch."""
+CLOSE: Final = 0.004
+"""[m] Links with one link between them that are closer than this with all joints at zero are built so.
+
+It is the default clearance of plans: a robot could not even start there."""
 MOST_CELLS: Final = 4000
 """Distances computed for one proof, at most; a pair that needs more is not proven."""
 
@@ -150,7 +154,9 @@ def _tested(robot: RobotModel, links: _Links) -> tuple[list[tuple[str, str]], se
     tested = [pair for pair in pairs if not links.adjacent(*pair) and frozenset(pair) not in ignored]
     zero = np.array([joint.limits.nearest(0.0) for joint in robot.moving_joints])
     touching = [pair for pair, hit in zip(tested, links.tester(tested)(zero), strict=True) if hit]
-    return tested, lasting_overlaps(robot, {pair: links.distance(*pair, zero) for pair in touching})
+    lasting = lasting_overlaps(robot, {pair: links.distance(*pair, zero) for pair in touching})
+    spaced = spaced_by_one(links.model, set(tested) - set(touching))
+    return tested, lasting | {pair for pair in spaced if links.distance(*pair, zero) < CLOSE}
 
 
 def lasting_overlaps(robot: RobotModel, at_zero: Mapping[tuple[str, str], float]) -> set[tuple[str, str]]:
@@ -174,6 +180,18 @@ def lasting_overlaps(robot: RobotModel, at_zero: Mapping[tuple[str, str], float]
     return found
 
 
+def spaced_by_one(model: pin.Model, pairs: Iterable[tuple[str, str]]) -> frozenset[tuple[str, str]]:
+    """Those pairs of links with one link between them on their chain. Planning never checks the ones that are apart
+    with all joints at zero, but closer than `CLOSE`."""
+    parents = [int(parent) for parent in model.parents]
+
+    def spaced(a: str, b: str) -> bool:
+        i, j = (model.frames[model.getFrameId(name)].parentJoint for name in (a, b))
+        return bool(i != j and (parents[parents[i]] == j or parents[parents[j]] == i))
+
+    return frozenset(pair for pair in pairs if spaced(*pair))
+
+
 def _ranges(robot: RobotModel) -> tuple[Array, Array]:
     """(n,) lower and upper ends of the positions; a mimic joint reaches what its leader makes of it."""
     lower = np.array([-UNLIMITED if j.limits.lower is None else j.limits.lower for j in robot.moving_joints])
@@ -192,7 +210,7 @@ class _Links:
 
         self._lower, self._upper = lower, upper
         self._pin = pin
-        self._model = model = kinematics.model
+        self.model = model = kinematics.model
         self._data = model.createData()
         self._geometry = pin.GeometryModel()
         self.shapes: dict[str, list[int]] = {}
@@ -210,7 +228,7 @@ class _Links:
     def adjacent(self, a: str, b: str) -> bool:
         """Whether at most one moving joint is between two links."""
         i, j = self._joint[a], self._joint[b]
-        return i == j or self._model.parents[i] == j or self._model.parents[j] == i
+        return i == j or self.model.parents[i] == j or self.model.parents[j] == i
 
     def tester(self, pairs: Sequence[tuple[str, str]]) -> Callable[[Array], Flags]:
         """A function of a configuration (n,): whether each of the pairs overlaps (k,)."""
@@ -219,7 +237,7 @@ class _Links:
         results = list(data.collisionResults)  # views: they change with each computation
 
         def overlaps(q: Array) -> Flags:
-            self._pin.computeCollisions(self._model, self._data, geometry, data, q, False)
+            self._pin.computeCollisions(self.model, self._data, geometry, data, q, False)
             touching = [result.isCollision() for result in results]
             return np.asarray(np.bincount(owners, weights=touching, minlength=len(pairs)) > 0.0)
 
@@ -243,8 +261,8 @@ class _Links:
 
     def _least(self, geometry: pin.GeometryModel, data: pin.GeometryData, q: Array) -> float:
         """The least distance [m] of all pairs of shapes."""
-        self._pin.forwardKinematics(self._model, self._data, q)
-        self._pin.updateGeometryPlacements(self._model, self._data, geometry, data)
+        self._pin.forwardKinematics(self.model, self._data, q)
+        self._pin.updateGeometryPlacements(self.model, self._data, geometry, data)
         count = len(geometry.collisionPairs)
         return float(min(self._pin.computeDistance(geometry, data, k).min_distance for k in range(count)))
 
@@ -304,14 +322,14 @@ class _Links:
             to_a = self._radius(a) + sum(lengths[: k + below])
             to_b = self._radius(b) + sum(lengths[k + below :])
             reach.append(1.0 if self._slides(joint) else min(to_a, to_b))
-        return [self._model.joints[joint].idx_q for joint in joints], np.array(reach)
+        return [self.model.joints[joint].idx_q for joint in joints], np.array(reach)
 
     def _chain(self, joint: int) -> list[int]:
         """The joint and all above it."""
         found = []
         while joint:
             found.append(joint)
-            joint = self._model.parents[joint]
+            joint = self.model.parents[joint]
         return found
 
     def _radius(self, link: str) -> float:
@@ -327,9 +345,9 @@ class _Links:
 
     def _length(self, joint: int) -> float:
         """Greatest distance [m] between the origins of a joint and of its parent joint."""
-        placed = float(np.linalg.norm(self._model.jointPlacements[joint].translation))
-        k = self._model.joints[joint].idx_q
+        placed = float(np.linalg.norm(self.model.jointPlacements[joint].translation))
+        k = self.model.joints[joint].idx_q
         return placed + (float(max(abs(self._lower[k]), abs(self._upper[k]))) if self._slides(joint) else 0.0)
 
     def _slides(self, joint: int) -> bool:
-        return "Prismatic" in self._model.joints[joint].shortname()
+        return "Prismatic" in self.model.joints[joint].shortname()

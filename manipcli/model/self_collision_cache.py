@@ -13,7 +13,7 @@ from manipcli.core.cache import cache_key, read_cached, write_cached
 from manipcli.core.version import __version__
 from manipcli.model.link_parts import link_parts_to_json
 from manipcli.model.robot import RobotModel
-from manipcli.model.self_collision import SAMPLES, Kind, LinkPair, SelfCollisionMatrix, sampled_matrix
+from manipcli.model.self_collision import CLOSE, SAMPLES, Kind, LinkPair, SelfCollisionMatrix, sampled_matrix
 from manipcli.shapes.primitives import Mesh
 from manipcli.spec.base import Model
 
@@ -50,7 +50,7 @@ def self_collision_matrix(robot: RobotModel, *, samples: int = SAMPLES) -> SelfC
         samples: number of random configurations.
     """
     digest = robot_hash(robot)
-    key = cache_key(digest, str(samples), __version__, metadata.version("coal"), metadata.version("pin"))
+    key = cache_key(digest, str(samples), str(CLOSE), __version__, metadata.version("coal"), metadata.version("pin"))
     stored = read_cached(KIND, key)
     known = None if stored is None else _read(stored, digest, robot, samples)
     if known is not None:

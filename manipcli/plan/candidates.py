@@ -23,6 +23,8 @@ REASONS: Final = 3
 """Number of reasons that a refusal lists."""
 OTHER: Final = math.radians(40.0)
 """[rad] Grasps that differ by less count as the same: where one of them fails, the other is likely to fail."""
+ELSEWHERE: Final = 0.3
+"""Share of the sides of a region: places nearer in both directions count as the same."""
 NUMBER: Final = re.compile(r"(?<![\w.])-?\d+(\.\d+)?")
 """A number in a cause, but no digits in a name."""
 
@@ -35,6 +37,7 @@ class Candidate:
         plan: its plan; raises NotPlannable.
         name: in reports; "" for the only way.
         grasp: R_WT (3, 3) of the tool when the hand closes; None for a step that does not grasp.
+        place: (2,) where in a region an object is put, in shares of its sides; None for a step without a region.
         look: why `plan` surely raises, found much sooner than by it; None if it may have a plan. The reason that is
             reported is that of `plan`.
     """
@@ -43,6 +46,12 @@ class Candidate:
     name: str = ""
     grasp: Array | None = None
     look: Callable[[], NotPlannable | None] = lambda: None
+    place: Array | None = None
+
+    @property
+    def choice(self) -> Array | None:
+        """What later steps depend on: its grasp or its place."""
+        return self.place if self.grasp is None else self.grasp
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +103,7 @@ class Attempts:
 
     Args:
         candidates: of the step.
-        exclude: grasps, R_WT (3, 3) each; candidates near one of them are skipped.
+        exclude: grasps, R_WT (3, 3) each, and places, (2,); candidates near one of them are skipped.
         prefer: index of the candidate that is tried before all others.
     """
 
@@ -112,7 +121,7 @@ class Attempts:
             NotPlannable: no other candidate has one; with the commonest reasons of all refused ones.
         """
         for index, candidate in self._options:
-            if candidate.grasp is not None and any(alike(candidate.grasp, R_WT) for R_WT in self.excluded):
+            if candidate.choice is not None and any(alike(candidate.choice, other) for other in self.excluded):
                 continue
             # A look costs part of a plan: the first candidate often has one.
             if self._refused and candidate.look() is not None:
@@ -186,6 +195,13 @@ def refusal_of(dropped: Iterable[Dropped], what: str) -> NotPlannable:
     return NotPlannable(cause, hint=first_.hint, parts=parts, remedy=first_.remedy)
 
 
-def alike(R_A: Array, R_B: Array) -> bool:
-    """Whether two rotations (3, 3) differ by less than `OTHER`; the trace of R_A^T R_B is 1 + 2 cos(angle)."""
-    return float(np.sum(R_A * R_B)) > 1.0 + 2.0 * math.cos(OTHER)
+def alike(a: Array, b: Array) -> bool:
+    """Whether two grasps, rotations (3, 3), differ by less than `OTHER`, or two places (2,) by less than `ELSEWHERE`.
+
+    The trace of A^T B is 1 + 2 cos(angle).
+    """
+    if a.shape != b.shape:
+        return False
+    if a.shape == (2,):
+        return float(np.max(np.abs(a - b))) < ELSEWHERE
+    return float(np.sum(a * b)) > 1.0 + 2.0 * math.cos(OTHER)

@@ -13,6 +13,7 @@ from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc, Place
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
+from manipcli.plan.hand import handless
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
@@ -149,6 +150,8 @@ def unmoved_tool(claims: Claims, robot: RobotModel, loc: Loc) -> tuple[Problem, 
 
 def unmoved_hand(claims: Claims, robot: RobotModel, posture: str, loc: Loc) -> tuple[Problem, ...]:
     """A problem unless one gripper controller moves the hand to this pose of the robot."""
+    if handless(robot, posture):
+        return ()
     posed = set(robot.pose(posture).joints)
     if posed & set(claims.hand):
         return _not_one_hand(claims, loc)

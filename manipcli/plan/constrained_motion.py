@@ -1,6 +1,6 @@
 """Motions within the limits, torques and constraints of a step: straight in joint space, on a line, or a smooth curve.
 
-Collisions are checked by the caller, except on a path that a constraint led away from the straight one.
+Collisions are checked by the caller, except on the tool's line, which a constraint led away from the straight path.
 """
 
 from __future__ import annotations
@@ -41,8 +41,10 @@ def straight_motion(
     *,
     query: CollisionQuery,
     line: Transform | None,
-) -> JointTrajectory:
-    """Straight in joint space to `end` (n); where that violates a constraint, on the tool's line or a searched path.
+    reserve: bool = True,
+) -> JointTrajectory | None:
+    """Straight in joint space to `end` (n); where that violates a constraint, on the tool's line; None if that does not
+    do, either: a path is to be searched.
 
     Args:
         planner, state, label: what moves, from where, and the label of the motion.
@@ -50,43 +52,25 @@ def straight_motion(
         end: of all joints.
         query: for a path that is not straight.
         line: the tool pose at `end`, if the arm may arrive there in another configuration.
+        reserve: whether the constraints are tighter by what is left to the run, whose tracking is not exact.
 
     Raises:
-        NotPlannable: no such motion keeps the limits and constraints.
+        NotPlannable: a motion that keeps the constraints exceeds a limit, or start or end violate a constraint.
     """
     keeps = applying(keeps_of(planner, state, label), end)
-    reserved = reserving(keeps, state.position, end)
-    if reserved != keeps:
-        try:
-            return _straight(planner, state, label, limits, end, reserved, query=query, line=line)
-        except NotPlannable:
-            pass  # the run may then exceed the constraint by its tracking error
-    return _straight(planner, state, label, limits, end, keeps, query=query, line=line)
-
-
-def _straight(
-    planner: Planner,
-    state: PlanningState,
-    label: str,
-    limits: MotionLimits,
-    end: Array,
-    keeps: tuple[Kept, ...],
-    *,
-    query: CollisionQuery,
-    line: Transform | None,
-) -> JointTrajectory:
-    refusal: NotPlannable | None = None
-    for points in kept_paths(planner, state, query, limits.names, end, keeps, line):
+    if reserve:
+        keeps = reserving(keeps, state.position, end)
+    for points in kept_paths(planner, state, limits.names, end, keeps, line):
         try:
             trajectory = _smooth(planner, state, limits, points, keeps)
             if len(points) > 2:
                 refuse_collision(planner, state, query, label, trajectory, None)
-        except NotPlannable as cause:
-            refusal = cause
-            continue
-        return trajectory
-    assert refusal is not None
-    raise refusal
+        except NotPlannable:
+            if len(points) == 2:
+                raise
+        else:
+            return trajectory
+    return None
 
 
 def tool_motion(

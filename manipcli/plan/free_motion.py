@@ -14,9 +14,10 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.model.edge_check import SLACK
-from manipcli.plan.constrained_motion import smooth_motion
+from manipcli.plan.constrained_motion import smooth_motion, straight_motion
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.keep import margins, reserving
+from manipcli.plan.kept_path import unkept_straight
 from manipcli.plan.motion import Grip, Motion, PlanningState
 from manipcli.plan.motion_constraints import applying, keeps_of
 from manipcli.plan.motion_limits import MotionLimits
@@ -47,18 +48,24 @@ def free_trajectory(
     planner: Planner,
     state: PlanningState,
     query: CollisionQuery,
-    straight: JointTrajectory,
+    straight: JointTrajectory | None,
     grip: Grip | None,
     limits: MotionLimits,
     label: str,
     verb: str,
     goals: Goals | None,
+    target: Array,
 ) -> JointTrajectory:
     """The `straight` motion where it is free; else around obstacles, if `goals` are given and paths are searched.
 
+    Without one that keeps the constraints, a path that does is searched, to the `target` (n) if no `goals` are given.
+
     Raises:
-        NotPlannable: both are obstructed.
+        NotPlannable: both are obstructed, or violate a constraint.
     """
+    if straight is None:
+        with labelled(label, verb):
+            return _keeping(planner, state, query, grip, limits, label, goals, target)
     hit = first_hit(planner, state, query, straight, grip)
     if hit is None:
         return straight
@@ -69,6 +76,36 @@ def free_trajectory(
         raise refusal
     with labelled(label, verb):
         return around(planner, search, state, query, goals(search.rng), limits, grip, label)
+
+
+def _keeping(
+    planner: Planner,
+    state: PlanningState,
+    query: CollisionQuery,
+    grip: Grip | None,
+    limits: MotionLimits,
+    label: str,
+    goals: Goals | None,
+    target: Array,
+) -> JointTrajectory:
+    """A searched motion that keeps the constraints; without any, a straight one that leaves no reserve to the run."""
+    search = planner.searching()
+    refusal: NotPlannable | None = None
+    if search is not None:
+        ends = target[list(planner.robot.indices(limits.names))][None] if goals is None else goals(search.rng)
+        try:
+            return around(planner, search, state, query, ends, limits, grip, label)
+        except NotPlannable as other:
+            refusal = other
+    keeps = applying(keeps_of(planner, state, label), target)
+    if refusal is not None or not planner.searches:  # else one is searched later
+        unreserved = straight_motion(planner, state, label, limits, target, query=query, line=None, reserve=False)
+        if unreserved is not None:
+            hit = first_hit(planner, state, query, unreserved, grip)
+            if hit is None:
+                return unreserved
+            refusal = refusal or blocked(planner, state, hit, label)
+    raise refusal or unkept_straight(planner, state, limits.names, target, keeps)
 
 
 def line_blocked(planner: Planner, state: PlanningState, X_WT: Transform, query: CollisionQuery) -> NotPlannable | None:
@@ -106,7 +143,7 @@ def refusing(
 
     def refuse(q: Array) -> object | None:
         if any(np.abs(q - other).max() < BRANCH for other in avoid):
-            return "the arm has a configuration that was tried"
+            return "it has the configuration of a candidate that was tried before"
         hit = query.check(q)
         if hit is not None or not free:
             return None if hit is None else planner.in_the_way(hit)
@@ -170,8 +207,9 @@ def around(
     keeps = reserving(applying(keeps_of(planner, state, label), end), state.position, end)
     keeps = tuple(kept for kept in keeps if kept.margin is not None)
     margin = partial(margins, keeps) if keeps else None
+    words = ", ".join(f"`{kept.name}`" for kept in keeps)
     for _ in range(_ROUNDS):
-        path = search.path(planner.robot, state, query, limits.names, goals, grip, margin)
+        path = search.path(planner.robot, state, query, limits.names, goals, grip, margin, words)
         for share in _FINER:
             points = rounded(path, share * search.spec.deviation)
             try:

@@ -18,7 +18,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,14 +26,13 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.model.grasp import friction_coefficient, friction_load
+from manipcli.plan.attachment import MOST, AttachedForce
 from manipcli.plan.grasp_contacts import PALM, GraspContact, finger_links, grasp_contacts
-from manipcli.plan.motion import StepPlan
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 
 EDGES: Final = 8
 """Edges of the pyramid inside a friction cone; it is at most 8 % narrower."""
-MOST: Final = 1e3
-"""Largest ratio to the weight that is computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +43,13 @@ class GraspMargin:
         body: the object.
         force: [N] of each finger.
         friction: coefficient mu.
-        weight: [N] of the object.
+        weight: [N] of the object with its contents.
         ratio: largest multiple of its weight that is held, at rest and as it is grasped.
         acceleration: [m/s2] largest acceleration in any of 14 directions (axes and diagonals) that is held with the
             weight; 0 if the weight is not held.
         contacts: number of fingers that touch.
+        contents: what lies in the object, which the hand carries, too.
+        attachment: `suction (60 N)`: what holds instead of fingers, with `force` [N] as its limit; "" for fingers.
     """
 
     body: str
@@ -58,6 +59,8 @@ class GraspMargin:
     ratio: float
     acceleration: float
     contacts: int
+    contents: tuple[str, ...] = ()
+    attachment: str = ""
 
     @property
     def text(self) -> str:
@@ -66,70 +69,106 @@ class GraspMargin:
             f"{number_of(self.contacts, 'finger')} at {readable(self.force, 'N')} each, "
             f"coefficient of friction {self.friction:.3g}"
         )
+        grip = self.attachment or grip
+        what = f"'{self.body}'{' with its contents' if self.contents else ''} ({readable(self.weight, 'N')})"
         if self.ratio < 1.0:
-            return (
-                f"'{self.body}' ({readable(self.weight, 'N')}) is not held: {grip} holds {self.ratio:.2g} x its weight"
-            )
+            return f"{what} is not held: {grip} holds {self.ratio:.2g} x its weight"
         most = f"{MOST:.0f} x or more" if self.ratio >= MOST else f"{self.ratio:.2g} x"
-        return (
-            f"holds {most} the weight of '{self.body}' ({readable(self.weight, 'N')}) and "
-            f"{self.acceleration:.3g} m/s2 in any direction: {grip}"
-        )
+        return f"holds {most} the weight of {what} and {self.acceleration:.3g} m/s2 in any direction: {grip}"
 
 
 def grasp_margin(planner: Planner, plan: StepPlan) -> GraspMargin | None:
     """The margin of the grasp with which a step ends; None if it grasps nothing, or without a stated grip force."""
-    closing = next((m for m in plan.motions if m.grip is not None and m.grip.force is not None), None)
-    if closing is None or closing.grip is None or closing.grip.force is None or plan.end.carried is None:
+    closed = _closed(planner, plan)
+    if closed is None:
         return None
-    grip, force = closing.grip, closing.grip.force
-    body = planner.scene.body(plan.end.carried.body)
-    contacts = grasp_contacts(planner, plan.end, grip.joints)
+    joints, force, name = closed
+    body, load = planner.scene.body(name), _load(planner, plan.end, name)
     mu = friction_coefficient(planner.robot, body)
-    g = float(np.linalg.norm(planner.scene.gravity))
-    centre = (planner.body_pose(plan.end, body.name) @ body.X_OI).p
-    limits = force_limits(contacts, force, len(finger_links(planner.robot, grip.joints)))
-    held = HeldForce(contacts, limits, centre, mu)
-    weight = body.mass * g
-    ratio = held.most(planner.scene.gravity * body.mass) if weight else MOST
+    contacts: tuple[GraspContact, ...] = ()
+    holding = planner.robot.holding
+    held: HeldForce | AttachedForce
+    if holding is not None:
+        held = AttachedForce(planner, plan.end, load.centre, mu)
+    else:
+        contacts = grasp_contacts(planner, plan.end, joints)
+        limits = force_limits(contacts, force, len(finger_links(planner.robot, joints)))
+        held = HeldForce(contacts, limits, load.centre, mu)
+    pull = planner.scene.gravity * load.mass
+    weight = float(np.linalg.norm(planner.scene.gravity)) * load.mass
+    ratio = held.most(pull) if weight else MOST
     acceleration = 0.0
     if ratio >= 1.0:
-        acceleration = min(
-            held.most(-direction, beside=planner.scene.gravity * body.mass) / body.mass for direction in DIRECTIONS
-        )
+        acceleration = min(held.most(-direction, beside=pull) / load.mass for direction in DIRECTIONS)
     touching = len({contact.finger for contact in contacts} - {PALM})
-    return GraspMargin(body.name, force, mu, weight, ratio, acceleration, touching)
+    attachment = "" if holding is None else holding.limits
+    return GraspMargin(name, force, mu, weight, ratio, acceleration, touching, load.contents, attachment)
 
 
 def carries(planner: Planner, plan: StepPlan) -> bool:
     """Whether the weight may be held, by a bound that needs no linear program: the forces along the vertical alone.
 
+    It is the weight of the object with its contents.
     A finger that presses with F holds at most F (n . u + mu sqrt(1 - (n . u)^2)) against gravity, with u up and n the
     normal of one of its contacts: moments and the other components only lower that. A palm below the object holds all.
     True, too, where friction is too low for the hand at any level grasp: another grasp is then no better.
     """
-    closing = next((m for m in plan.motions if m.grip is not None and m.grip.force is not None), None)
-    if closing is None or closing.grip is None or closing.grip.force is None or plan.end.carried is None:
-        return True
-    body = planner.scene.body(plan.end.carried.body)
-    gravity = planner.scene.gravity
+    if planner.robot.holding is not None:
+        margin = grasp_margin(planner, plan)
+        return margin is None or margin.ratio >= 1.0
+    closed, gravity = _closed(planner, plan), planner.scene.gravity
     g = float(np.linalg.norm(gravity))
-    if not g:
+    if closed is None or not g:
         return True
-    mu = friction_coefficient(planner.robot, body)
+    joints, force, name = closed
+    mu = friction_coefficient(planner.robot, planner.scene.body(name))
     most: dict[int, float] = {}
-    for contact in grasp_contacts(planner, plan.end, closing.grip.joints):
+    for contact in grasp_contacts(planner, plan.end, joints):
         up = -float(contact.normal @ gravity) / g
         if contact.finger == PALM and up > 0.0:
             return True
         best = up + mu * math.sqrt(max(0.0, 1.0 - up * up)) if up < 1.0 / math.hypot(1.0, mu) else math.hypot(1.0, mu)
         most[contact.finger] = max(most.get(contact.finger, 0.0), best)
-    force, weight = closing.grip.force, body.mass * g
-    hand = len(finger_links(planner.robot, closing.grip.joints))
+    weight = _load(planner, plan.end, name).mass * g
+    hand = len(finger_links(planner.robot, joints))
     if friction_load(mu, [force] * hand) < weight:
         return True
     held = sum(share * (hand if finger == PALM else 1) for finger, share in most.items())
     return force * held >= weight
+
+
+class _Load(NamedTuple):
+    """What a hand carries: mass [kg], centre of mass (3,) in the world, and what lies in the object."""
+
+    mass: float
+    centre: Array
+    contents: tuple[str, ...]
+
+
+def _load(planner: Planner, state: PlanningState, name: str) -> _Load:
+    """An object and its contents, as one rigid body."""
+    contents = planner.contents(state, name)
+    bodies = [planner.scene.body(each) for each in (name, *contents)]
+    centres = [(planner.body_pose(state, body.name) @ body.X_OI).p for body in bodies]
+    mass = sum(body.mass for body in bodies)
+    if not contents:
+        return _Load(mass, centres[0], ())
+    moment = np.sum([body.mass * centre for body, centre in zip(bodies, centres, strict=True)], axis=0)
+    return _Load(mass, moment / mass, contents)
+
+
+def _closed(planner: Planner, plan: StepPlan) -> tuple[tuple[str, ...], float, str] | None:
+    """Joints of the hand, force [N] and object of a step that grasps; None if it does not, or without a force.
+
+    The force is that of the grip; of an attachment, its limit.
+    """
+    closing, holding = next((m for m in plan.motions if m.closes), None), planner.robot.holding
+    if closing is None or plan.end.carried is None:
+        return None
+    grip, name = closing.grip, plan.end.carried.body
+    if holding is not None:
+        return () if grip is None else grip.joints, holding.force, name
+    return None if grip is None or grip.force is None else (grip.joints, grip.force, name)
 
 
 def force_limits(contacts: Sequence[GraspContact], force: float, count: int) -> dict[int, float]:

@@ -34,6 +34,22 @@ def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], 
     return tuple(tuple(finger) for finger in found.values())
 
 
+def handless(robot: RobotModel, posture: str) -> bool:
+    """Whether the robot holds without fingers: by suction, or by a weld without this pose of a hand."""
+    holding = robot.holding
+    if holding is None or holding.kind == "suction":
+        return holding is not None
+    return posture in ("open", "closed") and posture not in {pose.name for pose in robot.poses}
+
+
+def posture_values(robot: RobotModel, name: str) -> dict[str, float]:
+    """The joint values of a pose of the hand; none for a robot that holds without fingers."""
+    if handless(robot, name):
+        return {}
+    pose = robot.pose(name)
+    return dict(zip(pose.joints, pose.positions, strict=True))
+
+
 def closing_speed(robot: RobotModel, joints: Sequence[str], stated: float | None) -> float:
     """Speed of a hand's references [rad/s or m/s]: as stated, else at most the least velocity limit of its joints."""
     if stated is not None:

@@ -1,8 +1,4 @@
-"""Joint paths that keep the constraints of a step: the straight one, the tool's straight line, or a searched one.
-
-The search is that of `path_planners.rrt_connect`, in which every new configuration is projected onto the constraints,
-see `kept_problem`.
-"""
+"""Joint paths that keep the constraints of a step without a search: the straight one, or the tool's straight line."""
 
 from __future__ import annotations
 
@@ -14,46 +10,36 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.collision import CollisionQuery
-from manipcli.model.configuration import position_limits
-from manipcli.plan.free_space import FreeSpace
 from manipcli.plan.keep import Kept, margins, refuse_unkept
-from manipcli.plan.kept_problem import LONGEST, ROUNDING, STEP, between, kept_problem
+from manipcli.plan.kept_problem import ROUNDING, STEP, between
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path import linear_path
-from manipcli.plan.path_planner import PathFailure, PathProblem
-from manipcli.plan.path_planners.rrt_connect import RrtConnect, RrtConnectSpec
-from manipcli.plan.path_shortening import shortened
 from manipcli.plan.planner import Planner
 
-_SPACING: Final = 0.1  # rad or m, between the waypoints of the smooth curve
-_SAMPLES: Final = 4000
-_SHORTCUTS: Final = 100
 _SAME: Final = 1e-3  # rad or m
 
 
 def kept_paths(
     planner: Planner,
     state: PlanningState,
-    query: CollisionQuery,
     names: tuple[str, ...],
     end: Array,
     keeps: tuple[Kept, ...],
     line: Transform | None = None,
 ) -> Iterator[Array]:
-    """Paths to try: waypoints (k, m) of the joints `names` from the state to `end` (n).
+    """Paths to try: waypoints (k, m) of the joints `names` from the state to `end` (n); none where a search is needed.
 
     The straight path, two waypoints, is the only one where it keeps `keeps`.
 
     Args:
-        planner, state, query: what moves, and what is free.
+        planner, state: what moves.
         names: the joints that move.
         end: of all joints.
         keeps: those on configurations count.
         line: the tool pose at `end`, if the arm may arrive there in another configuration; None where it may not.
 
     Raises:
-        NotPlannable: start or end violate a constraint, or no path was found that keeps it.
+        NotPlannable: start or end violate a constraint.
     """
     columns = planner.robot.indices(names)
     start = np.array(state.position)
@@ -69,7 +55,6 @@ def kept_paths(
     on_line = _tool_line(planner, state, names, end, line)
     if on_line is not None and _least(shape, start, columns, on_line) >= -ROUNDING:
         yield on_line
-    yield _searched(planner, state, query, names, end, shape)
 
 
 def _tool_line(
@@ -93,43 +78,19 @@ def _tool_line(
     return ordered
 
 
-def _searched(
-    planner: Planner,
-    state: PlanningState,
-    query: CollisionQuery,
-    names: tuple[str, ...],
-    end: Array,
-    keeps: tuple[Kept, ...],
-) -> Array:
-    robot = planner.robot
-    columns = robot.indices(names)
-    start = np.array(state.position)
-    space = FreeSpace(robot, query, names, [start])
-
-    def margin(q: Array) -> Array:
-        whole = np.tile(start, (len(q), 1))
-        whole[:, columns] = q
-        return margins(keeps, whole)
-
-    lower, upper = position_limits(robot.joint(name) for name in names)
-    ends = np.stack((start[columns], end[columns]))
-    problem = PathProblem(
-        start=ends[0],
-        goals=ends[1:],
-        lower=np.where(np.isfinite(lower), np.minimum(lower, ends.min(axis=0)), ends.min(axis=0) - np.pi),
-        upper=np.where(np.isfinite(upper), np.maximum(upper, ends.max(axis=0)), ends.max(axis=0) + np.pi),
-        valid=space.valid,
-        edge=space.edge,
-    )
-    problem = kept_problem(problem, margin)
-    rng = planner.rng.spawn(1)[0]
-    found = RrtConnect(RrtConnectSpec(samples=_SAMPLES, range=LONGEST)).plan(problem, rng)
-    if isinstance(found, PathFailure):
-        words = ", ".join(f"`{kept.name}`" for kept in keeps)
-        hint = "make the constraint wider, or `move` to a pose in between"
-        raise NotPlannable(f"no path keeps {words}: {found.why}", hint=hint, reason="constraint")
-    short = shortened(found, problem, rng, attempts=_SHORTCUTS)
-    return np.vstack([short[:1], *(between(a, b, _SPACING)[1:] for a, b in pairwise(short))])
+def unkept_straight(
+    planner: Planner, state: PlanningState, names: tuple[str, ...], end: Array, keeps: tuple[Kept, ...]
+) -> NotPlannable:
+    """Refusal of the straight path to `end` (n): the constraint that it violates most, and by how much."""
+    columns = planner.robot.indices(names)
+    points = between(np.array(state.position[columns]), end[columns], STEP)
+    whole = np.tile(state.position, (len(points), 1))
+    whole[:, columns] = points
+    shape = [kept for kept in keeps if kept.margin is not None]
+    worst = min(shape, key=lambda kept: float(margins((kept,), whole).min()))
+    q = whole[int(np.argmin(margins((worst,), whole)))]
+    hint = "make the constraint wider, or `move` to a pose in between"
+    return NotPlannable(f"{worst.text(q)} on the straight path", hint=hint, reason="constraint")
 
 
 def _least(keeps: tuple[Kept, ...], start: Array, columns: list[int], path: Array) -> float:

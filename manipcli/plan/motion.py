@@ -62,6 +62,28 @@ class Switch:
     strictness: Strictness = "strict"
 
 
+@dataclass(frozen=True, slots=True)
+class JointTolerance:
+    """control_msgs/JointTolerance: rad or m, per second, per second squared.
+
+    Each: above 0 is the tolerance, 0 leaves the controller's own, -1 means that it is not enforced.
+    """
+
+    name: str
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class GoalTolerances:
+    """Tolerances of a goal instead of the controller's; `goal_time` [s], 0: the controller's."""
+
+    path: tuple[JointTolerance, ...]
+    goal: tuple[JointTolerance, ...]
+    goal_time: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """Commands that start together; done when all goals are reached and `duration` [s] has passed.
@@ -77,6 +99,9 @@ class Motion:
         begins: the state in which it begins, for reports; None where nothing moves.
         allowed: pairs of parts that may touch in it, besides the hand and what it holds.
         searched: the path planner whose path around obstacles it follows; "" for a path that was not searched.
+        tolerances: of the trajectory, instead of the controller's.
+        takes: the object that is attached to the tool at its end, for robots with a `holding`.
+        lets_go: what is attached to the tool is freed at its beginning.
     """
 
     label: str
@@ -89,6 +114,19 @@ class Motion:
     begins: PlanningState | None = None
     allowed: frozenset[Pair] = frozenset()
     searched: str = ""
+    tolerances: GoalTolerances | None = None
+    takes: str | None = None
+    lets_go: bool = False
+
+    @property
+    def closes(self) -> bool:
+        """Whether the hand closes on something."""
+        return self.takes is not None or (self.grip is not None and self.grip.force is not None)
+
+    @property
+    def opens(self) -> bool:
+        """Whether the hand moves without closing on something, or frees an object."""
+        return not self.closes and (self.lets_go or self.grip is not None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,4 @@
-"""Builder of a step's motions: each method adds one that starts where the last ended.
-
-Every motion is timed, verified against the limits and free of collisions.
-"""
+"""Builder of a step's motions, each from the end of the last: timed, within the limits and free of collisions."""
 
 from __future__ import annotations
 
@@ -18,17 +15,21 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
+from manipcli.plan.attachment import attached, freed
+from manipcli.plan.blind_grasp import blindly_closed
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
-from manipcli.plan.hand import closed_hand, closed_on, no_gripper, pressing
+from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values
 from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
+from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.pose_error import Leaving
-from manipcli.plan.prediction import carried_along, put, spilled
+from manipcli.plan.prediction import carried_along, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.trajectory_sampling import resampled
@@ -72,10 +73,6 @@ class MotionBuilder:
     def adopt(self, other: MotionBuilder) -> None:
         """Continue where a copy has led."""
         self._motions, self._now = other._motions, other._now
-
-    def with_body(self, name: str, X_WO: Transform) -> PlanningState:
-        """The present state with one body moved to `X_WO`."""
-        return put(self._planner, self._now, {name: X_WO})
 
     def let_go(self, posture: str) -> PlanningState:
         """The present state with the hand at a pose and empty; collisions are not checked."""
@@ -198,14 +195,15 @@ class MotionBuilder:
         """Rotate the tool in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         self.along(label, rotated(self._planner.tool_pose(self._now), axis, angle), speed=speed)
 
-    def back(self, label: str) -> None:
+    def back(self, label: str, *, emptied: bool) -> None:
         """Repeat the last trajectory backwards.
 
-        Limits are symmetric and the path was free forwards: only torques are checked, as friction acts the other way.
+        Limits are symmetric and the path was free forwards: torques are checked, as friction acts the other way, and
+        collisions only if what is held was `emptied` since: its contents then lie elsewhere.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
         trajectory = timed.reversed_motion(self._planner, self._now, label, done)
-        self._accept(label, trajectory, None)
+        (self._add if emptied else self._accept)(label, trajectory, None)
 
     def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
         """Follow given points from the end of the last motion, sampled at every control tick and at their end.
@@ -227,7 +225,7 @@ class MotionBuilder:
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
         """Close the hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
-        The fingers are predicted to stop where the first link of each touches the body.
+        The fingers are predicted to stop where the first link of each touches the body, or any if it is not known.
 
         Args:
             posture: named.
@@ -240,15 +238,19 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and does not touch it.
         """
         planner = self._planner
+        if handless(planner.robot, posture):
+            motion, self._now = attached(planner, self._now, body, self._allowed)
+            return self._motions.append(motion)
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
+        before, duration = self._now, grip_time(planner, self._now, grip)
         if body is None:
-            self._accept(CLOSING, None, grip)
-            self._now = replace(self._now, closed=True)
+            self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)
+            self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=self._allowed))
             return
-        query = planner.grasping(self._now, body)
-        closed, touched = closed_on(planner.robot, query, self._now.position, grip.joints, grip.target)
+        now = against_jaw(planner, self._now, body, grip)
+        closed, touched = closed_on(planner.robot, planner.grasping(now, body), now.position, grip.joints, grip.target)
         if must_hold and not touched:
             raise NotPlannable(
                 f"the hand, closed to '{posture}', does not touch '{body}'",
@@ -259,13 +261,12 @@ class MotionBuilder:
             refuse_collision(planner, self._now, self.query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
             raise refusal.but(hint=roomier or None) from refusal
-        link = planner.tool_link
-        X_LW = planner.kinematics.forward(closed, link).inverse()
-        carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
+        X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
+        carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(now, body))
         allowed = self._allowed | planner.hand_contacts(body)
-        duration = grip_time(planner, self._now, grip)
-        self._motions.append(Motion(CLOSING, None, grip, duration, begins=self._now, allowed=allowed))
-        self._now = replace(self._now.moved(closed), carried=carried, closed=True)
+        takes = None if planner.robot.holding is None else body
+        self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=allowed, takes=takes))
+        self._now = replace(now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
         """Open the hand to a pose; the held object stays where it is. It may touch that, or the body it is `around`.
@@ -276,23 +277,22 @@ class MotionBuilder:
             NotPlannable: no gripper controller moves the hand, it collides with something else than the object, or it
                 `must_arrive` at a pose that still presses on the object.
         """
+        if handless(self._planner.robot, posture):
+            motion, self._now = freed(self._now)
+            return self._motions.append(motion)
         grip = self._grip(self._posture(posture))
         if grip is None:
             raise no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
-            held = self._now.carried.body
-            there = self._with(grip.joints, grip.target)
-            query = self._planner.grasping(self._now, held)
-            still = pressing(self._planner.robot, query, there, grip.joints) if must_arrive else None
-            if still is not None:
-                message = f"'{still}' still presses on '{held}' with the hand in its pose '{posture}'"
-                raise NotPlannable(message, hint="set a pose in which the hand is open: `posture: POSE`")
-            allowed |= self._planner.hand_contacts(held)
+            if must_arrive:
+                refuse_pressing(self._planner, self._now, self._with(grip.joints, grip.target), grip.joints, posture)
+            allowed |= self._planner.hand_contacts(self._now.carried.body)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
         self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
+        self._motions[-1] = replace(self._motions[-1], lets_go=self._planner.robot.holding is not None)
 
     def dwell(self, label: str, duration: float) -> None:
         """Hold still for `duration` [s], and until the step's `until` holds."""
@@ -325,8 +325,7 @@ class MotionBuilder:
         return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
-        pose = self._planner.robot.pose(name)
-        return dict(zip(pose.joints, pose.positions, strict=True))
+        return posture_values(self._planner.robot, name)
 
     def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
         return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
@@ -342,7 +341,7 @@ class MotionBuilder:
         query, end = self.query(), self._with(limits.names, target)
         with self._labelled(label):
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
-        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals)
+        free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals, end)
         self._accept(label, free, grip)
         if free is not straight and (search := self._planner.searching()) is not None:
             self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)

@@ -75,6 +75,8 @@ def _motion(motion: Motion) -> dict[str, object]:
     if motion.grip is not None:
         written["hand"] = motion.grip.target.tolist()
         written["force"] = motion.grip.force
+    if motion.takes is not None:
+        written["attaches"] = motion.takes
     if motion.switch is not None:
         written["switch"] = {
             key: list(names) for key in ("to", "activate", "deactivate") if (names := getattr(motion.switch, key))

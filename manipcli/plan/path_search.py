@@ -52,9 +52,11 @@ class PathSearch:
         goals: Array,
         grip: Grip | None,
         margin: Margin | None = None,
+        keeps: str = "",
     ) -> Array:
         """A short free path (k, m) of the joints `names` from `state` to one of the `goals` (j, m), also while the
-        hand moves as in `grip`. It keeps constraints whose `margin` at positions (i, n) of all joints is not negative.
+        hand moves as in `grip`. It keeps constraints whose `margin` at positions (i, n) of all joints is not negative;
+        `keeps` names them.
 
         Raises:
             NotPlannable: there is none; names the narrowest place that was found.
@@ -85,12 +87,12 @@ class PathSearch:
         found = member.make(settings).plan(problem, self.rng)
         if isinstance(found, PathFailure):
             self.left -= max(1, found.samples)
-            self.failed = self._refusal(space, found)
+            self.failed = self._refusal(space, found, keeps)
             raise self.failed
         return shortened(found, problem, self.rng, attempts=self.spec.shortcuts)
 
-    def _refusal(self, space: FreeSpace, failure: PathFailure) -> NotPlannable:
-        texts = [f"no path around obstacles: {failure.why}"]
+    def _refusal(self, space: FreeSpace, failure: PathFailure, keeps: str) -> NotPlannable:
+        texts = [f"no path around obstacles{keeps and f' keeps {keeps}'}: {failure.why}"]
         hit = space.first_hit(failure.near_start, failure.near_goal)
         if hit is not None:
             apart = "overlap by" if hit.distance < 0.0 else "are only"
@@ -105,6 +107,8 @@ class PathSearch:
         bodies = [] if hit is None else [name for name in (hit.a, hit.b) if not name.startswith("robot/")]
         away = f"move '{bodies[0]}' away, or " if bodies else ""
         hint = f"{away}first `move` to a pose nearer to the goal, or raise `planner: {{samples: ...}}`"
+        if keeps:
+            hint = f"make the constraint wider, or {hint}"
         return NotPlannable("; ".join(texts), hint=hint, reason="in_the_way")
 
 

@@ -29,9 +29,17 @@ SPOTS: Final = 128
 
 
 def standing(
-    planner: Planner, state: PlanningState, name: str, onto: str, at: tuple[float, float], yaw: float | None
+    planner: Planner,
+    state: PlanningState,
+    name: str,
+    onto: str,
+    at: tuple[float, float],
+    yaw: float | None,
+    word: str = "at",
 ) -> Transform:
     """X_WG of an object that stands upright on a body at [x, y] in the world, with this yaw [rad] or its present one.
+
+    `word` is the key of the step that sets the place.
 
     Raises:
         NotPlannable: the support is tilted, or is not below this place.
@@ -45,8 +53,8 @@ def standing(
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
         raise NotPlannable(
             f"[{at[0]:g}, {at[1]:g}] m is outside '{onto}', whose centre is at [{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`at` is in the world frame; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
-            loc=("at",),
+            hint=f"`{word}` is in the world frame; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
+            loc=(word,),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
     x_axis = planner.body_pose(state, name).R[:, 0]
@@ -58,8 +66,8 @@ def standing(
     if deeper is None:
         raise NotPlannable(
             f"no part of '{onto}' is below '{name}' at [{at[0]:g}, {at[1]:g}] m",
-            hint=f"choose `at` over a part of '{onto}'",
-            loc=("at",),
+            hint=f"choose `{word}` over a part of '{onto}'",
+            loc=(word,),
         )
     return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
 

@@ -1,7 +1,4 @@
-"""Planner of one task: robot, scene, inverse kinematics and collision queries, behind a few methods.
-
-A step queries the `Planner` about a state, and builds its motions with a `MotionBuilder`.
-"""
+"""Planner of one task: robot, scene, inverse kinematics and collision queries. Motions are built by `MotionBuilder`."""
 
 from __future__ import annotations
 
@@ -120,6 +117,11 @@ class Planner:
         """The search for a motion that is `obstructed` on its straight path; None while only those are tried."""
         self._obstructed |= obstructed
         return self._search
+
+    @property
+    def searches(self) -> bool:
+        """Whether paths are searched where no straight one is found."""
+        return bool(self._paths.samples)
 
     @property
     def solver(self) -> InverseKinematics:

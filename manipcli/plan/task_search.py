@@ -54,7 +54,7 @@ class Solved:
 
     Attributes:
         chosen: its candidate.
-        grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
+        grasps: excluded tool orientations R_WT (3, 3) and places (2,), after which a later step has no plan.
         dropped: the refused candidates, and those after which a later step has no plan.
     """
 
@@ -231,8 +231,9 @@ def _back(done: list[Node], conflicts: set[int], refusal: NotPlannable) -> Node 
             node.conflicts = set(conflicts)
             if node.chosen is not None:
                 node.left.append(Dropped(node.chosen.candidate.name, refusal, node.chosen.plan))
-            if node.chosen is not None and node.chosen.candidate.grasp is not None:
-                node.attempts.excluded.append(node.chosen.candidate.grasp)
+            choice = None if node.chosen is None else node.chosen.candidate.choice
+            if choice is not None:
+                node.attempts.excluded.append(choice)
             return node
     return None
 

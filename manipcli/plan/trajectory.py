@@ -147,6 +147,11 @@ class JointTrajectory:
             return LINEAR
         return CUBIC if self.accelerations is None else QUINTIC
 
+    @property
+    def order_of_points(self) -> npt.NDArray[np.int8]:
+        """(k) what each point gives, see `orders`."""
+        return np.full(len(self.times), self.order, dtype=np.int8) if self.orders is None else self.orders
+
     def sample(self, time: float | npt.ArrayLike) -> Samples:
         """Position, velocity and acceleration at `time` [s] from the start of the goal.
 
@@ -262,7 +267,7 @@ class JointTrajectory:
         within = t <= self.times[-1]
         if k > 1 and within.any():
             segment = np.minimum(np.searchsorted(self.times, t, side="right") - 1, k - 2)
-            orders = np.full(k, self.order, dtype=np.int8) if self.orders is None else self.orders
+            orders = self.order_of_points
             pairs = np.minimum(orders[:-1], orders[1:])
             order = np.where(within, pairs[segment], -1)
             for kind, evaluate in ((LINEAR, self._linear), (CUBIC, self._cubic), (QUINTIC, self._quintic)):

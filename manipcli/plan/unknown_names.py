@@ -9,6 +9,7 @@ from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
+from manipcli.plan.hand import handless
 from manipcli.scene.scene import Scene
 
 
@@ -24,6 +25,8 @@ class UnknownPosture(Problem):
 
 def unknown_posture(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
     """A problem if the robot has no pose of this name for its hand, else empty."""
+    if handless(robot, name):
+        return ()
     return tuple(UnknownPosture(loc, found.message, found.hint) for found in unknown_pose(robot, name, loc))
 
 

@@ -12,8 +12,8 @@ from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
 from manipcli.plan.candidates import NUMBER, Dropped
 
-START: Final = "start"
-"""The stage of a refusal before any motion."""
+UNNAMED: Final = "-"
+"""The stage of a refusal that names no motion: before any, or of a step that is a single one."""
 NAMED: Final = 5
 """Names of candidates that a group lists."""
 _LABEL: Final = re.compile(r"([a-z_]+(?: back)?): ")
@@ -27,7 +27,7 @@ def stage_of(cause: str) -> str:
     """The motion that a cause names: `approach: ...`, or `... at t = 0.3 s of 'approach'`."""
     label = _LABEL.match(cause)
     during = label or _DURING.search(cause)
-    return during[1] if during is not None else START
+    return during[1] if during is not None else UNNAMED
 
 
 def by_stage(refused: Refused) -> tuple[RefusedCandidates, ...]:

@@ -13,7 +13,7 @@ from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.inspection import DESCRIPTIONS, inspect
 from manipcli.plan.steps import STEPS
 from manipcli.preflight.findings import preflight_findings
-from manipcli.preflight.pose_overlaps import pose_findings
+from manipcli.preflight.robot_findings import robot_findings
 from manipcli.scene.build_scene import SHAPES
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
@@ -67,7 +67,7 @@ def _findings(
         if kind == "controllers":
             return load.load_controllers(path, model=controllers_spec()).findings
         file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
-        return (*findings, *pose_findings(file, robot))
+        return (*findings, *robot_findings(file, robot))
     except InvalidInput as invalid:
         return invalid.findings
 

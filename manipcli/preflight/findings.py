@@ -48,4 +48,8 @@ def _grasp_margins(task: Task, plan: Plan) -> Iterator[Diagnostic]:
     numbers = {step.id: k for k, step in enumerate(plan.steps)}
     for step, margin in plan.grasps():
         place = task.file.place("steps", numbers[step])
-        yield Diagnostic("TASK250", f"step '{step}': {margin.text}", place, severity="note")
+        if margin.attachment and margin.ratio < 1.0:
+            hint = "it will fall: raise the limits under `tool: {holding: ...}`, or lift something lighter"
+            yield Diagnostic("TASK251", f"step '{step}': {margin.text}", place, hint, "warning")
+        else:
+            yield Diagnostic("TASK250", f"step '{step}': {margin.text}", place, severity="note")

@@ -46,7 +46,9 @@ class Grasp:
 
 
 def grasps(plan: Plan) -> Iterator[Grasp]:
-    """All grasps of a plan that have a force."""
+    """All grasps of a plan that have a force; none where an attachment holds objects."""
+    if plan.planner.robot.holding is not None:
+        return
     for k, step in enumerate(plan.steps):
         for grip in (motion.grip for motion in step.plan.motions):
             if grip is not None and grip.force is not None:

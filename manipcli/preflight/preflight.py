@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.control.chain import target_of
 from manipcli.control.control_loop import ControlLoop, HandSettings, PidLoop
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
@@ -156,7 +157,7 @@ class Subject:
     def _controlled(self, active: frozenset[str]) -> Iterator[ControlledJoint]:
         period = self.task.spec.simulation.control_period
         for name, spec in self.task.controllers.controllers.items():
-            if name not in active or not spec.interfaces:
+            if name not in active or not spec.interfaces or target_of(spec):
                 continue
             loop = CONTROLLERS[spec.type].loop(spec)
             for joint in spec.joints:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed, number_of, shorten
@@ -26,7 +27,7 @@ def render_text(
     tree: Sequence[str] = (),
 ) -> str:
     """Findings, summary, link tree if given, and the verdict in the last line."""
-    lines = [*map(describe, findings)]
+    lines = [text for group in alike(findings) for text in _described(group)]
     lines += [f"... and {number} more of {code}" for code, number in left_out]
     if lines:
         lines.append("")
@@ -41,6 +42,45 @@ def render_text(
     ]
     more = f", {sum(number for _, number in left_out)} more not shown" if left_out else ""
     return "\n".join([*lines, f"{mark} {word}: {file}: {', '.join(counts)}{more}"])
+
+
+MOST_ALIKE = 3
+"""More findings with one cause than this are shown as one."""
+_PATH = re.compile(r"'(?:\w+://)?/?[^' ]*/[^' ]*'|(?<= )/[^ ]*")
+
+
+def alike(findings: Sequence[Diagnostic]) -> list[list[Diagnostic]]:
+    """Groups of findings that differ only in the file they name, in the order of their first ones."""
+    groups: dict[object, list[Diagnostic]] = {}
+    for k, finding in enumerate(findings):
+        cause = _PATH.sub("''", finding.message)
+        hint = None if finding.hint is None else _PATH.sub("''", finding.hint)
+        key = k if cause == finding.message else (finding.code, finding.severity, cause, hint)
+        groups.setdefault(key, []).append(finding)
+    return list(groups.values())
+
+
+def _described(group: Sequence[Diagnostic]) -> list[str]:
+    """The lines of findings with one cause."""
+    if len(group) <= MOST_ALIKE:
+        return [*map(describe, group)]
+    named = [found[0].strip("'") for finding in group if (found := _PATH.search(finding.message))]
+    folder = _common_folder(named)
+    more = f" (x {len(group)}{f', all below {folder}' if folder else ''})"
+    first = group[0]
+    return [describe(replace(first, message=first.message + more))]
+
+
+def _common_folder(uris: Sequence[str]) -> str:
+    """The folder that all these are in; empty if there is none."""
+    parts = [uri.split("/")[:-1] for uri in uris]
+    same = [names[0] for names in zip(*parts, strict=False) if len({*names}) == 1]
+    shared = []
+    for k, name in enumerate(same):
+        if any(len(own) <= k or own[k] != name for own in parts):
+            break
+        shared.append(name)
+    return "/".join(shared)
 
 
 def render_explanation(check: Check) -> str:

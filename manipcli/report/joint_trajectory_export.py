@@ -10,7 +10,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.plan.motion import Motion, PlanningState
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory
+from manipcli.spec.resolved import number_text, yaml_word
 
 TOLERANCE: Final = 1e-6
 """[rad or m] Deviation in position of the written splines."""
@@ -65,26 +66,28 @@ def step_trajectory(spans: Sequence[Span], columns: dict[str, int]) -> JointTraj
     )
 
 
-def thinned(trajectory: JointTrajectory) -> JointTrajectory:
-    """Fewer points of a trajectory with accelerations, whose quintic splines differ from it by at most `TOLERANCE`.
+def thinned(trajectory: JointTrajectory, *, tolerance: float = TOLERANCE, jerk: float = JERK) -> JointTrajectory:
+    """Fewer points of a trajectory, whose curves of the same order differ from it by at most `tolerance`.
 
-    Intervals are halved as long as they differ.
+    Intervals are halved as long as they differ, or the changes of acceleration by a share `jerk` of the largest. A
+    trajectory whose points give different values is returned as it is.
     """
-    times, positions, velocities, accelerations = (
-        trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations
-    )  # fmt: skip
-    assert velocities is not None and accelerations is not None
-    last = len(times) - 1
-    kept = np.array([0, last])
-    steps = np.diff(accelerations, axis=0)
-    steepest = max(float(np.max(np.abs(steps))), 1e-9)
+    if trajectory.orders is not None:
+        return trajectory
+    times, positions = trajectory.times, trajectory.positions
+    velocities, accelerations = trajectory.velocities, trajectory.accelerations
+    kept = np.array([0, len(times) - 1])
+    steps = None if accelerations is None else np.diff(accelerations, axis=0)
+    steepest = 0.0 if steps is None else max(float(np.max(np.abs(steps))), 1e-9)
     while True:
         shorter = JointTrajectory.of_arrays(
-            trajectory.names, times[kept], positions[kept], velocities[kept], accelerations[kept]
-        )
+            trajectory.names, times[kept], positions[kept], None if velocities is None else velocities[kept],
+            None if accelerations is None else accelerations[kept],
+        )  # fmt: skip
         p, _, a = shorter.sample(times)
-        off = np.max(np.abs(p - positions), axis=1)[1:] > TOLERANCE
-        off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > JERK * steepest
+        off = np.max(np.abs(p - positions), axis=1)[1:] > tolerance
+        if steps is not None:
+            off |= np.max(np.abs(np.diff(a, axis=0) - steps), axis=1) > jerk * steepest
         wrong = np.unique(np.searchsorted(kept, np.flatnonzero(off), side="right") - 1)
         middles = (kept[wrong] + kept[wrong + 1]) // 2
         more = np.setdiff1d(middles, kept)
@@ -106,24 +109,31 @@ def _add(rows: _Rows, begins: float, trajectory: JointTrajectory, names: Sequenc
 
 def message(trajectory: JointTrajectory, comment: str) -> str:
     """The message in YAML; numbers read back bit for bit, times to the nanosecond."""
-    lines = [f"# {comment}", "header: {frame_id: ''}", f"joint_names: [{', '.join(trajectory.names)}]", "points:"]
-    velocities, accelerations = trajectory.velocities, trajectory.accelerations
-    assert velocities is not None and accelerations is not None  # `step_trajectory` gives both
+    return "\n".join([f"# {comment}", *message_lines(trajectory)]) + "\n"
+
+
+def message_lines(trajectory: JointTrajectory) -> list[str]:
+    """The lines of the message; a point has the velocities and accelerations that it gives."""
+    names = ", ".join(yaml_word(name) for name in trajectory.names)
+    lines = ["header: {frame_id: ''}", f"joint_names: [{names}]", "points:"]
+    orders = trajectory.order_of_points
     for k, time in enumerate(trajectory.times.tolist()):
-        sec, nanosec = divmod(round(time * 1e9), 1_000_000_000)
-        lines.append(
-            f"- {{positions: {_list(trajectory.positions[k])}, velocities: {_list(velocities[k])}, "
-            f"accelerations: {_list(accelerations[k])}, "
-            f"time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}"
-        )
-    return "\n".join(lines) + "\n"
+        given = {"positions": trajectory.positions}
+        if orders[k] >= CUBIC and trajectory.velocities is not None:
+            given["velocities"] = trajectory.velocities
+        if orders[k] >= QUINTIC and trajectory.accelerations is not None:
+            given["accelerations"] = trajectory.accelerations
+        values = ", ".join(f"{key}: {_list(rows[k])}" for key, rows in given.items())
+        lines.append(f"- {{{values}, time_from_start: {duration_text(time)}}}")
+    return lines
+
+
+def duration_text(seconds: float) -> str:
+    """builtin_interfaces/Duration in YAML, to the nanosecond."""
+    sec, nanosec = divmod(round(seconds * 1e9), 1_000_000_000)
+    return f"{{sec: {sec}, nanosec: {nanosec}}}"
 
 
 def _list(values: Array) -> str:
-    return f"[{', '.join(_number(float(value)) for value in values)}]"
-
-
-def _number(value: float) -> str:
-    """With a point: YAML 1.1 reads `1e-05` as a string."""
-    text = repr(value)
-    return text if "." in text else text.replace("e", ".0e")
+    """In brackets; never '-0.0'."""
+    return f"[{', '.join(number_text(float(value) + 0.0) for value in values)}]"

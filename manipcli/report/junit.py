@@ -56,6 +56,8 @@ def render_junit(
     for name, value in values:
         if value:
             SubElement(properties, "property", {"name": name, "value": safe(value)})
+    for held in verdict.holding:
+        SubElement(properties, "property", {"name": "holding", "value": safe(held)})
     suite.extend(cases)
     indent(suites)
     text: bytes = tostring(suites, encoding="utf-8", xml_declaration=True)

@@ -26,7 +26,11 @@ def render_json(task: str, plan: Plan) -> str:
             "motions": [_motion(motion, kind, near, margins) for motion, kind, near, margins in motions],
             "steps": [_step(step) for step in plan.steps],
             "grasps": [
-                {"step": step, **picked(margin, "body force friction weight ratio acceleration contacts")}
+                {
+                    "step": step,
+                    **picked(margin, "body force friction weight ratio acceleration contacts"),
+                    **({"attachment": margin.attachment} if margin.attachment else {}),
+                }
                 for step, margin in plan.grasps()
             ],
             "errors": [],

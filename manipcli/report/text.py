@@ -84,6 +84,7 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
     lines.append(f"{mark} {verdict.task} {verdict.verdict}: {verdict.text or _summary(verdict)}")
     if cut := str(verdict.saturations):
         lines.append(cut)
+    lines += verdict.holding
     if touching := self_contact_line(verdict.self_contacts):
         lines.append(f"warning: {touching}")
     lines.append(f"{speed}; engine {verdict.engine}, seed {verdict.seed}")

@@ -42,7 +42,7 @@ def build_manager(task: Task, kinematics: Kinematics | None = None) -> Controlle
     """
     file = task.true.controllers
     period = task.spec.simulation.control_period
-    compat = task.robot_file.spec.compat
+    compat = task.robot_file.spec.compat or file.spec.compat
     kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
     return build_controllers(
         file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat,

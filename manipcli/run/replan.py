@@ -51,7 +51,8 @@ class Measured:
         self._limits = limits
         self._physics = physics
         self._lost = ""
-        self.grasp = Grasp(planner.kinematics, planner.scene, period=SLOW * session.period)
+        period = SLOW * session.period
+        self.grasp = Grasp(planner.kinematics, planner.scene, period=period, attachment=session.holder)
 
     def situation(self, believed: PlanningState) -> PlanningState:
         """The measured planning state.
@@ -208,9 +209,9 @@ def after(planned: StepPlan, before: PlanningState, *, done: int) -> PlanningSta
     """The expected grasp after the first `done` motions of a plan that started in `before`; poses must be measured."""
     carried, closed = before.carried, before.closed
     for k, motion in enumerate(planned.motions[: done + 1]):
-        if motion.grip is not None and motion.grip.force is not None:
+        if motion.closes:
             closed, carried = True, planned.end.carried if k < done else None
-        elif motion.grip is not None and (closed or carried is not None):
+        elif motion.opens and (closed or carried is not None):
             closed, carried = False, None
     return replace(before, carried=carried, closed=closed)
 

@@ -19,7 +19,7 @@ from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import Verdict
 from manipcli.model.link_parts import LINK_PARTS, link_parts_to_json
 from manipcli.plan.outline import PLAN_FILE
-from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
+from manipcli.record.attachments import CONTROLLERS, INERTIALS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.channels import ControllerChannel, Recorded, SensorChannel
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
@@ -112,6 +112,7 @@ def open_log(
                 "run": run_metadata(task),
                 **({"engine": chosen} if (chosen := _chosen(task, plan)) else {}),
                 **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
+                **({INERTIALS: inertials} if (inertials := _inertials(task)) else {}),
                 "versions": {"manipcli": __version__, engine.name: engine.version()},
                 "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},
                 "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
@@ -147,6 +148,7 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
         "engine": engine.name,
         "physics": engine.physics,
         "period": repr(simulation.control_period),
+        **({"holding": task.true.robot.holding.kind} if task.true.robot.holding is not None else {}),
         **end,
     }
 
@@ -155,6 +157,11 @@ def _chosen(task: Task, plan: Plan) -> dict[str, str]:
     """The settings that the engine chose itself."""
     engine = ENGINES[task.spec.simulation.engine]
     return dict(engine.chosen(task.true.robot, task.true.scene, engine_settings(task, plan)))
+
+
+def _inertials(task: Task) -> dict[str, str]:
+    """How the inertials that are not the description's were made, by link."""
+    return {row.link: str(row) for row in task.robot.inertials}
 
 
 def recorded(controller: Controller) -> Recorded:

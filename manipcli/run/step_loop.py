@@ -18,6 +18,8 @@ from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
 from manipcli.model.state import WorldState
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
+from manipcli.run.attaching import Attaching
+from manipcli.run.effort_shortage import effort_shortage
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
@@ -95,6 +97,7 @@ class StepLoop:
         self._failed = False
         self._over = False
         self._at: PlannedStep | None = None
+        self._attaching = Attaching(session, self._event)
 
     def steps(self) -> None:
         """Run all steps in order, until a step fails without being tolerated, or a watch is broken."""
@@ -133,6 +136,9 @@ class StepLoop:
             if end.outcome == "done" or attempt == attempts or not self._may_go_on:
                 end = self._closed(planned, end)
             ended = self._session.time
+            if end.outcome != "done" and self._physics:
+                short = effort_shortage(self._session, self._task.scene.gravity)
+                end = replace(end, text=f"{short}; {end.text}") if short else end
             self._event("step_ended", planned, end.outcome, end.text)
             if end.outcome == "done" or not self._may_go_on:
                 break
@@ -172,6 +178,7 @@ class StepLoop:
         """At every tick: update the grasp and return the alarm."""
         if self._physics and self._session.ticks % SLOW == 0:
             self._measured.grasp.look(state, self._session.touching)
+        self._attaching.look(self._at)
         return self._alarm(state) if self._task.spec.watch else ""
 
     @property
@@ -254,10 +261,11 @@ class StepLoop:
             for k, motion in enumerate(planned.plan.motions):
                 self._event("phase_started", planned, "", motion.label)
                 self._believed = after(planned.plan, before, done=k)
-                if motion.grip is not None and motion.grip.force is None and before.carried is not None and k > 0:
+                if motion.opens and before.carried is not None and k > 0:
                     left = self._left_behind(before.carried)
                     if left is not None:
                         return left
+                self._attaching.before(motion, planned)
                 over = deadline
                 if motion.awaits and until is not None and over is None:
                     over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
@@ -266,7 +274,10 @@ class StepLoop:
                     held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
                     text = f"{motion.label}: {end.text}{_missing(end, probe)}{f'; {held}' if held else ''}"
                     return MotionEnd(end.outcome, text)
-                if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
+                missed = self._attaching.after(motion, planned)
+                if missed:
+                    return MotionEnd("failed", missed)
+                if motion.closes and planned.plan.end.carried is not None:
                     self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
                     self._take(planned.plan.end.carried)
                 if end.weak:
@@ -312,8 +323,11 @@ class StepLoop:
         why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
         if not why:
             return None
+        text = f"the hand does not carry '{carried.body}': {why}"
+        if self._attaching.holding is not None:
+            return MotionEnd("failed", text)
         grasp = self._grasp_margin.summary(carried.body)
-        text = f"the hand does not carry '{carried.body}': {why}; it slipped or was never held"
+        text += "; it slipped or was never held"
         return MotionEnd("failed", f"{text}{f'; {grasp}' if grasp else ''}")
 
     def _short_of_plan(self, planned: PlannedStep, before: PlanningState) -> MotionEnd | None:

@@ -14,7 +14,6 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from manipcli.core.activity import announce
 from manipcli.core.cache import cache_key, read_cached, write_cached
@@ -23,8 +22,7 @@ from manipcli.shapes.coacd_process import SETTINGS
 from manipcli.shapes.mesh import TriangleMesh, read_mesh
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import ConvexPart
-
-Faces = npt.NDArray[np.int64]
+from manipcli.shapes.surface import Faces, closed, hull, volume, welded
 
 SOLID: Final = 0.9
 """A mesh that fills at least this share of its convex hull counts as the hull by default."""
@@ -39,25 +37,25 @@ LEAST_SHARE: Final = 1e-6
 HULL_HINT: Final = "install it: pip install 'manipcli[coacd]'; or use the convex hull: `collision: hull`"
 
 
-def concave(path: Path) -> bool:
-    """Whether a mesh fills less than the share `SOLID` of its convex hull.
+def concave(path: Path, share: float = SOLID) -> bool:
+    """Whether a mesh fills less than this share of its convex hull.
 
     Small holes of a scanned surface count for little: what is behind a hole, seen from the middle, counts as empty. An
     open box fills 5/6, half a sphere without a lid 13/16. False for a file that cannot be used as a mesh, which has no
     parts either.
     """
     try:
-        return _concave(read_mesh(path))
+        return _filled(read_mesh(path)) < share
     except UnusableMesh:
         return False
 
 
 @functools.lru_cache(maxsize=64)
-def _concave(mesh: TriangleMesh) -> bool:
-    """Cached, like `_parts`."""
-    points, faces = _welded(mesh)
-    hull = _hull(points)
-    return hull is not None and abs(_volume(points, faces, hull[0].mean(axis=0))) < SOLID * hull[2]
+def _filled(mesh: TriangleMesh) -> float:
+    """Share of the convex hull that is filled; 1 for a flat mesh. Cached, like `_parts`."""
+    points, faces = welded(mesh)
+    whole = hull(points)
+    return 1.0 if whole is None else abs(volume(points, faces, whole[0].mean(axis=0))) / whole[2]
 
 
 def convex_parts(path: Path) -> tuple[ConvexPart, ...]:
@@ -72,20 +70,20 @@ def convex_parts(path: Path) -> tuple[ConvexPart, ...]:
 @functools.lru_cache(maxsize=64)
 def _parts(mesh: TriangleMesh, name: str) -> tuple[ConvexPart, ...]:
     """Cached: the reader returns the same mesh object while the file does not change."""
-    points, faces = _welded(mesh)
-    whole = _hull(points)
+    points, faces = welded(mesh)
+    whole = hull(points)
     if whole is None:
         raise UnusableMesh("is flat")
     separate = _separate(points, faces)
     hulls: list[Array] = []
     for part in separate:
         corners = points[np.unique(part)]
-        made = _hull(corners)
-        if made is not None and _closed(part) and _volume(points, part) >= CONVEX * made[2]:
+        made = hull(corners)
+        if made is not None and closed(part) and volume(points, part) >= CONVEX * made[2]:
             hulls.append(corners)
         elif made is not None:
             hulls += _decomposed(points, part, name)
-    found = [part for part in map(_hull, hulls) if part is not None and part[2] > LEAST_SHARE * whole[2]]
+    found = [part for part in map(hull, hulls) if part is not None and part[2] > LEAST_SHARE * whole[2]]
     if not found:
         raise UnusableMesh("cannot be decomposed into convex parts", hint="use its convex hull: `collision: hull`")
     if len(found) > MOST_PARTS:
@@ -170,16 +168,6 @@ def _read(content: bytes, vertices: Array) -> list[Array] | None:
     return np.split(points, np.cumsum(counts)[:-1])
 
 
-def _welded(mesh: TriangleMesh) -> tuple[Array, Faces]:
-    """Vertices (n, 3) without duplicates, and the faces between different ones: STL repeats every vertex."""
-    points, index = np.unique(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0, return_inverse=True)
-    faces = index.reshape(-1, 3).astype(np.int64)
-    proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    faces = faces[proper]
-    inside_out = _closed(faces) and _volume(points, faces) < 0.0
-    return points, faces[:, ::-1] if inside_out else faces
-
-
 def _separate(points: Array, faces: Faces) -> list[Faces]:
     """The faces of each connected part, if all are closed and none is the inside of another; else all faces.
 
@@ -199,40 +187,7 @@ def _separate(points: Array, faces: Faces) -> list[Faces]:
     if number > MOST_PARTS:
         return [faces]
     parts = [faces[part_of == k] for k in range(number)]
-    return parts if all(_closed(part) and _volume(points, part) > 0.0 for part in parts) else [faces]
-
-
-def _closed(faces: Faces) -> bool:
-    """Whether every edge has one triangle on each side, with the same orientation."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    forward, backward = edges[np.lexsort(edges.T)], edges[:, ::-1][np.lexsort(edges[:, ::-1].T)]
-    return bool(np.array_equal(forward, backward)) and not bool((forward[1:] == forward[:-1]).all(axis=1).any())
-
-
-def _volume(points: Array, faces: Faces, about: Array | None = None) -> float:
-    """Signed volume between the triangles and a point, by default any: a closed surface encloses the same from all."""
-    a, b, c = (points[faces[:, k]] - (points[0] if about is None else about) for k in range(3))
-    return float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
-
-
-def _hull(points: Array) -> tuple[Array, Faces, float] | None:
-    """Corners, outward triangles and volume of the convex hull; None for points without volume.
-
-    The corners are rounded to single precision: an engine reads them from STL, and all programs use the same.
-    """
-    from scipy.spatial import ConvexHull, QhullError
-
-    rounded = np.unique(points.astype(np.float32).astype(np.float64), axis=0)
-    try:
-        found = ConvexHull(rounded)
-    except (QhullError, ValueError):
-        return None
-    corners = rounded[found.vertices]
-    triangles = np.searchsorted(found.vertices, found.simplices)
-    a, b, c = (corners[triangles[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
-    triangles[inward] = triangles[inward, ::-1]
-    return corners, triangles.astype(np.int64), float(found.volume)
+    return parts if all(closed(part) and volume(points, part) > 0.0 for part in parts) else [faces]
 
 
 def _three(values: list[float]) -> tuple[float, float, float]:

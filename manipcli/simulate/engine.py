@@ -74,6 +74,19 @@ class Engine(Protocol):
         """
         ...
 
+    def attach(self, body: str) -> Array:
+        """Fix a movable body to the tool where it is now; for robots with a `holding` only, and not while attached.
+
+        Returns:
+            (6) force [N] and torque [N m] of the attachment on the body, in the tool frame and about its origin, in the
+            last physics step; overwritten by every read. Always zeros in an engine without physics.
+        """
+        ...
+
+    def detach(self, body: str) -> None:
+        """Free an attached body."""
+        ...
+
     def advance(self) -> None:
         """One control tick: `substeps` physics steps."""
         ...

@@ -12,10 +12,11 @@ import numpy as np
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
+from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
-from manipcli.plan.motion import Grip, Motion
+from manipcli.plan.motion import GoalTolerances, Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import SLOW, Session
 
@@ -194,7 +195,9 @@ class Executor:
             follower = manager.serving(motion.trajectory.names)
             if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
-            handle = follower.send_goal(self._completed(motion.trajectory, follower))
+            whole = self._completed(motion.trajectory, follower)
+            own = motion.tolerances
+            handle = follower.send_goal(whole if own is None else _goal(whole, own))
             handles.append(self._announced(follower.name, handle))
             self._serving += (follower,)
         if motion.grip is not None:
@@ -246,6 +249,12 @@ class Executor:
     def _cancel(self) -> None:
         for handle in self._handles:
             handle.cancel()
+
+
+def _goal(trajectory: JointTrajectory, own: GoalTolerances) -> TrajectoryGoal:
+    return TrajectoryGoal(
+        trajectory, path_tolerance=own.path, goal_tolerance=own.goal, goal_time_tolerance=own.goal_time
+    )
 
 
 def _fault(session: Session) -> MotionEnd:

@@ -29,6 +29,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import Engine
+from manipcli.simulate.holder import Holder
 from manipcli.simulate.sensor import Sensor
 from manipcli.simulate.sensors import SENSORS
 
@@ -67,7 +68,10 @@ class Silent:
 
 
 class Session:
-    """Owns the clock of a run: control tick k begins at k * period. `rng`: of the sensors [default: seeded with 0]."""
+    """Owns the clock of a run: control tick k begins at k * period. `rng`: of the sensors [default: seeded with 0].
+
+    `holder`: of attached objects; None where contact and friction hold them.
+    """
 
     def __init__(
         self,
@@ -108,6 +112,8 @@ class Session:
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
         self._touching: tuple[Contact, ...] = ()
+        holding = None if engine.ideal else robot.holding
+        self.holder = None if holding is None else Holder(robot, scene, holding, engine, period)
         self._watchful = 0  # the tick up to which contacts are read at every tick
 
     @property
@@ -154,6 +160,8 @@ class Session:
         for sensor in self._sensors:
             sensor.sense(state, self._rng)
         self._touch(state)
+        if self.holder is not None and self.holder.attached:
+            self.holder.look(state, self.engine.contacts())
         if self._motors.watches:
             limiter = self._limiter
             self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.by_kind[EFFORT])

@@ -50,6 +50,21 @@ class ControllerSpec(Model):
         """Command interfaces that it claims on each of its joints."""
         return ()
 
+    @property
+    def references(self) -> tuple[Interface, ...]:
+        """References of each of its joints that another controller may command."""
+        return ()
+
+
+class ChainableSpec(ControllerSpec):
+    """A controller that may command the references of another one."""
+
+    chained_to: str | None = Field(
+        None,
+        description="Name of a `pid` whose references it commands, instead of the joints; that one has the same joints "
+        "and is active with it. Default: it commands the joints.",
+    )
+
 
 AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
 

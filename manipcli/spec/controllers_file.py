@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -22,4 +22,9 @@ class ControllersSpec(Model):
     """Specs of the members by type; `unions.controllers_model` fills it."""
 
     version: Version = None
+    compat: Literal["ros1", "ros2"] | None = Field(
+        None,
+        description="Whose behaviour to follow where ROS 1 and ROS 2 differ, if the robot file has no `compat`. "
+        "Default: `ros2` for a file in the form of ROS 2, otherwise the safer behaviour in each case.",
+    )
     controllers: dict[str, ControllerSpec] = Field(description="The controllers, by name.")

@@ -20,9 +20,9 @@ from manipcli.spec.override import Override, apply, read_overrides, seed_overrid
 from manipcli.spec.partial.partial_controllers import salvage_controllers
 from manipcli.spec.partial.partial_robot import salvage_robot
 from manipcli.spec.partial.partial_task import salvage
-from manipcli.spec.robot import RobotSpec
+from manipcli.spec.robot import Arguments, RobotSpec
 from manipcli.spec.ros import rewrite
-from manipcli.spec.ros.substitutions import open_substitutions
+from manipcli.spec.ros.substitutions import open_substitutions, substituted
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.source.yaml import MAX_BYTES, parse
 from manipcli.spec.task import TaskSpec
@@ -75,7 +75,7 @@ def kind_of(path: Path, *, types: Collection[str] | None = None) -> FileKind:
         InvalidInput: the file cannot be read or is not a YAML mapping; with `types`, it is not of any kind.
     """
     found: list[Diagnostic] = []
-    root = parse(read_bytes(path), str(path), infinite=True, reported=found if types is None else None)
+    root = parse(read_bytes(path), str(path), ros=True, reported=found if types is None else None)
     if not isinstance(root, MappingNode) and found:
         raise InvalidInput(found)
     if not isinstance(root, MappingNode):
@@ -201,7 +201,7 @@ def salvage_robot_file(path: Path, *, overrides: Sequence[str]) -> Located[Robot
 
 
 def load_controllers(
-    path: Path, *, model: type[ControllersSpec], overrides: Sequence[str] = ()
+    path: Path, *, model: type[ControllersSpec], overrides: Sequence[str] = (), args: Arguments | None = None
 ) -> Located[ControllersSpec]:
     """Loads a controllers file in our form or in a form of ROS.
 
@@ -209,33 +209,40 @@ def load_controllers(
         path: the file.
         model: the result of `unions.controllers_model`, with all types of controllers.
         overrides: values of `--set`; those that begin with `controllers.` are used.
+        args: values of `$(var NAME)`, from the robot file; None: there is no robot file, and an open substitution is
+            a warning instead of an error.
     """
-    return load_controllers_text(read_bytes(path), str(path), model=model, overrides=overrides)
+    return load_controllers_text(read_bytes(path), str(path), model=model, overrides=overrides, args=args)
 
 
 def load_controllers_text(
-    text: str | bytes, name: str, *, model: type[ControllersSpec], overrides: Sequence[str] = ()
+    text: str | bytes,
+    name: str,
+    *,
+    model: type[ControllersSpec],
+    overrides: Sequence[str] = (),
+    args: Arguments | None = None,
 ) -> Located[ControllersSpec]:
     """As `load_controllers`, from text; places call it `name`."""
-    source, findings = _controllers_source(text, name, model, overrides)
-    return validate(source, model, findings=[*findings, *open_substitutions(source.root)])
+    source, findings = _controllers_source(text, name, model, overrides, args)
+    return validate(source, model, findings=[*findings, *open_substitutions(source.root, args)])
 
 
 def _controllers_source(
-    text: str | bytes, name: str, model: type[ControllersSpec], overrides: Sequence[str]
+    text: str | bytes, name: str, model: type[ControllersSpec], overrides: Sequence[str], args: Arguments | None
 ) -> tuple[Source, list[Diagnostic]]:
     written, in_text = _source(text, name, "CTRL", "controllers")
-    root, more = rewrite(written.root, model.types)
+    root, more = rewrite(substituted(written.root, args or {}), model.types)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), model)
     return source, [*in_text, *more, *findings]
 
 
 def salvage_controllers_file(
-    path: Path, *, model: type[ControllersSpec], overrides: Sequence[str]
+    path: Path, *, model: type[ControllersSpec], overrides: Sequence[str], args: Arguments | None = None
 ) -> Located[ControllersSpec] | None:
     """The valid part of a controllers file that `load_controllers` refused; None if too little is left."""
     try:
-        source, _ = _controllers_source(read_bytes(path), str(path), model, overrides)
+        source, _ = _controllers_source(read_bytes(path), str(path), model, overrides, args)
     except InvalidInput:
         return None
     return salvage_controllers(source, model)
@@ -246,7 +253,7 @@ def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = No
     if kind is not None:
         refuse_description(name, kind)
     findings: list[Diagnostic] = []
-    root: Node | None = parse(text, name, infinite=area == "CTRL", reported=findings)
+    root: Node | None = parse(text, name, ros=area == "CTRL", reported=findings)
     if kind is not None and root is not None:
         refuse_other_kind(root, name, kind)
     return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area), findings

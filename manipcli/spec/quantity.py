@@ -80,6 +80,7 @@ Pause = Annotated[Time, Field(le=3600.0)]
 """A waiting time, at most 1 h."""
 Frequency = Annotated[float, Unit((units.FREQUENCY,))]
 Force = Annotated[float, Unit((units.FORCE,))]
+Torque = Annotated[float, Unit((units.TORQUE,))]
 Speed = Annotated[float, Unit((units.SPEED,))]
 Acceleration = Annotated[float, Unit((units.ACCELERATION,))]
 Energy = Annotated[float, Unit((units.ENERGY,))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 
@@ -31,14 +32,26 @@ def resolved(spec: BaseModel, expressions: Mapping[Loc, str] | None = None) -> s
     for path, text in (expressions or {}).items():
         data = _with(data, path, text)
     assert isinstance(data, dict)
+    return yaml_text(data)
+
+
+def yaml_text(data: dict[str, Plain]) -> str:
+    """Plain data as YAML text."""
     return "".join(f"{line}\n" for line in _lines(data))
+
+
+def plain_data(spec: BaseModel) -> dict[str, Plain]:
+    """A spec as plain data with defaults, without null keys whose default is null."""
+    data = _data(spec, escape=False)
+    assert isinstance(data, dict)
+    return data
 
 
 def as_written(spec: BaseModel) -> str:
     """The YAML text without defaults: only values set in a file or by `model_copy`."""
     data = _data(spec, escape=isinstance(spec, TaskSpec), stated=True)
     assert isinstance(data, dict)
-    return "".join(f"{line}\n" for line in _lines(data))
+    return yaml_text(data)
 
 
 def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
@@ -78,8 +91,8 @@ def _with(data: Plain, path: Loc, text: str) -> Plain:
 def _lines(data: dict[str, Plain]) -> list[str]:
     lines: list[str] = []
     for key, value in data.items():
-        name = _text(key)
-        short = f"{name}: {_inline(value)}"
+        name = yaml_word(key)
+        short = f"{name}: {inline(value)}"
         if len(short) <= _WIDTH or not isinstance(value, dict | list):
             lines.append(short)
         elif isinstance(value, dict):
@@ -94,29 +107,36 @@ def _lines(data: dict[str, Plain]) -> list[str]:
 def _items(items: list[Plain]) -> list[str]:
     lines: list[str] = []
     for item in items:
-        inner = _lines(item) if isinstance(item, dict) and len(_inline(item)) > _WIDTH else [_inline(item)]
+        inner = _lines(item) if isinstance(item, dict) and len(inline(item)) > _WIDTH else [inline(item)]
         lines.append(f"- {inner[0]}")
         lines.extend(f"  {line}" for line in inner[1:])
     return lines
 
 
-def _inline(value: Plain) -> str:
+def inline(value: Plain) -> str:
+    """A value on one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_text(key)}: {_inline(v)}" for key, v in value.items()) + "}"
+        return "{" + ", ".join(f"{yaml_word(key)}: {inline(v)}" for key, v in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_inline, value)) + "]"
+        return "[" + ", ".join(map(inline, value)) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None:
         return "null"
     if isinstance(value, str):
-        return _text(value)
+        return yaml_word(value)
+    return number_text(value)
+
+
+def number_text(value: int | float) -> str:
+    """A number in YAML, with all its digits; YAML 1.1 reads 1e-05, which has no point, as a string."""
+    if math.isinf(value):
+        return ".inf" if value > 0.0 else "-.inf"
     mantissa, exponent, power = repr(value).partition("e")
-    # YAML 1.1 reads 1e-05, which has no point, as a string.
     return f"{mantissa}.0e{power}" if exponent and "." not in mantissa else f"{mantissa}{exponent}{power}"
 
 
-def _text(text: str) -> str:
+def yaml_word(text: str) -> str:
     """A plain word unquoted; a text that YAML could misread in double quotes."""
     if _WORD.fullmatch(text) and text.casefold() not in _RESERVED:
         return text

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
 from manipcli.core.text import number_of, shorten
 from manipcli.spec.base import Model, problem
+from manipcli.spec.holding import HoldingSpec
+from manipcli.spec.inertials import InertialsSpec
 from manipcli.spec.quantity import (
     JointAcceleration,
     JointEffort,
@@ -234,6 +237,18 @@ class ToolSpec(Model):
 
     link: str = Field(description="The link that carries the tool.")
     pose: PoseSpec = Field(PoseSpec(), description="Pose of the tool frame in the link. Default: identity.")
+    holding: HoldingSpec | None = Field(
+        None,
+        description="What holds a grasped object: contact and friction, a suction cup, or a weld. Default friction.",
+    )
+
+
+def _relative(packages: dict[str, str]) -> dict[str, str]:
+    for name, folder in packages.items():
+        if PurePath(folder).is_absolute() or folder.startswith("~"):
+            hint = "write it relative to this file, or pass --package-path"
+            raise problem("conflict", f"'{shorten(folder)}' is an absolute path", at=(name,), hint=hint)
+    return packages
 
 
 class RobotSpec(Model):
@@ -243,6 +258,10 @@ class RobotSpec(Model):
     version: Version = None
     description: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
     args: Arguments = Field({}, description="Arguments of the xacro file.")
+    packages: Annotated[dict[str, str], AfterValidator(_relative)] | None = Field(
+        None,
+        description="Folders of ROS packages by name, relative to this file. Default: they are searched, see below.",
+    )
     mount: PoseSpec = Field(PoseSpec(), description="Pose of the root link in the world. Default: identity.")
     attach: tuple[AttachSpec, ...] = Field((), description="Further descriptions, welded on.")
     groups: dict[str, GroupSpec] = Field({}, description="Groups of joints, by name.")
@@ -250,6 +269,10 @@ class RobotSpec(Model):
     tool: ToolSpec | None = Field(None, description="The tool frame. Default: the tip of the first group.")
     limits: dict[str, LimitsSpec] = Field(
         {}, description="Limits by joint, which complete or narrow those of the URDF."
+    )
+    inertials: InertialsSpec | None = Field(
+        None,
+        description="Masses, centres and inertias of links, or `estimate`. Default: those of the description.",
     )
     transmissions: dict[str, TransmissionSpec] = Field(
         {}, description="Transmissions by name, which add to those of the description or replace them."
@@ -265,6 +288,12 @@ class RobotSpec(Model):
         (),
         description="Links whose collision meshes count as their convex parts, not as one convex hull each (a concave "
         "mesh needs `manipcli[coacd]`). Default: none.",
+    )
+    collision: Literal["from_visual"] | dict[str, Literal["from_visual", "none"]] | None = Field(
+        None,
+        description="Collision shapes of links that have none, or whose collision mesh is missing: `from_visual` uses "
+        "the visual shapes of all of them; `{LINK: from_visual, LINK: none}` of single links; `none` leaves a link "
+        "without contacts. Default: as in the description.",
     )
     friction: Annotated[float, Field(ge=0)] = Field(
         1.0, description="Friction coefficient of the robot; the engine multiplies it by the other body's. Default 1."

@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from manipcli.control.factory import controller_findings
+from manipcli.core.errors import InvalidInput
+from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.load import load_controllers
 from manipcli.task.load_task import load_task
+from manipcli.task.vocabulary import controllers_spec
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +63,22 @@ def controllers_of(path: Path) -> tuple[ControllerRow, ...]:
         )
         for name, controller in task.controllers.controllers.items()
     )
+
+
+def checked_controllers(path: Path, robot: RobotModel, period: float) -> ControllersSpec:
+    """The controllers of a file, for a robot without a task.
+
+    Args:
+        path: the controllers file.
+        robot: the robot.
+        period: control period [s].
+
+    Raises:
+        InvalidInput: all errors of the file, or of its controllers with this robot.
+    """
+    file = load_controllers(path, model=controllers_spec())
+    findings = controller_findings(file.spec, robot, period, place=lambda loc: file.place(*loc))
+    errors = [finding for finding in findings if finding.severity == "error"]
+    if errors:
+        raise InvalidInput(errors)
+    return file.spec

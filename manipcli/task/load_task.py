@@ -135,7 +135,9 @@ def _as_written(
         allow_outside=allow_outside,
         source=robot_file.source,
     )
-    controllers_file = load_controllers(controllers_path, model=controllers_spec(), overrides=overrides)
+    controllers_file = load_controllers(
+        controllers_path, model=controllers_spec(), overrides=overrides, args=robot_file.spec.args
+    )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
     warnings = consistent(file, controllers_file, robot, scene)

@@ -21,7 +21,7 @@ from manipcli.spec import load
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located, apart
 from manipcli.spec.partial.partial_robot import is_whole
-from manipcli.spec.robot import RobotSpec
+from manipcli.spec.robot import Arguments, RobotSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.changed_files import Files, out_of_range
 from manipcli.task.consistency import disagreements, not_there
@@ -61,7 +61,8 @@ def every_finding(
     robot_path = _named(errors, partial, path, "robot")
     controllers_path = _named(errors, partial, path, "controllers")
     robot = _Robot.read(robot_path, errors, overrides, package_path, allow_outside)
-    controllers_file, partial_controllers = _controllers(errors, controllers_path, overrides)
+    args = {} if robot.file is None else robot.file.spec.args
+    controllers_file, partial_controllers = _controllers(errors, controllers_path, overrides, args)
     scene = None
     if task is not None:
         packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
@@ -160,10 +161,10 @@ def _named(errors: _Errors, task: Located[TaskSpec], path: Path, key: str) -> Pa
 
 
 def _controllers(
-    errors: _Errors, path: Path | None, overrides: Sequence[str]
+    errors: _Errors, path: Path | None, overrides: Sequence[str], args: Arguments
 ) -> tuple[Located[ControllersSpec] | None, Located[ControllersSpec] | None]:
     """The controllers file (None if refused), and its valid part."""
     if path is None:
         return None, None
-    file = errors.of(lambda: load.load_controllers(path, model=controllers_spec(), overrides=overrides))
-    return file, file or load.salvage_controllers_file(path, model=controllers_spec(), overrides=overrides)
+    file = errors.of(lambda: load.load_controllers(path, model=controllers_spec(), overrides=overrides, args=args))
+    return file, file or load.salvage_controllers_file(path, model=controllers_spec(), overrides=overrides, args=args)

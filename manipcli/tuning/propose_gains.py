@@ -80,8 +80,8 @@ def tune(
     Raises:
         InvalidInput: a file is invalid, a joint has no loop, no controller has gains, or no gains are stable.
     """
-    _, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
-    file = load.load_controllers(controllers_path, model=controllers_spec())
+    robot_file, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
+    file = load.load_controllers(controllers_path, model=controllers_spec(), args=robot_file.spec.args)
     tuner = _Tuner(robot, file, wish, step)
     everything = tuner.proposals()
     there = [tuned.joint for tuned in everything]

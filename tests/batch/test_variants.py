@@ -156,11 +156,14 @@ def test_a_run_without_a_verdict_is_not_compared() -> None:
     assert (found.outcome, found.text) == ("error", "not compared: 'pour[mujoco]' is invalid")
 
 
-def test_an_amount_in_another_unit_is_invalid() -> None:
+def test_an_amount_in_another_unit_is_no_agreement() -> None:
     *runs, agreement = variants_of_case(CASE, ("pybullet", "mujoco"), check_step=False)
     agree = AgreeSpec(margins={"near": "2 deg"})
     found = agreement_report(replace(JOB, case=agreement), [ended(runs[0], 0.012, agree=agree), ended(runs[1], 0.012)])
-    assert found.outcome == "invalid"
+    assert (found.outcome, found.text) == (
+        "differs",
+        "a limit cannot be used: agree.margins.near: '2 deg' is an angle; the margin is in m",
+    )
 
 
 def test_places_have_the_shown_name_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ import yaml
 
 from manipcli.cli.app import main
 from manipcli.cli.commands.init import FILES, TEMPLATES
+from manipcli.core.version import __version__
 
 ROOT = Path(__file__).parents[2]
 
@@ -159,7 +160,8 @@ def test_the_robot_is_that_of_the_repository() -> None:
 
 def test_the_example_shows_the_same_workflow() -> None:
     shown = ROOT / "examples" / "09_continuous_integration" / "manipcli.yml"
-    assert shown.read_text() == (TEMPLATES / "github/workflows/manipcli.yml").read_text()
+    template = (TEMPLATES / "github/workflows/manipcli.yml").read_text()
+    assert shown.read_text() == template.replace("INSTALL", f"./vendor/manipcli-{__version__}-py3-none-any.whl")
 
 
 @pytest.mark.slow

@@ -289,6 +289,33 @@ def test_a_pendulum_swings_with_its_period(member: EngineMember, opens: Opens) -
 
 
 @with_physics
+def test_a_fixed_joint_adds_masses_and_inertias_however_they_are_shared(member: EngineMember, opens: Opens) -> None:
+    """The mass on the moved link, on a link fixed to it below a massless frame, or half on each: the same pendulum."""
+
+    def shared(own: float, tip: float) -> RobotModel:
+        moments = (0.02, 0.03, 0.04)
+        at = Transform.of(xyz=(0.2, 0.1, 0.0), rpy=(0.0, 0.0, 0.5))
+        joints = [
+            joint("swing", "bob", at=(0.0, 0.0, 1.0)),
+            replace(joint("f", "frame", parent="bob"), type="fixed", X_PJ=at),
+            replace(joint("g", "tip", parent="frame"), type="fixed", X_PJ=at.inverse()),
+        ]
+
+        def part(share: float) -> Inertial | None:
+            return inertial(2.0 * share, (0.5, 0.0, 0.0), [share * each for each in moments]) if share else None
+
+        return robot(joints, [part(own), None, part(tip)])
+
+    def control(k: int, _: WorldState) -> Array:
+        return np.array([3.0 * math.sin(0.01 * k)])
+
+    runs = [run(opens(member, shared(*each)), 300, control) for each in ((1.0, 0.0), (0.0, 1.0), (0.5, 0.5))]
+    for other in runs[1:]:
+        assert abs(other[-1][0][0] - runs[0][-1][0][0]) < 1e-9
+    assert abs(runs[0][-1][0][0]) > 0.3
+
+
+@with_physics
 @pytest.mark.parametrize("torque", [10.0, 50.0])
 def test_effort_accelerates_by_the_inertia(member: EngineMember, opens: Opens, torque: float) -> None:
     """Without gravity and from rest: w = tau t / (m l^2 + I)."""

@@ -191,9 +191,10 @@ def test_the_package_that_was_meant_is_named(tree: Path, monkeypatch: pytest.Mon
         return refused.value.hint
 
     assert hint("pybulet_data") == (
-        "did you mean 'pybullet_data'? Otherwise add the folder that contains 'pybulet_data' with --package-path DIR"
+        "did you mean 'pybullet_data'? Otherwise add the folder that contains 'pybulet_data' with --package-path DIR, "
+        "or to the robot file: packages: {pybulet_data: FOLDER}"
     )
-    assert hint("my_robot") == "add the folder that contains 'my_robot' with --package-path DIR"
+    assert (hint("my_robot") or "").startswith("add the folder that contains 'my_robot' with --package-path DIR")
     (tree / "other").mkdir()
     (tree / "other" / "package.xml").write_text("<package><name>my_robots</name></package>")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tree))

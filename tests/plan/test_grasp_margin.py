@@ -10,7 +10,7 @@ import pytest
 
 from manipcli.core.geometry import Array
 from manipcli.plan.grasp_contacts import PALM, GraspContact, finger_links, grasp_contacts
-from manipcli.plan.grasp_margin import MOST, HeldForce, carries, cone_edges, force_limits, grasp_margin
+from manipcli.plan.grasp_margin import MOST, HeldForce, _load, carries, cone_edges, force_limits, grasp_margin
 from manipcli.plan.motion import CLOSING
 
 Make = Callable[..., Any]
@@ -134,3 +134,40 @@ def test_fingers_that_mimic_count_and_joints_of_one_finger_do_not(bench: Make, s
     panda = bench("panda")
     assert len(finger_links(panda.robot, panda.planner.gripper_joints)) == 2
     assert len(finger_links(story.bench.robot, story.bench.planner.gripper_joints)) == 3
+
+
+HEAVY = """
+  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}
+  cup: {cup: {radius: 30 mm, height: 90 mm, wall: 3 mm}, mass: 80 g, rests_on: table, at: [0.5, -0.1]}
+"""
+STONE = "  stone: {sphere: {radius: 20 mm}, mass: MASS, inside: cup}\n"
+
+
+def test_what_lies_in_the_object_hangs_on_the_hand_too(bench: Make) -> None:
+    """Fingers that hold 9 x the empty cup hold less than its weight with a stone of 900 g: the oracle adds masses."""
+    found = {}
+    for mass in ("", "20 g", "900 g"):
+        panda = bench("panda", scene=HEAVY + (STONE.replace("MASS", mass) if mass else ""))
+        plan = panda.do("pick", {"object": "cup", "grasp": {"force": "6 N"}})
+        margin = grasp_margin(panda.planner, plan)
+        assert margin is not None
+        found[mass] = margin
+        assert carries(panda.planner, plan)  # by friction too low at any grasp, too
+    empty, light, heavy = found[""], found["20 g"], found["900 g"]
+    assert (empty.contents, light.contents, heavy.contents) == ((), ("stone",), ("stone",))
+    assert empty.weight == pytest.approx(0.08 * 9.81, rel=1e-3)
+    assert heavy.weight == pytest.approx(0.98 * 9.81, rel=1e-3)
+    assert light.ratio * light.weight == pytest.approx(empty.ratio * empty.weight, rel=0.2)
+    assert heavy.ratio < 1.0 < light.ratio < empty.ratio
+    assert "'cup' with its contents (9.61 N) is not held" in heavy.text
+    assert "contents" not in empty.text
+
+
+def test_the_centre_of_mass_is_that_of_the_object_and_its_contents(bench: Make) -> None:
+    """Mass and first moment, summed by hand."""
+    panda = bench("panda", scene=HEAVY + STONE.replace("MASS", "240 g"))
+    load = _load(panda.planner, panda.now, "cup")
+    cup, stone = (panda.scene.body(name) for name in ("cup", "stone"))
+    centres = [panda.body(body.name).apply(body.X_OI.p) for body in (cup, stone)]
+    assert load.mass == pytest.approx(0.32)
+    np.testing.assert_allclose(load.centre, (0.08 * centres[0] + 0.24 * centres[1]) / 0.32, atol=1e-9)

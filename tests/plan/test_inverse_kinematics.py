@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle, matrix_from_rpy
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
+from manipcli.plan.damped_step import solve_kernel
 from manipcli.plan.inverse_kinematics import (
     ANGLE_TOLERANCE,
     POSITION_TOLERANCE,
@@ -190,3 +193,26 @@ def test_rotation_vector_inverts_axis_and_angle(angle: float) -> None:
     vector = rotation_vector(matrix_from_axis_angle(axis, angle))
     sign = 1.0 if vector @ axis >= 0.0 else -1.0  # at pi, both axes are the same rotation
     np.testing.assert_allclose(sign * vector, axis * angle, atol=1e-8)
+
+
+def broken(*_: object) -> Array:
+    raise TypeError("another signature")
+
+
+@pytest.mark.parametrize(
+    "module",
+    [None, SimpleNamespace(), SimpleNamespace(solve1=broken), SimpleNamespace(solve1=lambda H, b: b), "is not there"],
+)
+def test_a_numpy_without_the_kernel_is_as_good(module: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Missing, without the function, with another one, and with other results."""
+    if module != "is not there":
+        monkeypatch.setitem(sys.modules, "other_numpy", module)
+    assert solve_kernel("other_numpy") is np.linalg.solve
+
+
+def test_the_kernel_gives_the_bits_of_solve() -> None:
+    rng = np.random.default_rng(3)
+    for n in (1, 2, 6, 7):
+        J = rng.normal(size=(6, n))
+        H, b = J.T @ J + 1e-6 * np.eye(n), rng.normal(size=n)
+        np.testing.assert_array_equal(solve_kernel()(H, b), np.linalg.solve(H, b))

@@ -12,13 +12,15 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.plan import constrained_motion, kept_path, kept_problem
+from manipcli.plan import constrained_motion, free_motion, kept_path, kept_problem
+from manipcli.plan.candidates import first
 from manipcli.plan.carrying import carry
 from manipcli.plan.keep import Kept, reserving
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.motion_margins import motion_margins
 from manipcli.plan.path_kind import path_kind
+from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.steps import STEPS
 from manipcli.spec.keep import KeepSpec
 
@@ -40,7 +42,7 @@ def held(bench: Callable[..., Bench]) -> Bench:
 def planned(bench: Bench, spec: object, *keep: object, verb: str = "move") -> StepPlan:
     step = STEPS[verb]
     planner = bench.planner.keeping(tuple(KeepSpec.model_validate(each) for each in keep))
-    return step.plan(step.spec.model_validate(spec), planner, bench.now)
+    return first(step.ways(step.spec.model_validate(spec), planner, bench.now))
 
 
 def tools(bench: Bench, plan: StepPlan, *, every: int = 1) -> tuple[Array, Motion]:
@@ -102,14 +104,43 @@ def test_the_reserve_is_at_most_half_of_what_the_ends_leave(at_end: float, left:
     assert 3.0 - tighter.margin(np.array([[3.0]]))[0] == pytest.approx(left)
 
 
+def test_the_settings_of_the_planner_are_those_of_paths_that_keep_something(
+    held: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without samples no path is searched, with few none is found, and the path that is found says by whom."""
+    monkeypatch.setattr(kept_path, "_tool_line", lambda *_: None)
+    (motion,) = planned(held, ACROSS, {"upright": "1 deg"}).motions
+    assert motion.searched == "rrt_connect"
+    monkeypatch.setattr(held.planner, "_paths", RrtConnectSpec(samples=0))
+    none = refusal(held, ACROSS, {"upright": "1 deg"})
+    assert re.fullmatch(r"'cup' tilts by 1\.\d deg, beyond `upright: 1 deg` on the straight path", none.cause)
+    assert none.hint == "make the constraint wider, or `move` to a pose in between"
+    monkeypatch.setattr(held.planner, "_paths", RrtConnectSpec(samples=1))
+    few = refusal(held, ACROSS, {"upright": "1 deg"})
+    assert "no path around obstacles keeps `upright`: " in few.cause
+    assert few.hint is not None and few.hint.startswith("make the constraint wider, or ")
+
+
+def test_without_samples_a_straight_path_needs_no_reserve(held: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_path, "_tool_line", lambda *_: None)
+    monkeypatch.setattr(held.planner, "_paths", RrtConnectSpec(samples=0))
+    free = tilt(cups(held, planned(held, ACROSS, {"upright": 1.0})))
+    limit = free + 0.1  # of which 1 deg, at most a fifth, would be left to the run
+    assert tilt(cups(held, planned(held, ACROSS, {"upright": f"{limit} deg"}))) == pytest.approx(free)
+
+
 def test_where_only_a_path_without_the_reserve_exists_it_is_accepted(
     held: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def tighter(keeps: tuple[Kept, ...], *_: Array) -> tuple[Kept, ...]:
-        return (replace(keeps[0], margin=lambda q: np.full(len(q), -1.0)),)
+    def tighter(keeps: tuple[Kept, ...], *ends: Array) -> tuple[Kept, ...]:
+        def margin(q: Array) -> Array:
+            return np.array([0.1 if min(np.abs(x - end).max() for end in ends) < 1e-9 else -1.0 for x in q])
+
+        return (replace(keeps[0], margin=margin),)
 
     with_reserve = planned(held, ACROSS, {"upright": "5 deg"})
-    monkeypatch.setattr(constrained_motion, "reserving", tighter)
+    for module in (constrained_motion, free_motion):
+        monkeypatch.setattr(module, "reserving", tighter)
     without = planned(held, ACROSS, {"upright": "5 deg"})
     assert tilt(cups(held, with_reserve)) <= 5.0 and tilt(cups(held, without)) <= 5.0
 
@@ -135,7 +166,7 @@ def test_the_kind_of_each_path_is_known(held: Bench) -> None:
 def test_what_binds_is_named(held: Bench, keep: dict[str, object], bound: tuple[str, str]) -> None:
     planner = held.planner.keeping((KeepSpec.model_validate(keep),))
     plan = planned(held, ACROSS, keep)
-    found = motion_margins(planner, plan.motions[0], held.now, plan.end)
+    found = motion_margins(planner, plan.motions[0], held.now)
     assert found.binding is not None
     assert (found.binding.joint, found.binding.quantity) == bound
     (margin,) = (margin for margin in found.margins if margin.quantity == bound[1])

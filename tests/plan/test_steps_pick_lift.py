@@ -290,3 +290,21 @@ def test_unknown_names_of_a_pick_come_with_the_nearest(bench: Make) -> None:
     assert arm.problems("lift", {"object": "tray"}) == [
         (("object",), "'tray' is not a movable body of the scene", "known: cup, ball")
     ]
+
+
+def test_a_hand_that_closes_on_something_unknown_stops_there(bench: Make) -> None:
+    """4 cm between the fingers of the Panda: each of them travels to 2 cm; without the block they close."""
+    table = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    block = "  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}\n"
+    arm = bench("panda", scene=table + block)
+    plan = arm.plan("pick", {"object": "block", "approach": {"from": "top", "yaw": 0}})
+    around, _ = arm.at(arm.now, plan, "close")
+    columns = arm.robot.indices(arm.planner.gripper_joints)
+    for start, opening in ((around, 0.02), (arm.start, 0.0)):
+        arm.now = start
+        done = arm.do("grasp", {"until": "posture"})
+        np.testing.assert_allclose(arm.now.position[columns], opening, atol=2e-3)
+        assert arm.now.closed and arm.now.carried is None
+        (motion,) = done.motions
+        assert motion.grip is not None
+        np.testing.assert_allclose(motion.grip.target, 0.0, atol=1e-9)

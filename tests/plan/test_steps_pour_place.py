@@ -232,6 +232,24 @@ def test_a_block_goes_inside_a_tray(bench: Make) -> None:
     assert panda.body("block").p[2] == pytest.approx(0.2 + 0.005 + 0.025, abs=1e-4)
 
 
+def test_the_cup_does_not_go_back_through_what_was_poured_out(bench: Make) -> None:
+    """A rod of 10 cm, predicted upright in the tray, ends 5 cm above its rim: above the lip, which is at 4 cm."""
+    scene = """
+  desk: {box: {size: [0.6, 1.0, 0.4]}, pose: {xyz: [0.85, 0, 0.2]}, fixed: true}
+  cup: {cup: {radius: 36 mm, height: 110 mm, wall: 4 mm}, mass: 150 g, rests_on: desk, at: [0.75, 0.0]}
+  rod: {cylinder: {radius: 8 mm, height: 100 mm}, mass: 10 g, inside: cup}
+  tray: {tray: {size: [0.3, 0.3, 0.05]}, rests_on: desk, at: [0.70, 0.32], fixed: true}
+"""
+    arm = bench(scene=scene)
+    arm.do("pick", {"object": "cup", "grasp": {"posture": "wrap", "height": "68 mm"}})
+    arm.do("lift", {"object": "cup"})
+    pour = {"object": "cup", "into": "tray", "tilt": "125 deg"}
+    refusal = arm.refused("pour", {**pour, "clearance": "4 cm"})
+    assert "'cup' still touches 'rod' at t = 0.00 s of 'tilt back'" in refusal.cause
+    assert refusal.hint == "pour from higher, `clearance: ...`: what is poured out is in the way"
+    arm.do("pour", {**pour, "clearance": "12 cm"})
+
+
 REGION = {"object": "block", "onto": "table", "region": {"box": {"centre": [0.5, 0.2], "size": ["20 cm", "30 cm"]}}}
 
 
@@ -253,6 +271,18 @@ def test_a_place_in_a_region_keeps_away_from_what_stands_there(bench: Make) -> N
     assert "all 128 candidates failed" in refusal.cause and "is within 10 mm of 'post' (128 of 128)" in refusal.cause
     assert refusal.hint == "make `region` larger, or move 'post'"
     assert "post" in refusal.parts
+
+
+def test_a_region_off_its_support_is_refused_at_once(bench: Make) -> None:
+    panda = held_block(bench)
+    off = {**REGION, "region": {"box": {"centre": [1.5, 0.2], "size": ["20 cm", "30 cm"]}}}
+    refusal = panda.refused("place", off)
+    assert refusal.loc == ("region",)
+    assert refusal.cause.startswith("no place in the region is on 'table': [1.5, 0.2] m is outside 'table'")
+    assert refusal.hint == "`region` is in the world frame; 'table' offers 0.6 m x 0.8 m about its centre"
+    half = {**REGION, "region": {"box": {"centre": [0.45, 0.42], "size": ["10 cm", "20 cm"]}}}
+    panda.do("place", half)  # its centre is beside the table
+    assert panda.body("block").p[1] < 0.4
 
 
 def test_a_region_in_a_tray_is_not_crowded_by_the_table_under_its_thin_floor(bench: Make) -> None:

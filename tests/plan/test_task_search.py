@@ -15,7 +15,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.collision import Carried
 from manipcli.pipeline import run_task
-from manipcli.plan.candidates import Candidate, Candidates, Decision
+from manipcli.plan.candidates import ELSEWHERE, Candidate, Candidates, Decision
 from manipcli.plan.cost import CLEARANCE_WEIGHT, GRASP_WEIGHT, LIMIT_WEIGHT, SINGULARITY_WEIGHT, step_cost
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
@@ -186,6 +186,30 @@ def test_the_search_finds_a_plan_if_brute_force_finds_one(seed: int) -> None:
     else:
         with pytest.raises(NotPlannable):
             search_task(opens, count, start)
+
+
+def test_what_cannot_be_picked_where_it_was_put_is_put_elsewhere_in_the_region(tmp_path: Path) -> None:
+    """At the far places in the region the arm cannot take it from the other side; the nearest to the centre are far."""
+    region = "region: {box: {centre: [0.74, 0.0], size: [0.6, 0.3]}}"
+    scene = SCENE.replace("[0.6, 0.8, 0.2]}, pose: {xyz: [0.55", "[1.4, 0.8, 0.2]}, pose: {xyz: [0.95").split("  far:")[
+        0
+    ]
+    steps = (
+        "  - pick: {object: block, approach: {from: side, yaw: 90 deg}}\n"
+        "  - lift: {object: block, by: 10 cm}\n"
+        f"  - place: {{object: block, onto: table, {region}}}\n"
+        "  - move: {to: home}\n"
+    )
+    again = "  - pick: {object: block, approach: {yaw: 130 deg}, grasp: {height: 8 cm}}\n"
+    file = tmp_path / "task.yaml"
+    plans = []
+    for tail in ("", again):
+        file.write_text(f"task: t\n{PANDA}{scene}steps:\n{steps}{tail}")
+        plans.append(plan_task(load_task(file, allow_outside=True)))
+    (first,), (other,) = (plan.steps[2].plan.end.bodies for plan in plans)
+    assert abs(other.p[0] - 0.74) <= 0.3 and abs(other.p[1]) <= 0.15
+    assert max(abs(other.p[:2] - first.p[:2]) / [0.6, 0.3]) >= ELSEWHERE - 1e-9
+    assert other.p[0] < first.p[0] - 0.05
 
 
 @pytest.mark.slow

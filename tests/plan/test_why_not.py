@@ -27,8 +27,9 @@ def dropped(cause: str, *parts: str, name: str = "") -> tuple[str, Dropped]:
         ("approach: the tool cannot follow the line", "approach"),
         ("'robot/palm' comes within 4 mm of 'wall' (1.0 mm apart) at t = 0.30 s of 'lift'", "lift"),
         ("tilt back: joint 'a' needs 12 N m", "tilt back"),
-        ("'cup' is not held: the hand holds nothing", "start"),
-        ("no joint positions reach (1, 2, 3) m: the nearest pose is 3 mm off", "start"),
+        ("'cup' is not held: the hand holds nothing", "-"),
+        ("no joint positions reach (1, 2, 3) m: the nearest pose is 3 mm off", "-"),
+        ("'cup' tilts by 30.0 deg, beyond `upright: 10 deg` at its end", "-"),
     ],
 )
 def test_the_stage_is_the_motion_that_the_cause_names(cause: str, stage: str) -> None:

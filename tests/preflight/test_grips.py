@@ -157,8 +157,6 @@ def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
     assert preflight_findings(load_task(pick, overrides=[f"{mass}=0.64 kg"])) == ()
     (found,) = preflight_findings(load_task(pick, overrides=[f"{mass}=1 kg"]))
     assert found.hint == "it may slip or rotate while accelerated: 10.9 N per finger carries twice its weight"
-    run = run_task(pick, overrides=[f"{mass}=1 kg"], log=pick.with_suffix(".mcap"), force=True)
-    assert "it slipped" in str(run.verdict)
     (found,) = preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg"]))
     assert (found.code, found.severity) == ("TASK241", "warning")
     assert found.message == (

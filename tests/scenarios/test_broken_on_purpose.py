@@ -168,7 +168,7 @@ def test_a_move_asks_whether_what_is_held_follows(run: Run) -> None:
 
 
 def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
-    verdict = run(POUR, "scene.cup.friction=0.05")
+    verdict = run(POUR, "scene.cup.friction=0.03")
     assert verdict.verdict == "failed"
     assert outcomes(verdict) == ["done", "failed", "not_run", "not_run", "not_run", "not_run"]
     told = re.search(
@@ -177,14 +177,12 @@ def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
     )
     assert told is not None, verdict.text
     assert float(told[2]) > 50 > 2 * float(told[1])
-    grasp = r"grip force ([\d.]+) N: friction 0\.05 \('cup' 0\.05 x hand 1\) carries ([\d.]+) N"
+    grasp = r"grip force ([\d.]+) N: friction 0\.03 \('cup' 0\.03 x hand 1\) carries ([\d.]+) N"
     force = re.search(grasp, verdict.text)
     assert force is not None, verdict.text
-    assert float(force[2]) == pytest.approx(0.05 * float(force[1]), rel=0.01)
-    weight = r", its weight is 1\.47 N; maximum lift acceleration before slip: ([\d.]+) m/s2$"
-    left = re.search(weight, verdict.text)
-    assert left is not None, verdict.text
-    assert float(left[1]) == pytest.approx((float(force[2]) - 1.47) / 0.15, rel=0.05)
+    assert float(force[2]) == pytest.approx(0.03 * float(force[1]), rel=0.01)
+    assert float(force[2]) < 1.47
+    assert verdict.text.endswith(", its weight is 1.47 N")
 
 
 def test_a_hand_that_does_not_let_go_is_told(run: Run) -> None:

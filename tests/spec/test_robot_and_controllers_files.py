@@ -63,7 +63,7 @@ def test_the_listing_of_ros_1_loads_as_it_is() -> None:
     assert (arm.joints, arm.interfaces) == (("joint1",), ("effort",))
     assert arm.constraints.goal_time == 5.0
     assert arm.constraints.joints["joint1"].goal == 0.05
-    assert located.findings == ()
+    assert [finding.code for finding in located.findings] == ["CTRL218"]  # other defaults than ROS's
     place = located.place("controllers", "arm_controller", "constraints", "joints", "joint1", "goal")
     assert str(place) == "c.yaml:8:13"
 
@@ -76,7 +76,7 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
     assert (arm.gains["a"].p, arm.gains["a"].i_clamp_min, arm.gains["a"].i_clamp_max) == (3.0, -1.0, 1.0)
     assert (arm.constraints.joints["a"].goal, arm.constraints.joints["a"].trajectory) == (None, 0.1)
     assert list(located.spec.controllers) == ["joint_state_broadcaster", "arm"]
-    assert lines(located.findings) == [
+    assert lines(tuple(finding for finding in located.findings if finding.code != "CTRL218")) == [
         "c.yaml:3:5: note[CTRL214]: controller_manager: 'update_rate' has no effect: the task sets the control rate",
         "c.yaml:10:62: warning[CTRL214]: arm.gains.a: ROS parameter 'normalize_error' is not supported: left out",
     ]
@@ -104,21 +104,9 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
             "c.yaml:3:11: error[CTRL205]: controllers.arm.joints: expected a list, not 'a'",
         ),
         (
-            PAPER.replace("goal: 0.05", "gaol: 0.05"),
-            "c.yaml:8:7: error[CTRL201]: arm_controller.constraints.joint1: unknown key 'gaol'",
-        ),
-        (
-            PAPER.replace("goal_time", "goal_tim"),
-            "c.yaml:6:5: error[CTRL201]: arm_controller.constraints: unknown key 'goal_tim'",
-        ),
-        (
             PAPER.replace("effort_controllers", "efort_controllers"),
             "c.yaml:2:9: error[CTRL203]: controller 'arm_controller': unknown type "
             "'efort_controllers/JointTrajectoryController'",
-        ),
-        (
-            ROS2 + "amr: {ros__parameters: {}}\n",
-            "c.yaml:12:1: error[CTRL203]: the controller_manager does not declare controller 'amr'",
         ),
         ("", "c.yaml:1:1: error[CTRL200]: expected a mapping"),
         ("[1]", "c.yaml:1:1: error[CTRL200]: expected a mapping"),

@@ -63,7 +63,7 @@ def errors(tmp_path: Path, controllers: str) -> list[str]:
     try:
         load_task(task_file(tmp_path, controllers, "  - wait: 1 s\n"), allow_outside=True)
     except InvalidInput as refused:
-        return [f"{finding} | {finding.hint}" for finding in refused.findings]
+        return [f"{finding} | {finding.hint}" for finding in refused.findings if finding.severity == "error"]
     return []
 
 

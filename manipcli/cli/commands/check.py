@@ -42,6 +42,7 @@ def check(
     """
     from manipcli import pipeline
     from manipcli.report import json, text
+    from manipcli.report.inertials import render_table
 
     if collisions:
         return _self_collisions(files, format_, tuple(package_path or ()), allow_outside=allow_outside)
@@ -59,7 +60,11 @@ def check(
         raise InvalidInput([Diagnostic("USE052", "--set, --seed and --sample need a task; no file is a task")])
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings
-    console.result(render(findings, names))
+    text_ = render(findings, names)
+    if format_ == "text" and kinds == ["robot"]:
+        rows = pipeline.inertials(files[0], package_path=tuple(package_path or ()), allow_outside=allow_outside)
+        text_ = f"{render_table(rows)}\n\n{text_}" if rows else text_
+    console.result(text_)
     if any(finding.code in UNREADABLE for finding in findings):
         return ExitCode.USAGE
     if "controllers" in kinds and "task" not in kinds:

@@ -3,114 +3,151 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-from shlex import quote
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.new_project import enter, notes, refuse_conflicts, write_files
+from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
-from manipcli.core.text import listed
+
+if TYPE_CHECKING:
+    from manipcli.cli.own_wheel import Installation
 
 TEMPLATES: Final = Path(__file__).parents[1] / "project"
-FILES: Final = {
+COMMON: Final = {
     "README.md": "README.md",
     ".gitignore": "gitignore",
     ".github/workflows/manipcli.yml": "github/workflows/manipcli.yml",
+}
+"""Written files of every project, each with its template."""
+EXAMPLE: Final = {
     "tasks/pick_place.yaml": "tasks/pick_place.yaml",
     "robots/panda.yaml": "robots/panda.yaml",
     "controllers/panda.yaml": "controllers/panda.yaml",
 }
-"""Written files, each with its template."""
-MAY_BE_THERE: Final = ("README.md", ".gitignore")
-"""Existing files that are kept."""
-RESULTS: Final = ("runs", "report")
-"""Folders that belong in .gitignore."""
+"""Those of the example."""
+FILES: Final = COMMON | EXAMPLE
+SCHEMAS: Final[dict[str, Literal["task", "robot", "controllers"]]] = {
+    "schemas/task.json": "task",
+    "schemas/robot.json": "robot",
+    "schemas/controllers.json": "controllers",
+}
+NO_ROBOT: Final = "it belongs to --robot"
 
 
 def init(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Folder of the project.")] = Path(),
     *,
+    robot: Annotated[
+        str | None,
+        typer.Option("--robot", metavar="FILE", help="Set up this robot: a URDF or xacro file, or package://NAME/...."),
+    ] = None,
+    arg: Annotated[
+        list[str] | None,
+        typer.Option("--arg", metavar="NAME:=VALUE", help="Argument of the xacro file; repeatable."),
+    ] = None,
+    srdf: Annotated[
+        Path | None,
+        typer.Option("--srdf", metavar="FILE", help="Take groups, poses and touching links from this MoveIt SRDF."),
+    ] = None,
+    controllers: Annotated[
+        Path | None,
+        typer.Option(
+            "--controllers", metavar="FILE", help="Use this controllers file (also of ROS) instead of a guess."
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Create a small working project.
+    """Create a small working project, of an example or of your own robot.
 
-    A robot whose description comes with PyBullet, its controllers, a task with expectations, JSON schemas for editors
-    and a workflow for GitHub Actions. An existing README.md or .gitignore is kept; if another of the files exists,
-    nothing is written.
+    A robot file, its controllers, a task with expectations, JSON schemas for editors and a workflow for GitHub Actions.
+    With --robot, the arm, the hand, the tool frame, a start, missing limits and gains are guessed from the description,
+    each with its evidence as a comment, and a task is searched whose run passes. An existing README.md or .gitignore is
+    kept; if another of the files exists, nothing is written.
     """
-    files = _files(folder)
-    kept = [] if force else [path for name in MAY_BE_THERE if os.path.lexists(path := folder / name)]
-    there = [] if force else [str(path) for path in files if path not in kept and os.path.lexists(path)]
-    if there:
-        verb = "exists" if len(there) == 1 else "exist"
-        message = f"{listed(there)} already {verb}; nothing was written"
-        raise InvalidInput([Diagnostic("USE088", message, hint="name another folder, or add --force to replace them")])
-    wrong = sorted({conflict for path in files if path not in kept for conflict in _in_the_way(path)})
-    if wrong:
-        raise InvalidInput([Diagnostic("USE088", f"{listed(wrong)}; nothing was written", hint="name another folder")])
-    from manipcli.core.whole_file import write_whole
+    if robot is None:
+        for word, value in (("--arg", arg), ("--srdf", srdf), ("--controllers", controllers)):
+            if value:
+                raise InvalidInput([Diagnostic("USE089", f"{word} has no effect: {NO_ROBOT}", hint="add --robot FILE")])
+        write_files(folder, _common(folder) | _example() | _schemas() | _wheel(), force=force)
+        for note in notes(folder):
+            console.talk(f"note: {note}")
+        console.talk(f"next: {enter(folder)}manipcli test")
+        return ExitCode.PASSED
+    refuse_conflicts(folder, [*COMMON, "robot.yaml", "controllers.yaml", *SCHEMAS], force=force)
+    from manipcli.onboard.onboard import Request, onboard
 
-    for path, data in files.items():
-        if path in kept:
-            console.result(f"kept: {path}")
-            continue
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, data)
-        console.result(f"written: {path}")
-    for note in (*_unignored(folder / ".gitignore"), *_not_at_the_top(folder)):
+    request = Request(
+        robot,
+        folder,
+        xacro_arguments(arg or []),
+        package_path=tuple(package_path or ()),
+        allow_outside=allow_outside,
+        srdf=srdf,
+        controllers=controllers,
+    )
+    live = console.is_live()
+    made = onboard(request, on_progress=lambda what: console.redraw(what) if live else None)
+    if live:
+        console.redraw("")
+    own = {name: text.encode() for name, text in made.files.items()}
+    common = _common(folder, robot="robot.yaml", task=made.task_file)
+    write_files(folder, common | own | _schemas() | _wheel(), force=force)
+    console.result("")
+    for line in made.summary:
+        console.result(line)
+    for note in notes(folder):
         console.talk(f"note: {note}")
-    name = f"./{folder}" if str(folder).startswith("-") else str(folder)
-    enter = "" if Path(os.path.realpath(folder)) == Path.cwd() else f"cd {quote(name)} && "
-    console.talk(f"next: {enter}manipcli test")
-    return ExitCode.PASSED
+    options = " --allow-outside" * allow_outside
+    console.talk(f"next: {enter(folder)}manipcli run {made.task_file}{options}")
+    return ExitCode.PASSED if made.passed else ExitCode.FAILED
 
 
-def _unignored(file: Path) -> Iterator[str]:
-    """What is missing in a .gitignore that was kept."""
-    if not file.is_file():  # a link to nothing was kept
-        return
-    known = {line.strip().strip("/") for line in file.read_text("utf-8", "replace").splitlines()}
-    lacking = [f"`{name}/`" for name in RESULTS if name not in known]
-    if lacking:
-        yield f"{file} lacks {listed(lacking)}: add it, or git shows logs and reports as untracked files"
+def _common(folder: Path, *, robot: str = "robots/panda.yaml", task: str = "tasks/pick_place.yaml") -> dict[str, bytes]:
+    """README, .gitignore and workflow."""
+    name = (Path(os.path.realpath(folder)).name or "tasks").encode("utf-8", "replace")
+    found = _installation()
+    words = {
+        b"INSTALL": found.requirement.encode() if found is not None else b"manipcli",
+        b"CONTROLLERS": robot.replace("robot", "controllers", 1).encode(),
+        b"ROBOT": robot.encode(),
+        b"TASK": Path(task).stem.encode(),
+        b"PROJECT": name,
+    }
+    files = {}
+    for path, template in COMMON.items():
+        data = (TEMPLATES / template).read_bytes()
+        for word, value in words.items():
+            data = data.replace(word, value)
+        files[path] = data
+    return files
 
 
-def _not_at_the_top(folder: Path) -> Iterator[str]:
-    """A note where the project is not at the top of its repository: GitHub does not see its workflow."""
-    whole = Path(os.path.realpath(folder))
-    top = next((place for place in (whole, *whole.parents) if (place / ".git").exists()), whole)
-    if top != whole:
-        workflow = Path(".github", "workflows", "manipcli.yml")
-        yield (
-            f"GitHub runs workflows only from the top of a repository: move {folder / workflow} to {top / workflow}, "
-            f"add to its job `defaults: {{run: {{working-directory: {whole.relative_to(top)}}}}}`, "
-            "and prefix the paths of its artifact with that folder"
-        )
+@cache
+def _installation() -> Installation | None:
+    from manipcli.cli.own_wheel import installation
+
+    return installation()
 
 
-def _in_the_way(path: Path) -> Iterator[str]:
-    """Files and folders that prevent writing `path`."""
-    if path.is_dir():
-        yield f"'{path}' is a folder; expected a file"
-    for parent in path.parents:
-        if os.path.lexists(parent) and not parent.is_dir():
-            yield f"'{parent}' is a file; expected a folder"
+def _wheel() -> dict[str, bytes]:
+    """The wheel that the workflow installs, if it needs one."""
+    found = _installation()
+    return {} if found is None or found.wheel is None else dict([found.wheel])
 
 
-def _files(folder: Path) -> dict[Path, bytes]:
-    """Contents of every file of the project, by path."""
+def _example() -> dict[str, bytes]:
+    return {path: (TEMPLATES / template).read_bytes() for path, template in EXAMPLE.items()}
+
+
+def _schemas() -> dict[str, bytes]:
     from manipcli import pipeline
     from manipcli.report.json import dumps
 
-    name = (Path(os.path.realpath(folder)).name or "tasks").encode("utf-8", "replace")
-    files = {
-        folder / path: (TEMPLATES / template).read_bytes().replace(b"PROJECT", name) for path, template in FILES.items()
-    }
-    schemas = {
-        folder / "schemas" / f"{kind}.json": f"{dumps(pipeline.schema(kind))}\n".encode()
-        for kind in ("task", "robot", "controllers")
-    }
-    return files | schemas
+    return {path: f"{dumps(pipeline.schema(kind))}\n".encode() for path, kind in SCHEMAS.items()}

@@ -6,7 +6,16 @@ from typing import Annotated
 
 from pydantic import Field
 
-from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, unknown_body, untouchable
+from manipcli.conditions.condition import (
+    CheckContext,
+    Condition,
+    Monitor,
+    Problem,
+    World,
+    unknown_body,
+    unpinched,
+    untouchable,
+)
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.units import readable
@@ -44,7 +53,7 @@ def monitor(spec: GraspedSpec, world: World) -> Monitor:
 
 def check(spec: GraspedSpec, context: CheckContext) -> tuple[Problem, ...]:
     """An unknown or fixed body."""
-    return unknown_body(context.scene, spec.object, ("object",), movable=True)
+    return unknown_body(context.scene, spec.object, ("object",), movable=True) + unpinched(context, "grasped")
 
 
 GRASPED = Condition(

@@ -18,6 +18,7 @@ from manipcli.conditions.condition import (
     World,
     unknown_body,
     unmoving,
+    unpinched,
     untouchable,
 )
 from manipcli.conditions.robustness import Mask, Robustness, least, robustness
@@ -139,7 +140,7 @@ def monitor(spec: SlipSpec, world: World) -> Monitor:
 
 def check(spec: SlipSpec, context: CheckContext) -> tuple[Problem, ...]:
     """An unknown or fixed body, or an unknown link."""
-    problems = unknown_body(context.scene, spec.object, ("object",), movable=True)
+    problems = unknown_body(context.scene, spec.object, ("object",), movable=True) + unpinched(context, "slip")
     links = [link.name for link in context.robot.links]
     if spec.link is not None and spec.link not in links:
         message = f"'{spec.link}' is not a link of robot '{context.robot.name}'"

@@ -205,6 +205,15 @@ class CartesianImpedanceController:
         """(6) e of the last update, in world axes: from the tool to its reference [m, rad]."""
         return self._error.copy()
 
+    @property
+    def accepts_goals(self) -> bool:
+        """False while its manager has it inactive."""
+        return self._follower.accepts_goals
+
+    @accepts_goals.setter
+    def accepts_goals(self, active: bool) -> None:
+        self._follower.accepts_goals = active
+
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
     ) -> GoalHandle:

@@ -31,6 +31,7 @@ from manipcli.control.controller import BuildContext, ControllerMember, Controll
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
 from manipcli.control.stopping import StopPlanner
+from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
@@ -133,7 +134,18 @@ class ComputedTorqueController:
             wanted_acceleration=self._wanted,
         )
 
-    def send_goal(self, trajectory: JointTrajectory, *, constraints: ConstraintsSpec | None = None) -> GoalHandle:
+    @property
+    def accepts_goals(self) -> bool:
+        """False while its manager has it inactive."""
+        return self._follower.accepts_goals
+
+    @accepts_goals.setter
+    def accepts_goals(self, active: bool) -> None:
+        self._follower.accepts_goals = active
+
+    def send_goal(
+        self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
+    ) -> GoalHandle:
         """Accept a trajectory; see `JointTrajectoryController.send_goal`."""
         return self._follower.send_goal(trajectory, constraints=constraints)
 

@@ -44,7 +44,13 @@ class ForceTorqueBroadcasterSpec(ControllerSpec):
     """Claims no joint; measures the wrench of a link on its parent, in the log as `/NAME/wrench`."""
 
     type: Literal["force_torque_broadcaster"] = Field(description="`force_torque_broadcaster`.")
-    link: str = Field(description="Link whose wrench on its parent is measured, in this link's frame [N, N m].")
+    link: str | None = Field(
+        None,
+        description="Link whose wrench on its parent is measured, in this link's frame [N, N m]. Default: `frame_id`.",
+    )
+    frame_id: str | None = Field(
+        None, description="ROS's name of the frame; if it is not a link and there is no `link`, it measures nothing."
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,18 +115,25 @@ class ForceTorqueBroadcaster:
         return self.output
 
 
-def build(name: str, spec: ForceTorqueBroadcasterSpec, context: BuildContext) -> ForceTorqueBroadcaster:
-    """The controller of a spec."""
-    joint = next(joint.name for joint in context.robot.joints if joint.child == spec.link)
-    return ForceTorqueBroadcaster(name=name, link=spec.link, joint=joint)
+def build(name: str, spec: ForceTorqueBroadcasterSpec, context: BuildContext) -> ForceTorqueBroadcaster | None:
+    """The controller of a spec; None if its `frame_id` is only a label."""
+    link = spec.frame_id if spec.link is None else spec.link
+    joint = next((joint.name for joint in context.robot.joints if joint.child == link), None)
+    return None if link is None or joint is None else ForceTorqueBroadcaster(name=name, link=link, joint=joint)
 
 
 def check(spec: ForceTorqueBroadcasterSpec, robot: RobotModel) -> Iterator[Problem]:
-    """An unknown link, or the root; joints, which it does not have."""
+    """An unknown link, or the root; a `frame_id` that is only a label (a warning); joints, which it does not have."""
     if spec.joints:
         yield Problem(("joints",), "it reads no joints", "remove `joints`; `link` sets where it measures", "CTRL184")
     carried = [joint.child for joint in robot.joints]
-    if spec.link not in carried:
+    if spec.link is None and spec.frame_id is None:
+        yield Problem((), "it has no `link`", "add `link: ...`, the link at which it measures", "CTRL184")
+    elif spec.link is None and spec.frame_id not in carried:
+        message = f"frame_id '{spec.frame_id}' is not a link with a parent in robot '{robot.name}': left out"
+        near = did_you_mean(str(spec.frame_id), carried, kind="links")
+        yield Problem(("frame_id",), message, f"add `link: ...`; {near}", "CTRL184", "warning")
+    elif spec.link is not None and spec.link not in carried:
         root = spec.link == robot.root
         message = "is the root and has no parent" if root else f"is not in robot '{robot.name}'"
         hint = did_you_mean(spec.link, carried, kind="links")

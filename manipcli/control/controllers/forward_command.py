@@ -35,10 +35,10 @@ from manipcli.control.controller import (
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import ControllerSpec, Interface, Role
+from manipcli.spec.controllers import ChainableSpec, Interface, Role
 
 
-class ForwardCommandSpec(ControllerSpec):
+class ForwardCommandSpec(ChainableSpec):
     """Forwards the values of `set_command`; until then it holds: the measured position, zero velocity, zero effort."""
 
     type: Literal["forward_command"] = Field(description="`forward_command`.")
@@ -65,6 +65,7 @@ class ForwardCommandController:
         joints: (n) distinct names.
         interface: of the commands.
         feed_forward: added to efforts.
+        chained_to: the controller whose references it commands; None: it commands the joints.
 
     Raises:
         InvalidArgument: no or duplicate joints.
@@ -75,9 +76,15 @@ class ForwardCommandController:
     sensors = ()
 
     def __init__(
-        self, *, name: str, joints: Sequence[str], interface: Interface, feed_forward: FeedForward = "none"
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        interface: Interface,
+        feed_forward: FeedForward = "none",
+        chained_to: str | None = None,
     ) -> None:
-        self.name = name
+        self.name, self.chained_to = name, chained_to
         self.joints = distinct(name, joints)
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
@@ -144,7 +151,9 @@ def finite_values(name: str, joints: Sequence[str], values: npt.ArrayLike) -> Ar
 def build(name: str, spec: ForwardCommandSpec, context: BuildContext) -> ForwardCommandController:
     """The controller of a spec."""
     wants: FeedForward = "gravity" if spec.gravity_compensation else "none"
-    return ForwardCommandController(name=name, joints=spec.joints, interface=spec.command_interface, feed_forward=wants)
+    return ForwardCommandController(
+        name=name, joints=spec.joints, interface=spec.command_interface, feed_forward=wants, chained_to=spec.chained_to
+    )
 
 
 def check(spec: ForwardCommandSpec, robot: RobotModel) -> Iterator[Problem]:

@@ -35,7 +35,7 @@ from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.control.trajectory_goal import controlled_by_error, refused
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
-from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, GainsSpec, Interface, Role
+from manipcli.spec.controllers import ChainableSpec, ConstraintsSpec, GainsSpec, Interface, Role
 from manipcli.spec.quantity import Time
 
 __all__ = ["MEMBER", "JointTrajectoryController"]
@@ -55,7 +55,7 @@ class UpsamplingSpec(Model):
     enable: bool = Field(False, description="Follow the cubic spline through the positions. Default false.")
 
 
-class JointTrajectorySpec(ControllerSpec):
+class JointTrajectorySpec(ChainableSpec):
     """Follows joint trajectories: PID with feed-forward (effort, velocity), or forwards the reference (position)."""
 
     role: ClassVar[Role] = "follower"
@@ -124,6 +124,7 @@ def build(name: str, spec: JointTrajectorySpec, context: BuildContext) -> JointT
         limits=[joint.limits for joint in joints],
         types=[joint.type for joint in joints],
         feed_forward="inverse_dynamics" if spec.inverse_dynamics else wants,
+        chained_to=spec.chained_to,
         compat=context.compat,
         allow_partial_joints_goal=spec.allow_partial_joints_goal,
         allow_nonzero_velocity_at_trajectory_end=spec.allow_nonzero_velocity_at_trajectory_end,
@@ -165,6 +166,8 @@ def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
 
 def loop(spec: JointTrajectorySpec) -> ControlLoop:
     """A PID loop on efforts or on velocities; positions are followed by the engine's motors."""
+    if spec.chained_to is not None:
+        return NoLoop(f"it commands the references of '{spec.chained_to}'")
     if not controlled_by_error(spec.interfaces):
         return NoLoop(f"its interface is {', '.join(spec.interfaces)}, which needs no gains")
     tolerances = {

@@ -8,13 +8,14 @@
         reference_and_state_interfaces: [position, velocity]
         gains: {joint_6: {p: 80, i: 20, d: 3, i_clamp: 5}, joint_7: {p: 30, d: 0.4, feedforward_gain: 0.1}}
 
-Steps cannot use it; it is for Python programs:
+Steps cannot use it, unless a trajectory controller is `chained_to` it; it is for Python programs:
 
     manager["wrist_controller"].set_reference([0.3, -0.2])
 
 u = ff r + PID(r - x, d/dt). With one interface, r is its reference, and the PID computes the derivative of the error:
 (e - last e) / period, from 0 at first. With two, the error of the second interface is the derivative, and ff applies to
-the second reference: u = ff r' + PID(r - x, r' - x').
+the second reference: u = ff r' + PID(r - x, r' - x'). On the position interface u is a position, as in ROS 2; without
+a reference it is the measured one.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
 from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import ControllerSpec, GainsSpec, Interface, Role
+from manipcli.spec.controllers import ChainableSpec, GainsSpec, Interface, Role
 
 
 class PidGainsSpec(GainsSpec):
@@ -60,12 +61,14 @@ class PidGainsSpec(GainsSpec):
     save_i_term: bool = Field(True, description="Keep the integral term while it is not active. Default true.")
 
 
-class PidSpec(ControllerSpec):
+class PidSpec(ChainableSpec):
     """Controls each joint with its own PID; `set_reference` sets the references."""
 
     type: Literal["pid"] = Field(description="`pid`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    command_interface: Literal["velocity", "effort"] = Field("effort", description="What it commands. Default effort.")
+    command_interface: Literal["position", "velocity", "effort"] = Field(
+        "effort", description="What it commands. Default effort."
+    )
     reference_and_state_interfaces: Annotated[
         tuple[Literal["position", "velocity"], ...],
         Field(
@@ -87,6 +90,11 @@ class PidSpec(ControllerSpec):
         """What it commands of each of its joints."""
         return (self.command_interface,)
 
+    @property
+    def references(self) -> tuple[Interface, ...]:
+        """Its references, which another controller may command."""
+        return self.reference_and_state_interfaces
+
 
 class PidController:
     """ROS 2's `pid_controller/PidController`.
@@ -101,6 +109,7 @@ class PidController:
         hold_first: hold the state at activation until a reference is set; otherwise command 0 until then.
         feed_forward: added to efforts.
         compat: order of the PID integration.
+        chained_to: the controller whose references it commands; None: it commands the joints.
 
     Raises:
         InvalidArgument: no or duplicate joints; gains that are missing, invalid, zero or of other joints; other `led`.
@@ -122,8 +131,11 @@ class PidController:
         hold_first: bool = True,
         feed_forward: FeedForward = "none",
         compat: Compat | None = None,
+        chained_to: str | None = None,
     ) -> None:
-        self.name = name
+        self.name, self.chained_to = name, chained_to
+        self.references: tuple[Interface, ...] = tuple(led)
+        self._sources: list[tuple[Array, Array]] = []
         self.joints = distinct(name, joints)
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
@@ -175,10 +187,27 @@ class PidController:
         if rates is not None and not self._given_rates:
             message = f"controller '{self.name}' does not control a second interface"
             raise InvalidArgument("CTRL182", message, hint="set reference_and_state_interfaces: [position, velocity]")
+        if self._sources:
+            message = f"controller '{self.name}': another controller commands its references"
+            raise InvalidArgument("CTRL182", message, hint="deactivate that one, or send it a goal")
         reference = finite_values(self.name, self.joints, values)
         self._rate = np.zeros(len(self.joints)) if rates is None else finite_values(self.name, self.joints, rates)
         self._reference = reference
         self._has_reference = True
+
+    def chain(self, sources: Mapping[Interface, Array] | None, order: npt.ArrayLike = ()) -> None:
+        """Follow these live arrays (n) from the next update on, by interface; None: hold the last reference.
+
+        Args:
+            sources: commands of the preceding controller.
+            order: (n) index of each joint in them.
+        """
+        self._order = np.array(order, dtype=np.intp)
+        self._sources = []
+        if sources is not None:
+            self._reference, self._rate = np.array(self._reference), np.zeros(len(self.joints))
+            targets = dict(zip(self.references, (self._reference, self._rate), strict=False))
+            self._sources = [(targets[interface], source) for interface, source in sources.items()]
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Clear its reference, and the integral unless that is saved."""
@@ -195,12 +224,18 @@ class PidController:
             self._pid.reset(keep_integral=bool(self._saves.all()))
             self._before[:] = 0.0
             self._has_before = self._first_rate
+            if self._sources:
+                self._has_reference = True
             if not self._has_reference and self._hold_first:
                 self._has_reference = True
                 self._reference, self._rate = np.array(state), np.zeros(len(self.joints))
+        for target, source in self._sources:
+            target[:] = source[self._order]
         if not self._has_reference:
             output.rows[:] = 0.0
             output.position[:] = measured.position
+            if self.interfaces == ("position",):
+                output.command[:] = measured.position
             return output
         error = np.subtract(self._reference, state, out=self._error)
         if self._has_wraps:
@@ -241,6 +276,7 @@ def build(name: str, spec: PidSpec, context: BuildContext) -> PidController:
         hold_first=spec.set_current_state_as_first_setpoint,
         feed_forward="gravity" if spec.gravity_compensation else "none",
         compat=context.compat,
+        chained_to=spec.chained_to,
     )
 
 
@@ -264,6 +300,12 @@ def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
         message = f"{list(spec.reference_and_state_interfaces)} cannot be controlled together"
         hint = "use [position], [position, velocity] or [velocity]"
         yield Problem(("reference_and_state_interfaces",), message, hint, "CTRL182")
+    small = [joint for joint in spec.joints if (own := spec.gains.get(joint)) is not None and not own.feedforward_gain]
+    if spec.command_interface == "position" and spec.reference_and_state_interfaces == ("position",) and small:
+        message = f"joint '{small[0]}' has no feedforward_gain: its position command is p times its error, near 0"
+        yield Problem(
+            ("gains", small[0]), message, "for reference + PID, use feedforward_gain: 1", "CTRL182", "warning"
+        )
     if spec.gravity_compensation and spec.command_interface != "effort":
         message = f"gravity_compensation needs the effort interface, not {spec.command_interface}"
         yield Problem(

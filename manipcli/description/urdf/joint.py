@@ -27,6 +27,8 @@ _TYPES: dict[str, JointType] = {
 }
 _HELD = frozenset({"floating", "planar"})
 """Types with several degrees of freedom, which are treated as fixed."""
+UNSTATED: Final = "URDF036"
+"""Code of a limit that is 0 or missing, read as not stated."""
 UNBOUNDED: Final = sys.float_info.max
 """Written as the limit of an unlimited joint where URDF requires one."""
 
@@ -120,6 +122,10 @@ def _with_soft(reader: Reader, element: Element, name: str, kind: JointType) -> 
     lower, upper = (reader.number(safety, f"soft_{side}_limit", 0.0) or 0.0 for side in ("lower", "upper"))
     k_position, k_velocity = (_not_negative(reader, safety, key, name) or 0.0 for key in ("k_position", "k_velocity"))
     positions = k_position > 0.0 and lower < upper and kind != "continuous"
+    if not positions and lower < upper and kind != "continuous":
+        message = f"joint '{name}': the soft limits {lower:g} to {upper:g} have no effect without k_position"
+        hint = "add k_position, a velocity per distance [1/s]; 20 is a usual value"
+        reader.report("URDF086", message, safety.place, hint=hint, severity="warning")
     if not positions and k_velocity == 0.0:
         return limits
     soft = SoftLimits(
@@ -144,7 +150,7 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
         if kind != "continuous" and side not in limit.attributes and other in limit.attributes:
             message = f"joint '{name}': {side} limit is missing; 0 is used"
             hint = f'write {side}="0" if this is intended'
-            reader.report("URDF036", message, limit.place, hint=hint, severity="note")
+            reader.report(UNSTATED, message, limit.place, hint=hint, severity="note")
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
     if kind == "continuous" or lower is None or upper is None or (lower == -UNBOUNDED and upper == UNBOUNDED):
         return JointLimits(velocity=velocity, effort=effort)
@@ -167,7 +173,7 @@ def _stated(reader: Reader, limit: Element, attribute: str, joint: str) -> float
         how = "is 0" if value == 0.0 else "is missing"
         message = f"joint '{joint}': {attribute} limit {how}; it is read as not stated"
         hint = f"add it to the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
-        reader.report("URDF036", message, limit.place, hint=hint, severity="warning")
+        reader.report(UNSTATED, message, limit.place, hint=hint, severity="warning")
     return None
 
 
@@ -195,6 +201,11 @@ def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -
 def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
     name = element.name or "(without a name)"
     kind = element.first("type") or element.first("plugin")
+    if kind is None and element.attributes.get("type"):
+        message = f"transmission '{name}' has its type as an attribute, as before ros_control: ignored"
+        hint = f"write <type>transmission_interface/{element.attributes['type'].rpartition('/')[2]}</type> inside"
+        reader.report("URDF015", message, element.place, hint=hint, severity="warning")
+        return None
     if kind is None or not kind.text:
         message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"
         reader.report("URDF015", message, element.place)

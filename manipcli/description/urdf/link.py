@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.description.elements import Inertial, Link
+from manipcli.description.elements import Inertial, Link, UnusableInertial
 from manipcli.description.located_xml import Element
 from manipcli.description.packages import Absent, NotFound, Outside, Packages, RemoteFile
 from manipcli.description.urdf.numbers import FARTHEST, LARGEST, Reader
@@ -19,6 +19,13 @@ from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shap
 
 TRIANGLE_TOLERANCE = 1e-2
 """Relative excess of a principal moment over the sum of the others that is accepted: files have 2-3 digits."""
+ROUNDING = 1e-6
+"""Relative error of a principal moment that is only rounding: such an inertia is made regular, not refused."""
+IMPOSSIBLE: Final = "URDF011"
+REGULARISED: Final = "URDF038"
+MISSING_VISUAL: Final = "URDF033"
+UNUSABLE_MESH: Final = ("URDF013", "URDF200", "URDF210")
+"""Codes of errors about a collision mesh: missing, unusable, flat."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")
 _ELSEWHERE = frozenset({"capsule", "plane", "cone", "ellipsoid", "polyline", "heightmap", "sdf"})
 """Shapes of other formats and of URDF extensions."""
@@ -30,12 +37,20 @@ WITHOUT_IT: Final = (
 
 def read_link(reader: Reader, element: Element, name: str, packages: Packages, materials: Mapping[str, Rgba]) -> Link:
     """The link of a <link> element; invalid parts are omitted, with a finding."""
+    inertial = _inertial(reader, element, name)
+    unusable = inertial if isinstance(inertial, UnusableInertial) else None
+    visuals = tuple(_geometries(reader, element, "visual", packages, materials))
+    before = len(reader.findings)
+    collisions = tuple(_geometries(reader, element, "collision", packages, materials))
+    missing = tuple(finding for finding in reader.findings[before:] if finding.code in UNUSABLE_MESH)
     return Link(
         name=name,
-        inertial=_inertial(reader, element, name),
-        visuals=tuple(_geometries(reader, element, "visual", packages, materials)),
-        collisions=tuple(_geometries(reader, element, "collision", packages, materials)),
+        inertial=inertial if isinstance(inertial, Inertial) else None,
+        visuals=visuals,
+        collisions=collisions,
         place=element.place,
+        unusable=unusable,
+        missing=missing,
     )
 
 
@@ -54,36 +69,45 @@ def read_materials(reader: Reader, root: Element) -> dict[str, Rgba]:
     return found
 
 
-def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
+def _inertial(reader: Reader, link: Element, name: str) -> Inertial | UnusableInertial | None:
+    """The inertial of a link; None if it has none, or mass 0."""
     element = link.first("inertial")
     if element is None:
         return None
+    before = len(reader.findings)
+
+    def refused(mass: float | None = None, X_LI: Transform | None = None) -> UnusableInertial | None:
+        found = tuple(finding for finding in reader.findings[before:] if finding.severity == "error")
+        physical = all(finding.code == IMPOSSIBLE for finding in found)
+        return UnusableInertial(found, mass, X_LI) if physical else None
+
     mass_element, moments = element.first("mass"), element.first("inertia")
     if mass_element is None:
-        reader.report("URDF011", f"link '{name}': <inertial> has no <mass>", element.place)
-        return None
+        reader.report(IMPOSSIBLE, f"link '{name}': <inertial> has no <mass>", element.place)
+        return refused()
     X_LI = reader.origin(element)
     mass = reader.required(mass_element, "value", most=LARGEST)
     if mass is None:
         return None
     if mass < 0.0:
-        reader.report("URDF011", f"link '{name}' has mass {mass:g} kg; expected a positive number", mass_element.place)
-        return None
+        message = f"link '{name}' has mass {mass:g} kg; expected a positive number"
+        reader.report(IMPOSSIBLE, message, mass_element.place)
+        return refused()
     if mass == 0.0:
         message = f"link '{name}' has mass 0: its inertial is ignored"
         reader.report("URDF031", message, mass_element.place, severity="note")
         return None
     if moments is None:
-        reader.report("URDF011", f"link '{name}': <inertial> has no <inertia>", element.place)
-        return None
+        reader.report(IMPOSSIBLE, f"link '{name}': <inertial> has no <inertia>", element.place)
+        return refused(mass, X_LI)
     xx, yy, zz = (reader.required(moments, key, most=LARGEST) for key in ("ixx", "iyy", "izz"))
     xy, xz, yz = (_product(reader, moments, key) for key in ("ixy", "ixz", "iyz"))
     if xx is None or yy is None or zz is None:
         return None
-    I = frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # noqa: E741  (the inertia matrix)
-    if not _plausible(reader, I, name, moments):
-        return None
-    return Inertial(mass=mass, X_LI=X_LI, inertia=I)
+    inertia = _plausible(reader, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), name, moments)
+    if inertia is None:
+        return refused(mass, X_LI)
+    return Inertial(mass=mass, X_LI=X_LI, inertia=frozen(inertia))
 
 
 def _product(reader: Reader, moments: Element, key: str) -> float:
@@ -94,22 +118,32 @@ def _product(reader: Reader, moments: Element, key: str) -> float:
     return reader.number(moments, key, 0.0) or 0.0
 
 
-def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741  (the inertia matrix)
-    if not I.any():
-        return True  # a point mass: `read_parts` rejects it on a moving joint
-    principal = np.linalg.eigvalsh(I)
+def _plausible(reader: Reader, inertia: Array, name: str, element: Element) -> Array | None:
+    """The inertia (3, 3), made regular if it is singular only by rounding; None with a finding if it is impossible."""
+    if not inertia.any():
+        return inertia  # a point mass: `read_parts` rejects it on a moving joint
+    principal, R = np.linalg.eigh(inertia)
     shown = ", ".join(f"{value:.4g}" for value in principal)
-    if principal[0] <= 0.0:
+    largest = float(principal[2])
+    if principal[0] < -ROUNDING * largest or largest <= 0.0:
         message = f"link '{name}': inertia is not positive definite (principal moments {shown} kg m2)"
-        reader.report("URDF011", message, element.place, hint="compute it from the shape and the mass of the link")
-        return False
-    if principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE_TOLERANCE):
+        reader.report(IMPOSSIBLE, message, element.place, hint="compute it from the shape and the mass of the link")
+        return None
+    if largest > (principal[0] + principal[1]) * (1.0 + TRIANGLE_TOLERANCE) + ROUNDING * largest:
         message = (
             f"link '{name}': impossible principal moments {shown} kg m2: the largest exceeds the sum of the others"
         )
-        reader.report("URDF011", message, element.place, hint="compute it from the shape and the mass of the link")
-        return False
-    return True
+        reader.report(IMPOSSIBLE, message, element.place, hint="compute it from the shape and the mass of the link")
+        return None
+    least = ROUNDING * largest
+    if principal[0] >= least * (1.0 - 1e-9):
+        return inertia
+    # The least moment of a thin rod is rounded to 0; as little as rounding is added.
+    message = f"link '{name}': inertia is singular by rounding (principal moments {shown} kg m2)"
+    reader.report(
+        REGULARISED, f"{message}; {least:.2g} kg m2 is used for the least one", element.place, severity="note"
+    )
+    return np.asarray(R @ np.diag(np.maximum(principal, least)) @ R.T)
 
 
 def _geometries(
@@ -198,7 +232,7 @@ def _mesh(reader: Reader, element: Element, tag: str, packages: Packages) -> Mes
             reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=hint)
         else:
             message = f"visual mesh, ignored: {error.message}"
-            reader.report("URDF033", message, element.place, hint=error.hint, severity="warning")
+            reader.report(MISSING_VISUAL, message, element.place, hint=error.hint, severity="warning")
         return None
     if tag == "collision" and packages.reads and not _usable_mesh(reader, element, uri, packages):
         return None
@@ -212,8 +246,8 @@ def _usable_mesh(reader: Reader, element: Element, uri: str, packages: Packages)
         reader.report("URDF200", f"collision mesh '{uri}' {error.reason}", element.place, hint=error.hint)
         return False
     if facts.flat:
-        message = f"collision mesh '{uri}' is flat: its convex hull has no volume"
-        reader.report("URDF210", message, element.place, hint="use a thin <box>")
+        message = f"collision mesh '{uri}' is flat, ignored: its convex hull has no volume"
+        reader.report("URDF210", message, element.place, hint="use a thin <box>", severity="warning")
     return not facts.flat
 
 

@@ -15,7 +15,7 @@ def resolve_mimics(reader: Reader, joints: Mapping[str, Joint], elements: Mappin
     """The joints, each mimic following an independent joint: q = m1 (m2 q' + o2) + o1 = (m1 m2) q' + (m1 o2 + o1).
 
     Args:
-        reader: receives the findings: target unknown, fixed or the joint itself, multiplier 0, a circle.
+        reader: receives the findings: target unknown, fixed or the joint itself, multiplier 0, a circle, a chain.
         joints: the joints that could be read.
         elements: <joint> of every joint in the description.
     """
@@ -38,8 +38,22 @@ def resolve_mimics(reader: Reader, joints: Mapping[str, Joint], elements: Mappin
             resolved |= dict.fromkeys(circle)
         for name, mimic in reversed(path.items()):
             if name not in resolved:
-                resolved[name] = _followed(mimic, resolved[mimic.joint])
+                inner = resolved[mimic.joint]
+                resolved[name] = found = _followed(mimic, inner)
+                if inner is not None:
+                    message = (
+                        f"joint '{name}' mimics '{mimic.joint}', which mimics '{direct_target(direct, mimic.joint)}': "
+                        f"it follows '{found.joint}' with multiplier {found.multiplier:g} and offset {found.offset:g}"
+                    )
+                    hint = "write that: other programs follow only one step, or refuse it"
+                    reader.report("URDF085", message, _place(elements, name), hint=hint, severity="note")
     return {name: dataclasses.replace(joint, mimic=resolved[name]) for name, joint in joints.items()}
+
+
+def direct_target(direct: Mapping[str, Mimic | None], joint: str) -> str:
+    """The joint that this one mimics itself."""
+    mimic = direct[joint]
+    return "" if mimic is None else mimic.joint
 
 
 def _direct(reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements: Mapping[str, Element]) -> Mimic | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection
 from typing import Final
 
@@ -15,6 +16,8 @@ MOST_HINTS: Final = 50
 MOST_NAMES: Final = 2000
 """Most searches for a similar name, and most candidates: a bound on the time for a file full of errors."""
 
+LONGEST_NAME: Final = 200
+"""Characters of a name."""
 FARTHEST: Final = 1e6
 """[m, rad]: largest position, size or angle; beyond it engines in single precision fail."""
 LARGEST: Final = 1e9
@@ -28,6 +31,14 @@ def finite(word: str) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) and word.isascii() and "_" not in word else None
+
+
+_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
+
+
+def _dotted(word: str) -> str | None:
+    """The hint for a number with a decimal comma."""
+    return f"use a dot: {word.strip().replace(',', '.')}" if _COMMA.fullmatch(word) else None
 
 
 class Reader:
@@ -62,7 +73,11 @@ class Reader:
             how = "an empty" if attribute in element.attributes else "no"
             self.report("URDF003", f"<{element.tag}> has {how} attribute '{attribute}'", element.place)
             return None
-        if not value.isprintable() or len(value) > 200:
+        if len(value) > LONGEST_NAME:
+            message = f"<{element.tag}>: the name '{shorten(value)}' has {len(value)} characters"
+            self.report("URDF003", message, element.place, hint=f"at most {LONGEST_NAME} are allowed")
+            return None
+        if not value.isprintable():
             self.report("URDF003", f"<{element.tag}>: invalid name {value[:40]!r}", element.place)
             return None
         return value
@@ -80,7 +95,7 @@ class Reader:
         wrong = next((word for word in words if finite(word) is None), None)
         if wrong is not None:
             message = f"{written}: '{shorten(wrong)}' is not a finite number; expected {expected}"
-            self.report("URDF004", message, element.place)
+            self.report("URDF004", message, element.place, hint=_dotted(wrong))
             return None
         if len(words) != count:
             self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)
@@ -114,7 +129,7 @@ class Reader:
         value = finite(element.text)
         if value is None:
             message = f"<{element.tag}>{shorten(element.text)}</{element.tag}>: expected a finite number"
-            self.report("URDF004", message, element.place)
+            self.report("URDF004", message, element.place, hint=_dotted(element.text))
             return default
         return value
 

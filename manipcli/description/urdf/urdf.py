@@ -6,16 +6,17 @@ numbers, axes, limits, masses and inertias, shapes, meshes.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.errors import Diagnostic, Place
-from manipcli.description.elements import Joint, Link, TransmissionTag
+from manipcli.description.elements import Joint, Link, TransmissionTag, UnusableInertial
 from manipcli.description.expanded import Description
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.control_limits import with_control_limits
 from manipcli.description.urdf.joint import read_joint, read_transmissions
-from manipcli.description.urdf.link import read_link, read_materials
+from manipcli.description.urdf.link import IMPOSSIBLE, read_link, read_materials
 from manipcli.description.urdf.mimic import resolve_mimics
 from manipcli.description.urdf.numbers import Reader
 from manipcli.description.urdf.topology import check_tree, depth_first
@@ -65,7 +66,7 @@ def read_parts(description: Description) -> Parts:
     top = check_tree(reader, links_by_name, joints, joints_by_name, complete=complete) if links else ""
     known = with_control_limits(root, resolve_mimics(reader, known, joints_by_name))
     transmissions = read_transmissions(reader, root, joints_by_name)
-    _check_point_masses(reader, links, known, places)
+    links |= _point_masses(reader, links, known, places)
     ordered = depth_first(top, known) if top else tuple(known.values())
     order = [top, *(joint.child for joint in ordered)] if top else list(links)
     return Parts(
@@ -78,10 +79,14 @@ def read_parts(description: Description) -> Parts:
     )
 
 
-def _check_point_masses(
+def _point_masses(
     reader: Reader, links: Mapping[str, Link], joints: Mapping[str, Joint], places: Mapping[tuple[str, str], Place]
-) -> None:
-    """Reports links with mass and without moments of inertia: an error below a moving joint, else a warning."""
+) -> dict[str, Link]:
+    """Links with mass and without moments of inertia: an error below a moving joint, else a warning.
+
+    Returns those that no engine can use, marked as such.
+    """
+    unusable = {}
     moved = {joint.child for joint in joints.values() if joint.moves}
     for name, link in links.items():
         if link.inertial is None or link.inertial.inertia.any():
@@ -89,9 +94,12 @@ def _check_point_masses(
         message = f"link '{name}' has mass but no moments of inertia"
         hint = "compute them from the shape and the mass of the link"
         if name in moved:
-            reader.report("URDF011", message, places.get(("link", name)), hint=hint)
+            reader.report(IMPOSSIBLE, message, places.get(("link", name)), hint=hint)
+            known = UnusableInertial((reader.findings[-1],), link.inertial.mass, link.inertial.X_LI)
+            unusable[name] = dataclasses.replace(link, inertial=None, unusable=known)
         else:
             reader.report("URDF037", f"{message}: a point mass", places.get(("link", name)), severity="warning")
+    return unusable
 
 
 def _named(reader: Reader, root: Element, tag: str, places: dict[tuple[str, str], Place]) -> dict[str, Element]:

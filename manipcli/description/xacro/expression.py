@@ -15,7 +15,17 @@ from typing import Final, cast
 
 from manipcli.core.text import did_you_mean
 from manipcli.description.bounds import bounds
-from manipcli.description.xacro.values import Beyond, Clock, Held, Refused, Value, bounded, size_of, too_large
+from manipcli.description.xacro.values import (
+    Beyond,
+    Clock,
+    Held,
+    Refused,
+    Value,
+    bounded,
+    instance_of,
+    size_of,
+    too_large,
+)
 
 MAX_EXPRESSION: Final = 10_000
 MAX_EXPONENT: Final = 64
@@ -242,7 +252,7 @@ class Evaluator:
         positional = self._each(node.args, names)
         given = self._each([keyword.value for keyword in node.keywords], names)
         named = {str(keyword.arg): value for keyword, value in zip(node.keywords, given, strict=True)}
-        if function is not isinstance:  # callbacks that are called repeatedly (map, the key of sorted) are watched
+        if function is not instance_of:  # callbacks that are called repeatedly (map, the key of sorted) are watched
             positional = [self._watched(value) if callable(value) else value for value in positional]
             named = {name: self._watched(value) if callable(value) else value for name, value in named.items()}
         return self._watched(function)(*positional, **named)

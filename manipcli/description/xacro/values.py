@@ -100,6 +100,17 @@ def math_symbols() -> dict[str, Value]:
     return {name: value for name, value in vars(math).items() if not name.startswith("_") and name not in costly}
 
 
+_TYPES: Final[dict[str, type]] = {kind.__name__: kind for kind in (bool, dict, float, int, list, set, str, tuple)}
+
+
+def instance_of(value: Value, kinds: Value) -> bool:
+    """`isinstance`, with the types of expressions, of which `list` and `str` are functions with a bound."""
+    types = [_TYPES.get(getattr(kind, "__name__", "")) for kind in (kinds if isinstance(kinds, tuple) else (kinds,))]
+    if None in types:
+        raise TypeError(f"isinstance: expected one or several of {', '.join(_TYPES)}")
+    return isinstance(value, tuple(kind for kind in types if kind is not None))
+
+
 def python_symbols() -> dict[str, Value]:
     """The built-in functions that expressions may call."""
 
@@ -134,10 +145,11 @@ def python_symbols() -> dict[str, Value]:
 
         return call
 
-    kept = (float, int, bool, len, min, max, round, abs, all, any, divmod, isinstance, ord, dict, tuple, set)
+    kept = (float, int, bool, len, min, max, round, abs, all, any, divmod, ord, dict, tuple, set)
     symbols: dict[str, Value] = {function.__name__: function for function in kept}
     own: dict[str, Callable[..., Value]] = {function.__name__: listed(function) for function in _LISTED}
     own |= {"range": bounded_range, "str": text, "map": apply, "sorted": in_order, "sum": total}
+    own["isinstance"] = instance_of
     for name, function in own.items():
         function.__name__ = function.__qualname__ = name  # shown in Python's messages
     return symbols | own | {"True": True, "False": False, "None": None}

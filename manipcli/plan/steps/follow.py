@@ -1,4 +1,4 @@
-"""`follow`: follow a JointTrajectory in the form of a ROS message.
+"""`follow`: follow a JointTrajectory, or a FollowJointTrajectory goal, in the form of a ROS message.
 
 - follow:
     joint_names: [joint_1, joint_2]
@@ -9,18 +9,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem
-from manipcli.core.errors import NotPlannable
+from manipcli.core.errors import Loc, NotPlannable
+from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unfollowed
 from manipcli.plan.limit_check import verify_written
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.motion import GoalTolerances, JointTolerance, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.planner import Planner
@@ -29,54 +31,15 @@ from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, Trajectory
 from manipcli.plan.unknown_names import unknown_joint
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
-from manipcli.spec.quantity import JointAcceleration, JointValue, JointVelocity, Time
+from manipcli.spec.quantity import Time
+from manipcli.spec.trajectory_message import DurationSpec, PointSpec, ToleranceSpec, TrajectorySpec, check_sizes
 
 HERE = 1e-3
 """[rad or m] A first point at 0 s that is nearer to the robot's position counts as equal: messages are rounded."""
 
 
-class DurationSpec(Model):
-    """A duration with the fields of ROS 1 (`secs`, `nsecs`) or ROS 2 (`sec`, `nanosec`)."""
-
-    secs: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 1.")] = 0
-    nsecs: Annotated[int, Field(ge=0, lt=1_000_000_000, description="Nanoseconds beside them, in ROS 1.")] = 0
-    sec: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 2.")] = 0
-    nanosec: Annotated[int, Field(ge=0, lt=1_000_000_000, description="Nanoseconds beside them, in ROS 2.")] = 0
-
-    @model_validator(mode="after")
-    def _one_spelling(self) -> DurationSpec:
-        first, second = self.model_fields_set & {"secs", "nsecs"}, self.model_fields_set & {"sec", "nanosec"}
-        if any(getattr(self, word) for word in first) and any(getattr(self, word) for word in second):
-            word = min(second)
-            message = f"'{min(first)}' is a field of ROS 1, '{word}' a field of ROS 2; use those of one of them"
-            raise problem("conflict", message, at=(word,), key=True)
-        return self
-
-    @property
-    def seconds(self) -> float:
-        return self.secs + self.sec + 1e-9 * (self.nsecs + self.nanosec)
-
-
-class PointSpec(Model):
-    """One point; the curve between two points is linear, cubic or quintic, by what both give."""
-
-    positions: tuple[JointValue, ...] = Field(description="One for each joint, in the order of `joint_names`.")
-    velocities: tuple[JointVelocity, ...] = Field((), description="One for each joint, or none.")
-    accelerations: tuple[JointAcceleration, ...] = Field((), description="One for each joint, or none.")
-    effort: tuple[()] = Field((), description="Must be empty.")
-    time_from_start: Time | DurationSpec = Field(
-        description="From the start of the trajectory, later than the point before."
-    )
-
-    @property
-    def seconds(self) -> float:
-        """`time_from_start` [s]."""
-        t = self.time_from_start
-        return t.seconds if isinstance(t, DurationSpec) else t
-
-
 class FollowSpec(Model):
-    """Follow a trajectory_msgs/JointTrajectory, in the form of the ROS message.
+    """Follow a trajectory_msgs/JointTrajectory, or a goal of FollowJointTrajectory, in the form of the ROS message.
 
     Between two points the curve is linear, cubic or quintic, by what both give. The robot moves to the first point from
     its position, at rest; continuous joints take the shortest rotation. Position and velocity limits apply to every
@@ -86,43 +49,63 @@ class FollowSpec(Model):
     """
 
     header: dict[str, Any] = Field({}, description="Ignored, so that a message can be pasted.")
-    joint_names: tuple[str, ...] = Field(min_length=1, description="The joints that move.")
-    points: tuple[PointSpec, ...] = Field(min_length=1, description="In the order of their times; the last at rest.")
+    joint_names: tuple[str, ...] = Field((), description="The joints that move.")
+    points: tuple[PointSpec, ...] = Field((), description="In the order of their times; the last at rest.")
     retime: bool = Field(
         False,
         description="Whether only the positions count: a smooth curve through them is timed as fast as the limits of "
         "velocity, acceleration, jerk and effort allow. Default false.",
     )
+    trajectory: TrajectorySpec | None = Field(
+        None, description="Instead of `joint_names` and `points`: those of a FollowJointTrajectory goal."
+    )
+    path_tolerance: tuple[ToleranceSpec, ...] | None = Field(
+        None, description="Tolerances by joint on the way. Default: the controller's."
+    )
+    goal_tolerance: tuple[ToleranceSpec, ...] | None = Field(
+        None, description="Tolerances by joint at the end. Default: the controller's."
+    )
+    goal_time_tolerance: Time | DurationSpec | None = Field(
+        None, description="Extra time to reach the goal; -1: unlimited. Default, or 0: the controller's."
+    )
+
+    multi_dof_trajectory: dict[str, Any] | None = Field(None, description="Must have no points.")
+    component_path_tolerance: tuple[()] | None = Field(None, description="Must be empty.")
+    component_goal_tolerance: tuple[()] | None = Field(None, description="Must be empty.")
 
     @model_validator(mode="after")
-    def _sizes(self) -> FollowSpec:
-        n, before, last = len(self.joint_names), -1.0, len(self.points) - 1
-        for k, name in enumerate(self.joint_names):
-            if name in self.joint_names[:k]:
-                raise problem("duplicate", f"duplicate joint '{name}'", at=("joint_names", k))
-        for k, point in enumerate(self.points):
-            for word in ("positions", "velocities", "accelerations"):
-                values = getattr(point, word)
-                if len(values) != n and (values or word == "positions"):
-                    raise problem("count", f"{len(values)} {word} for {n} joints", at=("points", k, word))
-            if point.accelerations and not point.velocities:
-                message = "accelerations need velocities; add velocities"
-                raise problem("conflict", message, at=("points", k, "accelerations"))
-            at = ("points", k, "time_from_start")
-            if point.seconds < 0.0:
-                raise problem("range", f"must be 0 or more, not {point.seconds:g} s", at=at)
-            if point.seconds <= before:
-                message = f"{point.seconds:g} s is not after {before:g} s, the time of the previous point"
-                raise problem("conflict", message, at=at)
-            before = point.seconds
-        if before <= 0.0:
-            message = "the last point is at 0 s: the trajectory has no duration"
-            raise problem("conflict", message, at=("points", last, "time_from_start"))
-        for k, v in enumerate(self.points[-1].velocities):
-            if v != 0.0:
-                message = f"the last point must be at rest; its velocity of {self.joint_names[k]} is not 0"
-                raise problem("conflict", message, at=("points", last, "velocities", k))
+    def _one_form(self) -> FollowSpec:
+        if self.trajectory is None:
+            if not self.joint_names:
+                raise problem("conflict", "the key 'joint_names' is missing", hint="or `trajectory`, of a ROS goal")
+            check_sizes(self.joint_names, self.points)
+        elif self.joint_names or self.points:
+            key = "joint_names" if self.joint_names else "points"
+            message = f"'{key}' is given next to 'trajectory', which has its own"
+            raise problem("conflict", message, at=(key,), key=True)
+        if (self.multi_dof_trajectory or {}).get("points"):
+            raise problem("conflict", "poses of several axes are not supported", at=("multi_dof_trajectory",), key=True)
         return self
+
+    @property
+    def message(self) -> tuple[tuple[str, ...], tuple[PointSpec, ...], Loc]:
+        """The joints and points of either form, and where they are."""
+        if self.trajectory is None:
+            return self.joint_names, self.points, ()
+        return self.trajectory.joint_names, self.trajectory.points, ("trajectory",)
+
+    @property
+    def tolerances(self) -> GoalTolerances | None:
+        """The tolerances of the goal; None if it has none."""
+        time = self.goal_time_tolerance
+        seconds = time.seconds if isinstance(time, DurationSpec) else time or 0.0
+        if not (self.path_tolerance or self.goal_tolerance or seconds):
+            return None
+        return GoalTolerances(_joints(self.path_tolerance or ()), _joints(self.goal_tolerance or ()), seconds)
+
+
+def _joints(tolerances: Sequence[ToleranceSpec]) -> tuple[JointTolerance, ...]:
+    return tuple(JointTolerance(own.name, own.position, own.velocity, own.acceleration) for own in tolerances)
 
 
 def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
@@ -132,23 +115,23 @@ def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
         NotPlannable: a limit is exceeded (names joint, value, limit and time), a body is in the way, or a first point
             at 0 s is not the robot's position.
     """
-    names = spec.joint_names
+    names, given, at = spec.message
     start = state.position[planner.robot.indices(names)]
-    for k, point in enumerate(spec.points):
-        written = [(names[i], value, ("points", k, "positions", i)) for i, value in enumerate(point.positions)]
+    for k, point in enumerate(given):
+        written = [(names[i], value, (*at, "points", k, "positions", i)) for i, value in enumerate(point.positions)]
         verify_written(planner.robot, written, when=f" at t = {point.seconds:.3f} s")
-    first = np.array(spec.points[0].positions)
+    first = np.array(given[0].positions)
     endless = [planner.robot.joint(name).type == "continuous" for name in names]
     turns = np.where(endless, math.tau * np.round((first - start) / math.tau), 0.0)
     first = first - turns
     points = [
         TrajectoryPoint(np.array(point.positions) - turns, point.seconds, point.velocities, point.accelerations)
-        for point in spec.points
+        for point in given
     ]
     builder = MotionBuilder(planner, state, verb="follow")
     if spec.retime:
         builder.through("follow", names, np.vstack([start, *(np.asarray(point.positions) for point in points)]))
-        return builder.plan()
+        return _with_tolerances(builder.plan(), spec.tolerances)
     if points[0].time_from_start <= 0.0:
         off = np.abs(first - start)
         worst = int(np.argmax(off))
@@ -162,7 +145,12 @@ def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
         points[0] = replace(points[0], positions=start)
     trajectory = JointTrajectory(names, points, TrajectoryPoint(start))
     builder.follow("follow", trajectory, limits=_limits(planner.robot, trajectory))
-    return builder.plan()
+    return _with_tolerances(builder.plan(), spec.tolerances)
+
+
+def _with_tolerances(made: StepPlan, tolerances: GoalTolerances | None) -> StepPlan:
+    """The plan with these tolerances of its goals."""
+    return replace(made, motions=tuple(replace(motion, tolerances=tolerances) for motion in made.motions))
 
 
 def _limits(robot: RobotModel, trajectory: JointTrajectory) -> MotionLimits:
@@ -177,15 +165,21 @@ def _limits(robot: RobotModel, trajectory: JointTrajectory) -> MotionLimits:
 
 
 def check(spec: FollowSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown joints."""
-    return tuple(
-        problem for k, name in enumerate(spec.joint_names) for problem in unknown_joint(robot, name, ("joint_names", k))
-    )
+    """Unknown joints; tolerances of joints that the trajectory does not have."""
+    names, _, at = spec.message
+    found = [problem for k, name in enumerate(names) for problem in unknown_joint(robot, name, (*at, "joint_names", k))]
+    for key in ("path_tolerance", "goal_tolerance"):
+        for k, own in enumerate(getattr(spec, key) or ()):
+            if own.name not in names:
+                message = f"joint '{own.name}' is not in the trajectory"
+                found.append(Problem((key, k, "name"), message, did_you_mean(own.name, names, kind="its joints")))
+    return tuple(found)
 
 
 def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
     """Joints of two controllers, or joints of the hand."""
-    return unfollowed(claims, spec.joint_names, ("joint_names",))
+    names, _, at = spec.message
+    return unfollowed(claims, names, (*at, "joint_names"))
 
 
 MEMBER = StepMember(name="follow", spec=FollowSpec, candidates=single(plan), check=check, uncommanded=uncommanded)

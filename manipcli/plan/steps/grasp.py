@@ -25,7 +25,7 @@ DEFAULT_FORCE = 8.0
 
 
 class GraspSpec(Model):
-    """Close the hand until each finger meets `force`; the object is held by friction alone.
+    """Close the hand until each finger meets `force`; the object is held by friction, or as the tool states.
 
     The hand stays closed, even if it met nothing, until `release` or `place` opens it.
     """

@@ -22,11 +22,13 @@ from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.face_frames import clear_of, face_frames
 from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting
 from manipcli.plan.grasp_margin import carries
+from manipcli.plan.hand import handless
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.planner import CLEARANCE, Planner
+from manipcli.plan.planner import CLEARANCE, NOTHING, Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.reached_frames import reached_frames
 from manipcli.plan.step import StepMember
@@ -152,7 +154,9 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         direction=spec.approach.direction, yaw=spec.approach.yaw, height=spec.grasp.height,
         pitch=None if spec.approach.direction is not None else spec.approach.pitch,
     )  # fmt: skip
-    usual = frames.usual()
+    fingerless = handless(planner.robot, spec.grasp.posture)
+    touching = planner.hand_contacts(spec.object) if fingerless else NOTHING
+    usual = face_frames(frames, planner.robot) if fingerless else frames.usual()
     out_of_reach: dict[GraspFrame, NotPlannable | None] = {}
     lines: dict[GraspFrame, tuple[float, float, Array]] = {}
     unlikely: set[GraspFrame] = set()  # no approach to these was within reach so far
@@ -164,7 +168,8 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         nonlocal attempts
         builder = MotionBuilder(planner, state)
         if frame not in out_of_reach:  # checked once: it does not depend on distance and slope
-            out_of_reach[frame] = builder.unreachable("approach", frame.X_WT, hand=spec.open)
+            near = MotionBuilder(planner, state, allowed=touching)
+            out_of_reach[frame] = near.unreachable("approach", frame.X_WT, hand=spec.open)
         refusal = out_of_reach[frame]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
@@ -194,7 +199,9 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                     hint=_shorter(spec.object, distance, before_approach),
                 ) from far
         try:
-            builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2)
+            builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2, allowed=touching)
+            if fingerless:
+                clear_of(planner, builder.now, spec.object)
         except NotPlannable as bent:
             if bent.reason == "line":
                 lines.setdefault(frame, (distance, slope, builder.now.position))
@@ -240,11 +247,11 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
 
     def grasps() -> Iterator[Candidate]:
         for k, frame in enumerate((*usual, *frames.higher())):
-            if k >= len(usual) and not touched():
+            if k >= len(usual) and (fingerless or not touched()):
                 break  # a higher grasp is not nearer
             for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
                 yield candidate(frame, distance, slope)
-        if not touched() and _beyond(planner, state, usual[0].X_WT):
+        if fingerless or (not touched() and _beyond(planner, state, usual[0].X_WT)):
             return  # no other orientation is nearer
         overlapping = overlaps(planner, state, spec.object, spec.open)
         reached = reached_frames(frames, planner.solver, state.position, planner.rng)
@@ -264,11 +271,14 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             yield candidate(frame, distance, slope, True, position)
 
     def explain(refusal: NotPlannable) -> NotPlannable:
+        if fingerless:
+            return refusal
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
         nearer = _shorter(spec.object, *min(starts, key=lambda start: start[0])) if starts else None
         hints = dict.fromkeys(hint for hint in (amiss or wide, nearer, refusal.hint) if hint is not None)
-        return refusal.but(hint="; or ".join(hints) or None)
+        # An earlier step may have put the object where it cannot be picked.
+        return refusal.but(hint="; or ".join(hints) or None, parts=refusal.parts | {spec.object})
 
     return Candidates(options(), what=f"cannot pick '{spec.object}'", decides="grasp", explain=explain)
 

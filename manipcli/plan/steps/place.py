@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -40,6 +40,8 @@ from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
+
+T = TypeVar("T")
 
 TILTS = tuple(np.radians([0.0, 2.0, 4.0]))
 """Candidate tilts [rad] of the object when it is released."""
@@ -123,9 +125,15 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
         explain = partial(_explained, spec, planner, state, X_WG, held_back)
         return Candidates(_at(spec, planner, state, X_WG, held_back), what=what, decides="place", explain=explain)
     region = spec.region.box
+    _refuse_off_support(spec, planner, state, region)
+
+    examined: set[tuple[float, float]] = set()  # a place that the search skips does not count
+
+    def examine(at: tuple[float, float], done: Callable[[], T]) -> T:
+        examined.add(at)
+        return done()
 
     def in_region() -> Iterator[Candidate]:
-        free = 0
         for at in spots(region.centre, region.size):
             where = f"at [{at[0]:.3f}, {at[1]:.3f}] m"
             try:
@@ -133,14 +141,34 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
             except NotPlannable as refusal:
                 yield Candidate(partial(_refused, refusal), name=where)
                 continue
-            free += 1
-            if free > PLACES:
+            if len(examined) == PLACES:
                 return
+            share = np.subtract(at, region.centre) / np.maximum(region.size, 1e-9)
             for X_WO in _yaws(spec, planner, state, X_WG):
                 for way in itertools.islice(_ways(spec, planner, state, X_WO, []), WAYS):
-                    yield replace(way, name=f"{where}, {way.name}")
+                    plan, look = partial(examine, at, way.plan), partial(examine, at, way.look)
+                    yield replace(way, name=f"{where}, {way.name}", place=share, plan=plan, look=look)
 
     return Candidates(in_region(), what=what, decides="place")
+
+
+def _refuse_off_support(spec: PlaceSpec, planner: Planner, state: PlanningState, region: RectangleSpec) -> None:
+    """Check that a place in the region is on the support, which depends on no other step.
+
+    Raises:
+        NotPlannable: none is.
+    """
+    assert spec.onto is not None  # `check` asks for it
+    refusal: NotPlannable | None = None
+    for at in spots(region.centre, region.size):
+        try:
+            standing(planner, state, spec.object, spec.onto, at, spec.yaw, "region")
+        except NotPlannable as other:
+            refusal = refusal or other
+        else:
+            return
+    if refusal is not None:
+        raise refusal.but(cause=f"no place in the region is on '{spec.onto}': {refusal.cause}")
 
 
 def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[float, float]) -> Transform:
@@ -150,7 +178,7 @@ def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[flo
         NotPlannable: it is not on the support, or too near to another body.
     """
     assert spec.onto is not None  # `check` asks for it
-    X_WG = standing(planner, state, spec.object, spec.onto, at, spec.yaw)
+    X_WG = standing(planner, state, spec.object, spec.onto, at, spec.yaw, "region")
     hit = crowded(planner, state, spec.object, X_WG, spec.onto)
     if hit is None:
         return X_WG
@@ -256,7 +284,7 @@ def _ways(
         builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
             carry(planner, builder, "carry", above(X_WL, clearance), speed=spec.velocity_scaling)
-        support = planner.touching(builder.with_body(spec.object, X_WL), spec.object)
+        support = planner.touching(put(planner, builder.now, {spec.object: X_WL}), spec.object)
         with _hinted(_LOWER):
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
         return builder

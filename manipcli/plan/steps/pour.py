@@ -78,7 +78,8 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
-    poured = frozenset((name, spec.into) for name in planner.contents(state, spec.object))
+    contents = frozenset(planner.contents(state, spec.object))
+    poured = frozenset((name, spec.into) for name in contents)
 
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
@@ -91,9 +92,15 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         carry(planner, builder, "carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
         builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
         builder.dwell("dwell", spec.dwell)
-        if spec.tilt > math.pi / 2:
+        over = spec.tilt > math.pi / 2
+        if over:
             builder.spill(spec.into)
-        builder.back("tilt back")
+        try:
+            builder.back("tilt back", emptied=over and bool(poured))
+        except NotPlannable as refusal:
+            if not refusal.parts & contents:
+                raise
+            raise refusal.but(hint="pour from higher, `clearance: ...`: what is poured out is in the way") from refusal
         return builder.plan()
 
     ways = itertools.product(spread(spec.clearance), YAWS_DEG, _senses(planner, state, mouth, R_WT))

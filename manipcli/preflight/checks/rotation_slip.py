@@ -19,6 +19,8 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
     carried, and by less than one degree with a `spinning_friction` of 0.01.
     """
     task, plan = subject.task, subject.plan
+    if task.robot.holding is not None:
+        return
     for k, step in enumerate(plan.steps):
         end = step.plan.end
         if end.carried is None or not any(motion.grip is not None for motion in step.plan.motions):

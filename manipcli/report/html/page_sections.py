@@ -58,6 +58,7 @@ def head(page: RunPage) -> Markup:
         element("div", element("h1", verdict.task), word, class_="title"),
         element("p", verdict.text, class_="subtitle") if good or not page.causes else None,
         element("p", f"Warning: {touching}", class_="warn") if touching else None,
+        *(element("p", f"Attachment: {text}") for text in verdict.holding),
         element("p", verdict.drawn.described()) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),

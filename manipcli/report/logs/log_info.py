@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
+from manipcli.record.attachments import INERTIALS
 from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
+from manipcli.report.inertials import recorded_inertials
 from manipcli.report.json import Json, dumps, number, saturated_object, step_object
 from manipcli.report.logs.engine_choice import engine_choices
 from manipcli.report.table import table
@@ -85,6 +87,8 @@ def render_text(info: LogInfo) -> str:
         lines += ["", f"{meshes} meshes, {'not embedded in the log' if not embedded else held}"]
     lines += ["", _headline(info), *([str(info.saturations)] if str(info.saturations) else []), _length(info)]
     lines += [f"{name} of the engine: {value}" for name, value in engine_choices(found.metadata)]
+    lines += [f"{name}: {value}" for name, value in recorded_inertials(found.metadata)]
+    lines += [f"objects are held by {info.run['holding']}, not by friction"] if "holding" in info.run else []
     return "\n".join([*lines, f"log: {found.path}"])
 
 
@@ -105,6 +109,7 @@ def render_json(info: LogInfo) -> str:
             "run": dict(info.run),
             "versions": dict(info.versions),
             "engine_settings": dict(found.metadata.get("engine", {})),
+            "inertials": dict(found.metadata.get(INERTIALS, {})),
             "verdict": dict(info.verdict) or None,
             "saturated": saturated_object(info.saturations),
             "steps": [step_object(step) for step in info.steps],

@@ -73,6 +73,12 @@ class KinematicEngine:
     def sense_wrench(self, joint: str) -> Array:
         return np.zeros(6)
 
+    def attach(self, body: str) -> Array:
+        return np.zeros(6)
+
+    def detach(self, body: str) -> None:
+        """No effect: objects do not move."""
+
     def advance(self) -> None:
         self._advanced = True
 

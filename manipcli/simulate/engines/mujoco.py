@@ -16,6 +16,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
+from manipcli.simulate.engines.mujoco_attachment import Attachments
 from manipcli.simulate.engines.mujoco_bodies import BodyStates
 from manipcli.simulate.engines.mujoco_contacts import Contacts
 from manipcli.simulate.engines.mujoco_library import INSTALL, installed, library, version
@@ -81,6 +82,7 @@ class MujocoEngine:
         self._motors = Motors(model, data, robot, settings.step)
         self._contacts = Contacts(model, data, built.parts)
         self._wrenches = WrenchSensors(mujoco, model, data, built.links, settings.step)
+        self._attachments = Attachments(mujoco, model, data, robot, scene, built.links)
         self._warnings = data.warning.number
         self._calm = self._warnings.tobytes()
         self._mimics = Mimics(data, robot)
@@ -93,6 +95,8 @@ class MujocoEngine:
         self._bodies.read(velocities=velocities)
         if self._wrenches:
             self._wrenches.measure()
+        if self._attachments:
+            self._attachments.measure()
         return state
 
     def write(self, command: JointCommand) -> None:
@@ -100,6 +104,12 @@ class MujocoEngine:
 
     def sense_wrench(self, joint: str) -> Array:
         return self._wrenches.add(self._robot.joint(joint).child)
+
+    def attach(self, body: str) -> Array:
+        return self._attachments.attach(body)
+
+    def detach(self, body: str) -> None:
+        self._attachments.detach(body)
 
     def advance(self) -> None:
         model, data, motors = self._model, self._data, self._motors

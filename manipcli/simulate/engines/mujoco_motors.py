@@ -51,16 +51,16 @@ class Motors:
         self._limits = np.clip(motor_effort_limits(robot), LEAST_EFFORT, UNLIMITED_EFFORT)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._speeds = np.array([math.inf if limit is None else limit for limit in limits])
-        self._rows = model.neq
-        self._compliance = np.full(model.neq + n, MOTOR_COMPLIANCE)
-        self._compliance[: model.neq] = MIMIC_COMPLIANCE
+        self._mimics = self._rows = sum(joint.mimic is not None for joint in robot.moving_joints)
+        self._compliance = np.full(self._mimics + n, MOTOR_COMPLIANCE)
+        self._compliance[: self._mimics] = MIMIC_COMPLIANCE
         self._version = -1
         self._driven = self._drove = np.zeros(0, dtype=np.intp)  # now, and in the last physics step
         self._by_position = self._by_torque = np.zeros(n, dtype=np.bool_)
         self._by_speed = self._by_position
         self._all_torque = False
         self._wanted, self._target_speed = np.zeros((2, n))
-        self._follows = self._rows > 0
+        self._follows = self._mimics > 0
         self.active = self._follows
 
     def write(self, command: JointCommand) -> None:
@@ -93,11 +93,14 @@ class Motors:
 
     def push(self) -> None:
         """Set the speeds of the motors, between the two halves of a physics step."""
-        data, rows = self._data, self._rows
+        data, compliance = self._data, self._compliance
+        rows = self._rows = data.ne
+        if rows > self._mimics:  # attachments keep their own compliance
+            compliance = np.insert(compliance, self._mimics, np.ones(rows - self._mimics))
         self._drove = self._driven
         end = rows + len(self._driven)
-        data.efc_R[:end] *= self._compliance[:end]
-        data.efc_D[:end] /= self._compliance[:end]
+        data.efc_R[:end] *= compliance[:end]
+        data.efc_D[:end] /= compliance[:end]
         if end > rows:
             speed = self._target_speed
             if self._by_position.any():

@@ -20,6 +20,7 @@ from manipcli.model.normalised_urdf import inside_triangle
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body, Scene
 from manipcli.simulate.engine import EngineSettings
+from manipcli.simulate.engines.mujoco_attachment import add_welds
 from manipcli.simulate.engines.mujoco_friction import friction_pairs, towards_robot
 from manipcli.simulate.engines.mujoco_shapes import Shapes, wxyz
 
@@ -112,6 +113,10 @@ def build(
         for a in geoms[one]:
             for b in geoms[two]:
                 spec.add_pair(geomname1=a, geomname2=b, friction=friction, condim=condim, **solver)
+    if robot.holding is not None and robot.tool is not None:
+        movable = [f"body{k}" for k, body in enumerate(scene.bodies) if not body.fixed]
+        time = [2.0 * settings.step, 1.0]  # the stiffest that MuJoCo supports
+        add_welds(mujoco, spec, bodies[robot.tool.link].name, movable, solimp=HARD, solref=time)
     model = spec.compile()
     parts = {spec.body(f"body{k}").id: body.name for k, body in enumerate(scene.bodies)}
     links = {name: made.id for name, made in bodies.items()}

@@ -21,6 +21,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
+from manipcli.simulate.engines.pybullet_attachment import Attachments
 from manipcli.simulate.engines.pybullet_contacts import (
     BulletPoint,
     ContactMerger,
@@ -86,6 +87,9 @@ class PybulletEngine:
         ]
         self._start(robot, settings)
         self._wrenches = WrenchSensors(p, client, self._robot, gravity=scene.gravity, step=settings.step)
+        links = {name: k for k, name in self._links.items()}
+        bodies = {body.name: k for body, k in zip(scene.bodies, self._bodies, strict=True)}
+        self._attachments = Attachments(p, client, robot, self._robot, links, bodies)
         n, m = len(self._joints), len(self._movable)
         state = self._state = WorldState.room(n, m)
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
@@ -112,7 +116,7 @@ class PybulletEngine:
         by_name = {info[1].decode(): k for k, info in enumerate(infos)}
         self._joints = [by_name[name] for name in robot.joint_names]
         self._model, self._numbers = robot, by_name
-        link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
+        self._links = link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
         for link in link_names:
             # Two calls: with a damping, Bullet drops all other values of a link.
             p.changeDynamics(self._robot, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
@@ -162,8 +166,9 @@ class PybulletEngine:
                     linear = _minus(linear, _cross(angular, arm))
                 state.body_linear[row] = linear
                 state.body_angular[row] = angular
+        pulls = self._attachments.measure() if self._attachments else ()
         if self._wrenches:
-            self._wrenches.measure(self._contact_points())
+            self._wrenches.measure(self._contact_points(), pulls)
         return state
 
     def write(self, command: JointCommand) -> None:
@@ -173,6 +178,12 @@ class PybulletEngine:
         hanging = self._model.descendants(self._model.joint(joint).child)
         below = [self._numbers[below.name] for below in self._model.joints if below.child in hanging]
         return self._wrenches.add(self._numbers[joint], below)
+
+    def attach(self, body: str) -> Array:
+        return self._attachments.attach(body)
+
+    def detach(self, body: str) -> None:
+        self._attachments.detach(body)
 
     def advance(self) -> None:
         last = self._substeps - 1

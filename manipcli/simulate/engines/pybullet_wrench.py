@@ -21,6 +21,7 @@ from types import ModuleType
 import numpy as np
 
 from manipcli.core.geometry import Array, cross, rotate, rotate_inverse
+from manipcli.simulate.engines.pybullet_attachment import Pull
 from manipcli.simulate.engines.pybullet_contacts import BulletPoint, Vector
 
 
@@ -98,8 +99,8 @@ class WrenchSensors:
         """Store the motion before the last physics step of a tick."""
         self._before = self._motion() if self._now is None else self._now
 
-    def measure(self, points: Sequence[BulletPoint]) -> None:
-        """Compute the wrenches of the last physics step, with all its contact `points`."""
+    def measure(self, points: Sequence[BulletPoint], pulls: Sequence[Pull] = ()) -> None:
+        """Compute the wrenches of the last physics step, with all its contact `points` and `pulls` of attachments."""
         if self._now is not None or self._before is None:
             return
         now = self._now = self._motion()
@@ -111,6 +112,10 @@ class WrenchSensors:
             given = np.array(pushes)
             np.subtract.at(force, rows, given)
             np.subtract.at(torque, rows, cross(np.array(places), given))
+        for pull in pulls:
+            if pull.link in self._rows:
+                force[self._rows[pull.link]] -= pull.force
+                torque[self._rows[pull.link]] -= cross(pull.point, pull.force) + pull.torque
         forces, torques = self._carries @ force, self._carries @ torque
         for sensor, f, t in zip(self._sensors, forces, torques, strict=True):
             row = self._rows[sensor.link]

@@ -22,7 +22,7 @@ _ROUNDS = 5
 def salvage_controllers(source: Source, model: type[ControllersSpec]) -> Located[ControllersSpec] | None:
     """The controllers without invalid values; None if names contain launch substitutions, or nothing valid remains."""
     root = source.root
-    if open_substitutions(root):
+    if open_substitutions(root, {}):
         return None
     for _ in range(_ROUNDS):
         if not isinstance(root, MappingNode):

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from manipcli.core.errors import Place
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode
+from manipcli.spec.source.tree import PARAMETERS, Entry, MappingNode, Node, ScalarNode, merged
 
-PARAMETERS = "ros__parameters"
 MANAGER = "controller_manager"
 Path = tuple[str, ...]
 
@@ -94,17 +93,6 @@ def undotted(node: MappingNode) -> MappingNode:
         else:
             entries[key] = Entry(entry.key_place, inner)
     return MappingNode(entries, node.place)
-
-
-def merged(a: MappingNode, b: MappingNode) -> MappingNode:
-    """A recursive merge of both; `b` overrides `a`."""
-    entries = dict(a.entries)
-    for key, entry in b.entries.items():
-        before = entries.get(key)
-        if before is not None and isinstance(before.node, MappingNode) and isinstance(entry.node, MappingNode):
-            entry = Entry(before.key_place, merged(before.node, entry.node))
-        entries[key] = entry
-    return MappingNode(entries, a.place)
 
 
 def named(found: list[Found]) -> list[tuple[str, Found]]:

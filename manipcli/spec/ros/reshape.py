@@ -2,12 +2,45 @@
 
 from __future__ import annotations
 
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
+
+
+def chained(node: MappingNode, key: str) -> MappingNode:
+    """Replaces `CONTROLLER/joint` in the list under `key` by the joint, and adds `chained_to: CONTROLLER`.
+
+    Unchanged unless every item names the same controller; gains by such a name are then by joint, too.
+    """
+    listed = node.get(key)
+    items = listed.items if isinstance(listed, SequenceNode) else ()
+    parts = [str(item.value).rpartition("/") for item in items if isinstance(item, ScalarNode)]
+    targets = {target for target, _, _ in parts}
+    if not parts or len(parts) != len(items) or len(targets) != 1 or "" in targets:
+        return node
+    (target,) = targets
+    joints = SequenceNode(
+        tuple(ScalarNode(joint, item.place) for (_, _, joint), item in zip(parts, items, strict=True)), node.place
+    )
+    gains = node.entries.get("gains")
+    if gains is not None and isinstance(gains.node, MappingNode):
+        inner = {name.removeprefix(f"{target}/"): entry for name, entry in gains.node.entries.items()}
+        node = node.with_entry("gains", Entry(gains.key_place, MappingNode(inner, gains.node.place)))
+    place = node.entries[key].key_place
+    node = node.with_entry(key, Entry(place, joints))
+    return node.with_entry("chained_to", Entry(place, ScalarNode(target, place)))
+
+
+def forward(node: MappingNode) -> MappingNode:
+    """Replaces the single `joint` of ROS 1, and references of another controller."""
+    return chained(one_joint(node), "joints")
 
 
 def joint_trajectory(node: MappingNode) -> MappingNode:
-    """Moves `velocity_ff` into the gains and tolerances under `joints`; removes tolerances of 0 (not enforced)."""
-    node = _feed_forward(node)
+    """Moves `velocity_ff` into the gains and tolerances under `joints`; removes tolerances of 0 (not enforced).
+
+    `command_joints` that are references of another controller, in the order of `joints`, become `chained_to`; those
+    that are the joints themselves are removed.
+    """
+    node = _without_same(_feed_forward(chained(node, "command_joints")), "command_joints")
     constraints = node.entries.get("constraints")
     if constraints is None or not isinstance(constraints.node, MappingNode):
         return node
@@ -56,7 +89,15 @@ def pid(node: MappingNode) -> MappingNode:
     if gains and "gains" not in node.entries:
         place = next(iter(gains.values())).key_place
         node = node.with_entry("gains", Entry(place, MappingNode(gains, place)))
-    return one_joint(node)
+    node = chained(one_joint(node), "joints")
+    return _without_same(node, "reference_and_state_dof_names")
+
+
+def _without_same(node: MappingNode, key: str) -> MappingNode:
+    """Removes a list of joints that is the same as `joints`."""
+    given, joints = node.get(key), node.get("joints")
+    same = given is not None and joints is not None and plain(given) == plain(joints)
+    return node.without(key) if same else node
 
 
 def without_zeros(block: MappingNode) -> MappingNode:

@@ -2,22 +2,40 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Literal
 
 from pydantic import BaseModel
 
 from manipcli.core.errors import Diagnostic, Place, Severity
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.spec.controllers import ControllerSpec, Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
-from manipcli.spec.ros.table import Block, Table, model_below, value
-from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, INTERFACES, OTHER_NODES, PACKAGES, UNSERVED_TYPES
+from manipcli.spec.ros.questions import (
+    commanded_joints,
+    implied,
+    is_typo,
+    is_vendor_type,
+    may_be,
+    neutral,
+    renamed,
+    scalar_at,
+    value_at,
+)
+from manipcli.spec.ros.table import Block, Table, model_below
+from manipcli.spec.ros.tables import (
+    BY_TYPE,
+    DEFAULTS,
+    ELSEWHERE,
+    INTERFACES,
+    OTHER_NODES,
+    SIMULATORS,
+    UNSERVED_TYPES,
+)
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.ros.wildcards import Wildcards
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, plain
 
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 
@@ -33,10 +51,11 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
     version = {key: entry for key, entry in root.entries.items() if key == "version"}
     wrapped = root.entries.get("controllers")
     if is_ros2(root):
+        work.form = "ros2"
         found = work.of_nodes(root.without("version"))
         place, rest = root.place, MappingNode(version, root.place)
     elif wrapped is None:
-        work.ros1 = True
+        work.form = "ros1"
         found = work.of_blocks(root.without("version"))
         place, rest = root.place, MappingNode(version, root.place)
     elif isinstance(wrapped.node, MappingNode):
@@ -51,6 +70,10 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
     }
     inner = root.place if wrapped is None else wrapped.node.place
     made = MappingNode(work.started(entries), inner)
+    if work.form is not None and work.foreign:
+        work.unlike_ros(entries)
+    if work.form == "ros2" and work.foreign:
+        rest = rest.with_entry("compat", Entry(place, ScalarNode("ros2", place)))
     findings = sorted(work.findings, key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0))
     return rest.with_entry("controllers", Entry(place, made)), findings
 
@@ -58,14 +81,14 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
 class _Rewriting:
     """The rewriting of one file.
 
-    `foreign`: controllers in a form of ROS, which does not state whether they are active. `ros1`: the file is not in
-    the form of ROS 2, so ROS types have their meaning in ROS 1.
+    `foreign`: controllers in a form of ROS, which does not state whether they are active. `form`: that of the file;
+    None for ours, with ROS types.
     """
 
     def __init__(self, types: Mapping[str, type[ControllerSpec]]) -> None:
         self.findings: list[Diagnostic] = []
         self.models = types
-        self.ros1 = False
+        self.form: Literal["ros1", "ros2"] | None = None
         self.foreign: list[str] = []
 
     def report(
@@ -73,14 +96,50 @@ class _Rewriting:
     ) -> None:
         self.findings.append(Diagnostic(code, message, place, hint=hint, severity=severity))
 
+    def unknown(self, where: str, key: str, place: Place, known: Iterable[str]) -> None:
+        """Reports an unknown key: a warning in a file of ROS, whose nodes ignore it; an error if it is one of ours."""
+        ours = any(key in model.model_fields for model in self.models.values())
+        if self.form is None or ours:
+            self.report("CTRL201", place, f"{where}: unknown key '{key}'", hint=did_you_mean(key, known, kind="known"))
+        else:
+            near = nearest(key, known)
+            hint = f"did you mean {any_of(near)}?" if near else None
+            message = f"{where}: unknown key '{key}': left out, as in ROS"
+            self.report("CTRL201", place, message, hint=hint, severity="warning")
+
+    def other_node(self, block: Found) -> None:
+        """Reports a node that is not a controller."""
+        simulator = block.name in SIMULATORS
+        what = "a simulator's plugin" if simulator else "not a controller"
+        severity: Severity = "note" if simulator else "warning"
+        self.report("CTRL214", block.key_place, f"'{block.name}' is {what}: left out", severity=severity)
+
+    def unlike_ros(self, entries: Mapping[str, Entry]) -> None:
+        """One note on all defaults that differ from those of ROS, and one on a `goal_time` of 0 in ROS 2."""
+        differing: dict[str, None] = {}
+        endless: list[str] = []
+        for name in self.foreign:
+            node = entries[name].node
+            for key, text in DEFAULTS.get(str(scalar_at(node, "type")), {}).items():
+                if self.form in text and value_at(node, key) is None:
+                    differing.setdefault(f"{key} {text[self.form]}")
+            given = value_at(node, "constraints.goal_time")
+            if given is not None and plain(given) in (0, 0.0):
+                endless.append(name)
+        if differing:
+            first = entries[self.foreign[0]].key_place
+            self.report("CTRL218", first, f"defaults that differ from ROS's: {'; '.join(differing)}", severity="note")
+        if endless and self.form == "ros2":
+            message = f"goal_time 0 of {listed(endless, most=3)} means no time limit, as in ROS 2 (`compat: ros2`)"
+            hint = "`compat: ros1` in the robot file: no extra time"
+            self.report("CTRL219", entries[endless[0]].key_place, message, hint=hint, severity="note")
+
     def of_blocks(self, root: MappingNode) -> list[Found]:
         """The controllers of a ROS 1 file, or of our form without `controllers:`."""
         found = []
         for block in in_namespaces(root):
-            if block.name in OTHER_NODES and not has_type(block.node):
-                self.report(
-                    "CTRL214", block.key_place, f"'{block.name}' is not a controller: left out", severity="warning"
-                )
+            if block.name in OTHER_NODES | SIMULATORS and not has_type(block.node):
+                self.other_node(block)
             else:
                 found.append(block)
         return found
@@ -95,9 +154,7 @@ class _Rewriting:
         used: list[Found] = []
         found = []
         for controller in declared:
-            blocks = [node for node in own if node.path == controller.path] or [
-                n for n in own if _may_be(n, controller)
-            ]
+            blocks = [node for node in own if node.path == controller.path] or [n for n in own if may_be(n, controller)]
             used += blocks
             entries = dict(mapping(controller.node).entries)
             for block in blocks:
@@ -110,17 +167,15 @@ class _Rewriting:
         for node in own:
             if node in used:
                 continue
-            given = node if node.name in OTHER_NODES else wildcards.given(node)
+            given = node if node.name in OTHER_NODES | SIMULATORS else wildcards.given(node)
             if has_type(given.node):
                 found.append(given)
-            elif node.name in OTHER_NODES:
-                self.report(
-                    "CTRL214", node.key_place, f"'{node.name}' is not a controller: left out", severity="warning"
-                )
+            elif node.name in OTHER_NODES | SIMULATORS:
+                self.other_node(node)
             else:
                 hint = did_you_mean(node.name, names, kind="it names")
-                message = f"the controller_manager does not declare controller '{node.name}'"
-                self.report("CTRL203", node.key_place, message, hint=hint)
+                message = f"the controller_manager does not declare controller '{node.name}': left out, as in ROS"
+                self.report("CTRL203", node.key_place, message, hint=hint, severity="warning")
         self.of_all(wildcards, found)
         return found
 
@@ -138,8 +193,7 @@ class _Rewriting:
                 kinds = {str(plain(kind)) for kind in (mapping(c.node).get("type") for c in found) if kind is not None}
                 tables = [BY_TYPE[kind] for kind in sorted(kinds) if kind in BY_TYPE]
                 known = [name for t in tables for name in (*self.models[t.own].model_fields, *t.parameters.names)]
-                hint = did_you_mean(key, [*known, *MANAGER_BLOCK.names, *(c.name for c in found)], kind="known")
-                self.report("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+                self.unknown(where, key, entry.key_place, [*known, *MANAGER_BLOCK.names, *(c.name for c in found)])
 
     def declared(self, manager: Found) -> list[Found]:
         """The controllers that a manager declares; reports the manager's own parameters."""
@@ -161,9 +215,8 @@ class _Rewriting:
                 hint = f"write `simulation: {{control_period: {1.0 / rate:g} s}}` in the task"
             message = f"{MANAGER}: 'update_rate' has no effect: the task sets the control rate"
             self.report("CTRL214", entry.key_place, message, hint=hint, severity="note")
-        elif not _neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
-            hint = did_you_mean(key, [*MANAGER_BLOCK.names, *declared], kind="known")
-            self.report("CTRL201", entry.key_place, f"{MANAGER}: unknown key '{key}'", hint=hint)
+        elif not neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
+            self.unknown(MANAGER, key, entry.key_place, [*MANAGER_BLOCK.names, *declared])
 
     def controller(self, name: str, node: Node) -> Node | None:
         """A controller in our form; None if it is left out."""
@@ -181,10 +234,11 @@ class _Rewriting:
             return None
         own = ScalarNode(table.own, word.place, written=word.value)
         node = node.with_entry("type", Entry(entry.key_place, own))
-        node = table.reshape(_implied(_renamed(node, table.parameters), table, word))
-        if table.needs and table.needs not in node.entries:
-            message = f"controller '{name}' has no '{table.needs}': left out"
-            self.report("CTRL214", word.place, message, hint=f"add `{table.needs}: ...`", severity="warning")
+        node = table.reshape(implied(renamed(node, table.parameters), table, word))
+        if table.needs and not node.entries.keys() & {*table.needs}:
+            needed = table.needs[0]
+            message = f"controller '{name}' has no '{needed}': left out"
+            self.report("CTRL214", word.place, message, hint=f"add `{needed}: ...`", severity="warning")
             return None
         self.foreign.append(name)
         node = self.effective(name, node, table)
@@ -198,7 +252,7 @@ class _Rewriting:
         word = node.get(key) if key else None
         if not isinstance(word, ScalarNode) or not isinstance(word.value, str) or word.value in INTERFACES:
             return True
-        near = [interface for interface in INTERFACES if _is_typo(word.value, interface)]
+        near = [interface for interface in INTERFACES if is_typo(word.value, interface)]
         if near:
             message = f"controller '{name}': unknown {key} '{word.value}'"
             self.report("CTRL203", word.place, message, hint=did_you_mean(word.value, near))
@@ -214,7 +268,7 @@ class _Rewriting:
         interface = str(word.value) if isinstance(word, ScalarNode) else ""
         for key in table.idle.get(interface, ()):
             entry = node.entries.get(key)
-            if entry is not None and not _neutral(table.parameters, key, entry.node):
+            if entry is not None and not neutral(table.parameters, key, entry.node):
                 message = f"{name}: '{key}' has no effect on the {interface} interface: left out"
                 hint = "for a grip force, use `command_interface: effort` with `gains`"
                 self.report("CTRL214", entry.key_place, message, hint=hint, severity="warning")
@@ -223,7 +277,7 @@ class _Rewriting:
 
     def unclamped(self, name: str, gains: MappingNode) -> None:
         """Reports integral gains that have no effect in ROS 1 but act here."""
-        for joint, entry in gains.entries.items() if self.ros1 else ():
+        for joint, entry in gains.entries.items() if self.form != "ros2" else ():
             block = mapping(entry.node)
             gain = block.entries.get("i")
             if gain is None or plain(gain.node) in (0, 0.0) or _CLAMPS & block.entries.keys():
@@ -235,7 +289,7 @@ class _Rewriting:
         if word in UNSERVED_TYPES:
             message = f"controller '{name}': ROS type '{word}' is not supported: left out"
             self.report("CTRL214", place, message, severity="warning")
-        elif _is_vendor_type(word):
+        elif is_vendor_type(word):
             package, _, own = word.partition("/")
             message = f"controller '{name}': type '{word}' of package '{package}' is not supported: left out"
             same = [known for known in BY_TYPE if known.partition("/")[2] == own]
@@ -259,13 +313,16 @@ class _Rewriting:
         """
         if not isinstance(node, MappingNode):
             return node
-        node = _renamed(node, block)
+        node = renamed(node, block)
         kept: dict[str, Entry] = {}
         fields = () if model is None else tuple(model.model_fields)
         for key, entry in node.entries.items():
-            if _neutral(block, key, entry.node):
+            if neutral(block, key, entry.node):
                 continue
             given = plain(entry.node)
+            if key in block.refused:
+                self.report("CTRL220", entry.key_place, f"{where}: {key}: {block.refused[key]}")
+                continue
             if key in block.filled and given == []:
                 self.report("CTRL206", entry.node.place, f"{where}.{key}: expected at least 1 item, got none")
             if isinstance(given, int | float) and given > block.most.get(key, math.inf):
@@ -290,8 +347,7 @@ class _Rewriting:
                 message = f"{where}: '{key}' is a parameter of other ROS controllers: left out"
                 self.report("CTRL214", entry.key_place, message, severity="warning")
             elif not self.unserved(where, key, entry, block):
-                hint = did_you_mean(key, [*fields, *block.names], kind="known")
-                self.report("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+                self.unknown(where, key, entry.key_place, [*fields, *block.names])
         return MappingNode(kept, node.place)
 
     def unserved(self, where: str, key: str, entry: Entry, block: Block) -> bool:
@@ -316,7 +372,7 @@ class _Rewriting:
             entry = entries[name]
             node = entry.node
             if isinstance(node, MappingNode) and name in self.foreign and "active" not in node.entries:
-                joints = _joints(node)
+                joints = commanded_joints(node)
                 taken = next((joint for joint in joints if joint in owners), None)
                 if taken is not None:
                     message = f"controller '{name}' starts inactive: '{owners[taken]}' commands '{taken}'"
@@ -327,57 +383,18 @@ class _Rewriting:
                 else:
                     owners.update(dict.fromkeys(joints, name))
             result[name] = entry
+        return self.chained(result)
+
+    def chained(self, entries: dict[str, Entry]) -> dict[str, Entry]:
+        """Deactivates controllers that command references of one that starts inactive."""
+        result = dict(entries)
+        off = {name for name, entry in entries.items() if scalar_at(entry.node, "active") is False}
+        for name, entry in entries.items():
+            target = scalar_at(entry.node, "chained_to")
+            if name in self.foreign and target in off and name not in off and isinstance(entry.node, MappingNode):
+                message = f"controller '{name}' starts inactive, as '{target}', whose references it commands"
+                hint = "set `active`, or add a `switch_controllers` step"
+                self.report("CTRL215", entry.key_place, message, hint=hint, severity="note")
+                active = Entry(entry.key_place, ScalarNode(False, entry.key_place))
+                result[name] = Entry(entry.key_place, entry.node.with_entry("active", active))
         return result
-
-
-def _joints(node: MappingNode) -> list[str]:
-    """The joints that a controller commands."""
-    word, joints = node.get("type"), node.get("joints")
-    if not isinstance(word, ScalarNode) or not isinstance(joints, SequenceNode) or "broadcaster" in str(word.value):
-        return []
-    return [item.value for item in joints.items if isinstance(item, ScalarNode) and isinstance(item.value, str)]
-
-
-def _may_be(node: Found, controller: Found) -> bool:
-    """Whether these parameters belong to this controller: same name, and one of the two has no namespace."""
-    return node.name == controller.name and 1 in (len(node.path), len(controller.path))
-
-
-def _is_vendor_type(word: str) -> bool:
-    """Whether this is `package/Class` of a package that is not ROS's, and not a typo of one."""
-    package = word.partition("/")[0]
-    return re.fullmatch(r"\w+/\w+", word) is not None and not any(_is_typo(package, known) for known in PACKAGES)
-
-
-def _is_typo(given: str, known: str) -> bool:
-    """Whether at most two letters differ, ignoring case."""
-    match = difflib.SequenceMatcher(None, given.casefold(), known.casefold(), autojunk=False)
-    return max(len(given), len(known)) - sum(block.size for block in match.get_matching_blocks()) <= 2
-
-
-def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:
-    """Adds the keys that the ROS type implies."""
-    for key, words in table.types[str(word.value)].items():
-        if key in node.entries or key.removesuffix("s") in node.entries:
-            continue
-        plural = key.endswith("interfaces")
-        items = tuple(ScalarNode(value(text), word.place) for text in words.split())
-        implied: Node = SequenceNode(items, word.place) if plural else items[0]
-        node = node.with_entry(key, Entry(word.place, implied))
-    return node
-
-
-def _neutral(block: Block, key: str, node: Node) -> bool:
-    given = plain(node)
-    return any(given == nothing and type(given) is type(nothing) for nothing in block.neutral.get(key, ()))
-
-
-def _renamed(node: MappingNode, block: Block) -> MappingNode:
-    """Renames ROS keys to ours; if both are given, ours is used and the other is unknown."""
-    return MappingNode(
-        {
-            (key if (own := block.renamed.get(key)) is None or own in node.entries else own): entry
-            for key, entry in node.entries.items()
-        },
-        node.place,
-    )

@@ -14,6 +14,10 @@ Words = Mapping[str, str]
 """Values that a ROS type implies: our key -> value; several values are separated by blanks."""
 
 
+Data = dict[str, Plain]
+"""The parameters of a controller as plain data."""
+
+
 @dataclass(frozen=True, slots=True)
 class Block:
     """The ROS parameters of one block. Names that our spec has need not be listed.
@@ -27,7 +31,9 @@ class Block:
         neutral: values with the same effect as a missing key, as in parameter dumps.
         unserved: values of a key that ROS supports and manipcli does not.
         most: largest tolerance; a larger one is left out with a warning.
+        refused: key -> why a controller that has it cannot be served: it would command something else.
         filled: lists that must not be empty, though ours may be.
+        unwritten: names of older versions, which are read but not written.
     """
 
     known: frozenset[str] = frozenset()
@@ -38,16 +44,22 @@ class Block:
     neutral: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     unserved: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     most: Mapping[str, float] = field(default_factory=dict)
+    refused: Words = field(default_factory=dict)
     filled: frozenset[str] = frozenset()
+    unwritten: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
         """All ROS parameters of the block."""
-        return (*self.known, *self.quiet, *self.renamed, *self.inner)
+        return (*self.known, *self.quiet, *self.renamed, *self.inner, *self.refused)
 
 
 def _same(node: MappingNode) -> MappingNode:
     return node
+
+
+def _unchanged(data: Data) -> Data:
+    return data
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,20 +70,24 @@ class Table:
         own: our type.
         types: ROS type -> values that it implies.
         parameters: ROS parameters of all these types.
+        ros2: the type in ROS 2 that is written, by the interface that it commands, or under "" for any.
         reshape: restructures a controller after renaming.
+        unshape: the inverse, before renaming, of the parameters to write.
         idle: command interface -> our keys that have no effect on it.
         interface: ROS key that names a hardware interface; a controller with an interface that manipcli does not have
             is left out with a warning.
-        needs: required key; a controller without it is left out with a warning.
+        needs: required keys, of which one suffices; a controller without them is left out with a warning.
     """
 
     own: str
     types: Mapping[str, Words]
     parameters: Block
+    ros2: Words
     reshape: Callable[[MappingNode], MappingNode] = _same
+    unshape: Callable[[Data], Data] = _unchanged
     idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     interface: str = ""
-    needs: str = ""
+    needs: tuple[str, ...] = ()
 
 
 def model_below(model: type[BaseModel] | None, key: str) -> type[BaseModel] | None:

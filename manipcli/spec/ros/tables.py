@@ -10,8 +10,9 @@ from typing import Final
 
 from manipcli.spec.block_fields import bounds_of
 from manipcli.spec.quantity import JointTolerance
-from manipcli.spec.ros.reshape import joint_trajectory, one_joint, pid
+from manipcli.spec.ros.reshape import forward, joint_trajectory, one_joint, pid
 from manipcli.spec.ros.table import Block, Table
+from manipcli.spec.ros.unshape import to_forward, to_gripper, to_joint_trajectory, to_pid, to_wrench
 from manipcli.spec.source.tree import Plain
 
 _EVERYWHERE: Final = frozenset({"use_sim_time", "publish_state", "state_publish_rate", "publish_rate"})
@@ -52,10 +53,11 @@ JOINT_TRAJECTORY: Final = Table(
         "joint_trajectory_controller/JointTrajectoryController": {},
     },
     parameters=Block(
-        known=_ANY | {"command_joints", "hold_trajectory_duration", "velocity_ff"}
+        known=_ANY | {"hold_trajectory_duration", "velocity_ff"}
         | {"set_last_command_interface_value_as_state_on_activation"},
         quiet=_EVERYWHERE | {"action_monitor_rate"},
         renamed={"open_loop_control": "interpolate_from_desired_state"},
+        unwritten=frozenset({"open_loop_control"}),
         inner={
             "gains": Block(joint=_GAINS),
             "constraints": Block(inner={"joints": Block(joint=Block(most=_WIDEST))}),
@@ -68,9 +70,13 @@ JOINT_TRAJECTORY: Final = Table(
             ),
         },
         neutral=_NEUTRAL | {"command_joints": ([],)},
+        refused={"command_joints": "only `joints` can be commanded: give the same names, or the references "
+                 "of one controller (`CONTROLLER/joint`)"},
         filled=frozenset({"command_interfaces"}),
     ),
+    ros2={"": "joint_trajectory_controller/JointTrajectoryController"},
     reshape=joint_trajectory,
+    unshape=to_joint_trajectory,
 )  # fmt: skip
 
 GRIPPER: Final = Table(
@@ -93,7 +99,9 @@ GRIPPER: Final = Table(
             "max_effort": (0, 0.0),
         },
     ),
+    ros2={f: f"{f}_controllers/GripperActionController" for f in ("effort", "position")},
     reshape=one_joint,
+    unshape=to_gripper,
 )  # fmt: skip
 
 FORWARD: Final = Table(
@@ -113,7 +121,9 @@ FORWARD: Final = Table(
         renamed={"interface_name": "command_interface"},
         neutral=_NEUTRAL,
     ),
-    reshape=one_joint,
+    ros2={"": "forward_command_controller/ForwardCommandController"},
+    reshape=forward,
+    unshape=to_forward,
     interface="interface_name",
 )
 
@@ -130,15 +140,19 @@ PID: Final = Table(
     },
     parameters=Block(
         known=_ANY | {
-            "reference_and_state_dof_names", "use_external_measured_states", "enable_feedforward",
+            "use_external_measured_states", "enable_feedforward",
             "measured_state_suffix", "export_params",
         },
         quiet=_EVERYWHERE,
         renamed={"dof_names": "joints"},
         inner={"gains": Block(joint=_GAINS)},
         neutral=_NEUTRAL | {"reference_and_state_dof_names": ([],), "use_external_measured_states": (False,)},
+        refused={"reference_and_state_dof_names": "its states are those of `dof_names`: give the same names there, or "
+                 "the references of one controller (`CONTROLLER/joint`)"},
     ),
+    ros2={"": "pid_controller/PidController"},
     reshape=pid,
+    unshape=to_pid,
 )  # fmt: skip
 
 JOINT_STATES: Final = Table(
@@ -153,6 +167,7 @@ JOINT_STATES: Final = Table(
             "map_interface_to_joint_state": ({name: name for name in INTERFACES},),
         },
     ),
+    ros2={"": "joint_state_broadcaster/JointStateBroadcaster"},
 )  # fmt: skip
 
 WRENCH: Final = Table(
@@ -167,10 +182,11 @@ WRENCH: Final = Table(
             "topic_name",
         },
         quiet=_EVERYWHERE | {"sensor_name", "interface_names"},
-        renamed={"frame_id": "link"},
         neutral=_NEUTRAL | {"additional_frames_to_publish": ([],)},
     ),
-    needs="link",
+    ros2={"": "force_torque_sensor_broadcaster/ForceTorqueSensorBroadcaster"},
+    unshape=to_wrench,
+    needs=("link", "frame_id"),
 )  # fmt: skip
 
 TABLES: Final = (JOINT_TRAJECTORY, GRIPPER, FORWARD, PID, JOINT_STATES, WRENCH)
@@ -244,7 +260,7 @@ MANAGER: Final = Block(
 OTHER_NODES: Final = frozenset(
     {
         "controller_list", "controller_manager", "controller_manager_ns", "controller_names", "controller_stopper",
-        "gazebo_ros_control", "generic_hw_control_loop", "hardware_control_loop", "hardware_interface",
+        "generic_hw_control_loop", "hardware_control_loop", "hardware_interface",
         "joint_group_limits", "joint_limits", "joint_state_publisher", "joint_state_publisher_gui", "move_group",
         "moveit_controller_manager", "moveit_manage_controllers", "moveit_sim_hw_interface",
         "moveit_simple_controller_manager", "robot_description", "robot_state_publisher", "ros2_control_node",
@@ -252,3 +268,29 @@ OTHER_NODES: Final = frozenset(
     }
 )  # fmt: skip
 """Other blocks of ROS files with controllers."""
+
+SIMULATORS: Final = frozenset(
+    {"gazebo_ros_control", "gazebo_ros2_control", "gz_ros_control", "gz_ros2_control", "ign_ros2_control"}
+)
+"""Plugins of simulators, whose parameters have no meaning here."""
+
+
+def _default(here: str, ros2: str, ros1: str | None = None) -> dict[str, str]:
+    theirs = {"ros1": ros2 if ros1 is None else ros1, "ros2": ros2}
+    return {form: f"{here} (ROS: {value})" for form, value in theirs.items() if value != here}
+
+
+DEFAULTS: Final[dict[str, dict[str, dict[str, str]]]] = {
+    "joint_trajectory": {
+        "constraints.goal_time": _default("2 s", "0, no time limit", "0, no extra time"),
+        "constraints.stopped_velocity_tolerance": _default("0.05", "0.01"),
+        "constraints.decelerate_on_cancel": _default("true", "false"),
+        "interpolate_from_desired_state": _default("true", "false", "true"),
+    },
+    "gripper": {
+        "goal_tolerance": _default("0.05 rad or 0.002 m", "0.01"),
+        "stall_velocity": _default("0.02 rad/s or 0.001 m/s", "0.001"),
+        "stall_time": _default("0.2 s", "1 s"),
+    },
+}
+"""Our type -> key -> by the form of the file, our default and that of ROS, where they differ."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from manipcli.spec.controllers import ControllerSpec
-from manipcli.spec.ros.nodes import Found, has_type, mapping, merged
+from manipcli.spec.ros.nodes import Found, has_type, mapping
 from manipcli.spec.ros.tables import BY_TYPE, MANAGER
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, merged
 
 _BY_JOINT = ("gains", "constraints")
 """Blocks with one block per joint; a controller reads those of its own joints."""

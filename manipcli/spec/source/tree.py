@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from manipcli.core.errors import Loc, Place
@@ -63,6 +63,40 @@ class SequenceNode:
 
 
 Node = ScalarNode | MappingNode | SequenceNode
+
+
+def merged(a: MappingNode, b: MappingNode) -> MappingNode:
+    """A recursive merge of both; `b` overrides `a`."""
+    entries = dict(a.entries)
+    for key, entry in b.entries.items():
+        before = entries.get(key)
+        if before is not None and isinstance(before.node, MappingNode) and isinstance(entry.node, MappingNode):
+            entry = Entry(before.key_place, merged(before.node, entry.node))
+        entries[key] = entry
+    return MappingNode(entries, a.place)
+
+
+Clash = tuple[tuple[str, ...], Place, Place]
+
+
+def clashes(a: MappingNode, b: MappingNode, path: tuple[str, ...] = ()) -> Iterator[Clash]:
+    """What `merged` drops: the path and both places of values that differ."""
+    for key, entry in b.entries.items():
+        before = a.entries.get(key)
+        if before is None:
+            continue
+        if isinstance(before.node, MappingNode) and isinstance(entry.node, MappingNode):
+            yield from clashes(before.node, entry.node, (*path, key))
+        elif plain(before.node) != plain(entry.node):
+            yield (*path, key), before.key_place, entry.key_place
+
+
+PARAMETERS = "ros__parameters"
+
+
+def has_parameters(*nodes: Node) -> bool:
+    """Whether each is the block of a ROS 2 node."""
+    return all(isinstance(node, MappingNode) and PARAMETERS in node.entries for node in nodes)
 
 
 def plain(node: Node) -> Plain:

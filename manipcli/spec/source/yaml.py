@@ -12,7 +12,7 @@ process, are not used: plain scalars follow the core schema of YAML 1.2 (`1e-3` 
 | YAML103 | the file is larger than 10 MB |
 | YAML104 | a `!tag` |
 | YAML105 | more than one document |
-| YAML106 | a duplicate key in a mapping |
+| YAML106 | a duplicate key in a mapping; in a file of ROS 2, a node's second block, which is merged |
 | YAML107 | more than 100,000 values, aliases expanded |
 | YAML108 | nested deeper than 64 |
 | YAML109 | an alias to an unknown anchor, or to an anchor around it |
@@ -35,7 +35,17 @@ import yaml
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import shorten
-from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import (
+    Entry,
+    MappingNode,
+    Node,
+    Scalar,
+    ScalarNode,
+    SequenceNode,
+    clashes,
+    has_parameters,
+    merged,
+)
 
 MAX_BYTES = 10_000_000
 MAX_NODES = 100_000
@@ -53,15 +63,14 @@ _NOT_FINITE = re.compile(_INFINITE.pattern + r"|\.(nan|NaN|NAN)")
 _LONGEST_NUMBER = 400
 
 
-def parse(
-    data: bytes | str, name: str, *, infinite: bool = False, reported: list[Diagnostic] | None = None
-) -> Node | None:
+def parse(data: bytes | str, name: str, *, ros: bool = False, reported: list[Diagnostic] | None = None) -> Node | None:
     """Parses one YAML document; None if it holds only comments.
 
     Args:
         data: bytes or text of the file.
         name: name of the file in places.
-        infinite: accept `.inf` as a number; ROS files write it for "no limit".
+        ros: accept what files of ROS have: `.inf` as a number, for "no limit"; and duplicate keys of blocks with
+            `ros__parameters`, which are merged.
         reported: list that receives the errors of single keys and values, which are then not raised. An invalid number
             is then null, and the first of duplicate keys is used.
 
@@ -77,14 +86,20 @@ def parse(
         message = f"control character U+{ord(control.group()):04X}"
         hint = "remove it, or write it as an escape in double quotes"
         raise _refusal("YAML102", message, _place_at(text, control.start(), name), hint)
-    composer = _Composer(name=name, text=text, infinite=infinite)
+    composer = _Composer(name=name, text=text, ros=ros)
     try:
-        root = composer.document(_events(text))
+        try:
+            root = composer.document(_events(text))
+        except yaml.YAMLError as error:
+            if _UNSPACED not in str(getattr(error, "problem", "")):
+                raise
+            composer = _Composer(name=name, text=text, ros=ros)
+            root = composer.document(yaml.parse(text, Loader=yaml.BaseLoader))
     except yaml.YAMLError as error:
         if not isinstance(error, _Limit):
             composer.findings.append(_syntax_finding(error, text, name))
         raise InvalidInput(composer.findings) from None
-    if composer.findings and reported is None:
+    if reported is None and any(finding.severity == "error" for finding in composer.findings):
         raise InvalidInput(composer.findings)
     if reported is not None:
         reported += composer.findings
@@ -115,6 +130,10 @@ def _place_at(text: str, index: int, name: str) -> Place:
     for match in _BREAK.finditer(text, 0, index):
         line, begin = line + 1, match.end()
     return Place(name, line, index - begin + 1)
+
+
+_UNSPACED = "found unexpected ':'"
+"""libyaml refuses `{joints:['a']}`, which PyYAML's own scanner reads as `{joints: ['a']}`."""
 
 
 def _events(text: str) -> Iterator[yaml.Event]:
@@ -183,7 +202,7 @@ class _Limit(yaml.YAMLError):
 class _Composer:
     name: str
     text: str
-    infinite: bool
+    ros: bool
     findings: list[Diagnostic] = field(default_factory=list)
     anchors: dict[str, _Composed | None] = field(default_factory=dict)
     nodes: int = 0
@@ -269,6 +288,8 @@ class _Composer:
                     self.duplicate("<<", key_place, merge_place)
                 merge_place = key_place
                 self.merge(value.node, merged, value_event)
+            elif key is not None and key in entries and self.ros and has_parameters(entries[key].node, value.node):
+                entries[key] = self.joined(key, entries[key], Entry(key_place, value.node))
             elif key is not None and key in entries:
                 self.duplicate(key, key_place, entries[key].key_place)
             elif key is not None:
@@ -276,6 +297,16 @@ class _Composer:
         for key, entry in merged.items():
             entries.setdefault(key, entry)
         return self.composed(MappingNode(entries, self.place(event)), parts)
+
+    def joined(self, key: str, first: Entry, second: Entry) -> Entry:
+        """The parameters of two blocks of one ROS node; of a parameter in both, the second counts, as in rclcpp."""
+        assert isinstance(first.node, MappingNode) and isinstance(second.node, MappingNode)
+        message = f"'{shorten(key)}' occurs at lines {first.key_place.line} and {second.key_place.line}: merged"
+        self.findings.append(Diagnostic("YAML106", message, second.key_place, severity="note"))
+        for path, old, new in clashes(first.node, second.node):
+            message = f"'{shorten('.'.join(path))}' is given at lines {old.line} and {new.line}: the last one counts"
+            self.findings.append(Diagnostic("YAML106", message, new, severity="warning"))
+        return Entry(first.key_place, merged(first.node, second.node))
 
     def key(self, event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> str | None:
         """The key as written (`010:` and `on:` are strings); None, with a finding, if it is not a string."""
@@ -310,7 +341,7 @@ class _Composer:
         number = int(text, 0 if based else 10) if (whole or based) and len(text) <= _LONGEST_NUMBER else None
         if number is not None and abs(number) <= sys.float_info.max:
             return number
-        if self.infinite and _INFINITE.fullmatch(text):
+        if self.ros and _INFINITE.fullmatch(text):
             return -math.inf if text.startswith("-") else math.inf
         if _NOT_FINITE.fullmatch(text):
             self.report("YAML111", f"'{text}' is not a finite number", event, "write a finite number")

@@ -108,7 +108,6 @@ def to(*points, names=JOINTS):
         lambda: to(point([1, 2, 3], 1.0), names=("joint1", "joint2", "joint2")),
         lambda: to(point([1, 2, 3], 1.0, accelerations=[0, 0, 0])),
         lambda: to(point([1, 2, 3], -0.1)),
-        lambda: to(point([1, 2, 3], 1.0), point([1, 2, 3], 2.0, velocities=[0, 0, 0])),
     ],
 )
 def test_38_goals_that_are_refused(build):

@@ -128,3 +128,10 @@ def test_a_measurement_that_is_no_number_is_refused_by_name_and_costs_no_integra
     with pytest.raises(InvalidArgument, match="position of joint 'a' is nan"):
         command(controller, at(np.nan), 1)
     assert command(controller, at(1.0), 2) == pytest.approx(0.5)
+
+
+def test_on_positions_it_commands_the_reference_and_its_correction_and_holds_without_one():
+    controller = make([PidGainsSpec(p=0.5, feedforward_gain=1)], interface="position", hold_first=False)
+    assert command(controller, at(0.3)) == 0.3
+    controller.set_reference([1.0])
+    assert command(controller, at(0.8), 1) == pytest.approx(1.0 + 0.5 * 0.2)

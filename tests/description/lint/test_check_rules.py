@@ -117,7 +117,9 @@ QUIET = {
     "a material with a name": coloured('name="m"', '<color rgba="1 0 0 1"/>'),
     "a version": one_joint().replace('name="r"', 'name="r" version="1.0"'),
     "many turns": moved("", LIMIT.replace("-1", "-12").replace('upper="1"', 'upper="12"')),
-    "soft limits inside": moved('<safety_controller soft_lower_limit="-1" soft_upper_limit="0.9" k_velocity="1"/>'),
+    "soft limits inside": moved(
+        '<safety_controller soft_lower_limit="-1" soft_upper_limit="0.9" k_position="9" k_velocity="1"/>'
+    ),
     "soft limits unstated": moved('<safety_controller k_velocity="1"/>'),
     "continuous": one_joint(kind="continuous", inside=""),
     "simple transmission": one_joint(more=transmission()),

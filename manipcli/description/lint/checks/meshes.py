@@ -120,6 +120,8 @@ def _absolute_mesh(subject: Subject) -> Iterator[Diagnostic]:
     for mesh in _named_meshes(subject):
         uri = mesh.uri
         windows = bool(PureWindowsPath(uri).drive)
+        if subject.description.expanded and subject.packages.found_by_name(uri):
+            continue  # written as `file://$(find NAME)/...`
         if uri.startswith("file:") or PurePosixPath(uri).is_absolute() or windows:
             message = f"mesh '{uri}' has an absolute path, which works only on this machine"
             yield Diagnostic(

@@ -48,6 +48,7 @@ READING_MESHES: tuple[Check, ...] = (
         "A collision mesh is flat",
         "A collision shape is the convex hull of its vertices; a hull without volume cannot collide.",
         one_link('filename="a.stl"', role="collision"),
+        severity="warning",
         files=lambda: {"a.stl": binary_stl(TETRAHEDRON * (1.0, 1.0, 0.0))},
     ),
 )

@@ -3,7 +3,7 @@
 from functools import partial
 
 from manipcli.description.lint.check import Check, reading_check
-from manipcli.description.lint.samples import CUBE, INERTIAL, LIMIT, bare_joint, one_joint, robot
+from manipcli.description.lint.samples import CUBE, INERTIAL, LIMIT, another, bare_joint, one_joint, robot
 
 topology_check = partial(reading_check, "topology")
 physics_check = partial(reading_check, "physics")
@@ -83,6 +83,27 @@ READING_TREE: tuple[Check, ...] = (
         "In general no position satisfies such a coupling.",
         bare_joint('<mimic joint="j"/>', kind="continuous"),
     ),
+    topology_check(
+        "URDF085",
+        "mimic-chain",
+        "A joint mimics a joint that mimics another",
+        "manipcli follows the chain to its end; Gazebo and ros2_control follow one step, or refuse it.",
+        one_joint(
+            more=another('<mimic joint="j"/>')
+            + another('<mimic joint="k"/>', origin='<origin xyz="0 0 2"/>')
+            .replace('"other"', '"third"')
+            .replace('name="k"', 'name="l"')
+        ),
+        severity="note",
+    ),
+    physics_check(
+        "URDF086",
+        "soft-limits",
+        "The soft limits of a joint have no effect, because k_position is missing or 0",
+        "k_position is the velocity per distance to the soft limit; with 0 the joint does not slow down before it.",
+        one_joint(f'{LIMIT}<safety_controller soft_lower_limit="-0.5" soft_upper_limit="0.5" k_velocity="1"/>'),
+        severity="warning",
+    ),
     physics_check(
         "URDF009",
         "axis",
@@ -145,6 +166,14 @@ READING_TREE: tuple[Check, ...] = (
         "A point mass is fine if it is fixed to a larger body, and an error (URDF011) if a joint moves it.",
         one_joint(tip=INERTIAL.replace("0.02", "0"), kind="fixed", inside=""),
         severity="warning",
+    ),
+    physics_check(
+        "URDF038",
+        "singular-inertia",
+        "An inertia is singular by rounding",
+        "The least moment of a thin rod rounds to 0. Engines divide by it, so a millionth of the largest is used.",
+        one_joint(tip=INERTIAL.replace('izz="0.02"', 'izz="0"') + CUBE),
+        severity="note",
     ),
     readiness_check(
         "URDF015",

@@ -1,0 +1,90 @@
+"""What `pip install` needs to install this manipcli elsewhere: an address if it came from one, else a wheel of itself.
+
+manipcli is on no package index. Installers record where a distribution came from (PEP 610, `direct_url.json`). If that
+is an address on the network, another machine can use it; if not, the installed files are packed into a wheel, which
+goes into the user's repository. It has no compiled kernels: the laws in Python give the same bits.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+import zipfile
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+
+from manipcli.core.version import __version__
+
+PACKAGE: Final = Path(__file__).parents[1]
+FOLDER: Final = "vendor"
+"""Folder of the wheel in a project."""
+LEFT_OUT: Final = (".so", ".dylib", ".dll", ".pyc")
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+"""Time of all files in the wheel: the same contents give the same bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """`requirement` for pip in the folder of a project, and the wheel that it names: (path, contents), or None."""
+
+    requirement: str
+    wheel: tuple[str, bytes] | None = None
+
+
+def installation() -> Installation | None:
+    """How another machine installs this version; None where manipcli runs without being installed."""
+    try:
+        own = metadata.distribution("manipcli")
+    except metadata.PackageNotFoundError:
+        return None
+    address = _address(own.read_text("direct_url.json"))
+    if address is not None:
+        return Installation(f"manipcli @ {address}")
+    name = f"manipcli-{__version__}-py3-none-any.whl"
+    return Installation(f"./{FOLDER}/{name}", (f"{FOLDER}/{name}", _wheel(own)))
+
+
+def _address(text: str | None) -> str | None:
+    """The address on the network in `direct_url.json`, as pip reads it; None for a folder of this machine."""
+    try:
+        stated = json.loads(text or "{}")
+        url = str(stated.get("url", ""))
+        version = stated.get("vcs_info") or {}
+        if version and not url.startswith("file:"):
+            return f"{version['vcs']}+{url}@{version['commit_id']}"
+    except (ValueError, KeyError, AttributeError):
+        return None
+    return url if url.startswith(("http://", "https://")) else None
+
+
+def _wheel(own: metadata.Distribution) -> bytes:
+    """The wheel of the installed package (PEP 427)."""
+    info = f"manipcli-{__version__}.dist-info"
+    files = {
+        f"manipcli/{path.relative_to(PACKAGE).as_posix()}": path.read_bytes()
+        for path in sorted(PACKAGE.rglob("*"))
+        if path.is_file() and path.suffix not in LEFT_OUT and "__pycache__" not in path.parts
+    }
+    for name in ("METADATA", "entry_points.txt"):
+        text = own.read_text(name)
+        if text is not None:
+            files[f"{info}/{name}"] = text.encode()
+    files[f"{info}/WHEEL"] = b"Wheel-Version: 1.0\nGenerator: manipcli\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+    record = "".join(f"{name},sha256={_digest(data)},{len(data)}\n" for name, data in files.items())
+    files[f"{info}/RECORD"] = f"{record}{info}/RECORD,,\n".encode()
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data)
+    return buffer.getvalue()
+
+
+def _digest(data: bytes) -> str:
+    return base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()

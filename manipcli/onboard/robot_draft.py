@@ -1,0 +1,269 @@
+"""The entries of a robot file for a description: groups, poses, tool, limits, mount; each with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.description.elements import Joint
+from manipcli.model.collision import CollisionChecker
+from manipcli.model.configuration import with_mimics, zero_configuration
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel, Tool
+from manipcli.onboard.closure import Closure, HandShape, guess_closure, knuckles_only
+from manipcli.onboard.from_srdf import StatedParts
+from manipcli.onboard.home import CLEARANCES, Home, HomeSearch, guess_home
+from manipcli.onboard.limits import ProposedLimits, propose_limits
+from manipcli.onboard.mount import guess_mount, hung_up
+from manipcli.onboard.parts import Hand, RobotParts, guess_parts
+from manipcli.onboard.robot_entries import group_entries, limit_entries, pose_entries
+from manipcli.onboard.shape_points import ShapePoints
+from manipcli.onboard.tool_frame import ToolFrame, guess_tool_frame
+from manipcli.onboard.writer import Entry, Value
+from manipcli.scene.scene import Scene
+
+BLOCK: Final = 0.04
+"""[m] Edge of the block that a hand is asked to pick."""
+OVERLAP: Final = 1e-3
+"""[m] Fingers that close stop before they overlap by more."""
+STEPS: Final = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotDraft:
+    """What was found out.
+
+    Attributes:
+        robot: with its mount, tool and limits, without groups and poses.
+        parts: its arm and hand.
+        arm_name, hand_name: of their groups.
+        entries: of the robot file, behind `robot`, `description` and `args`.
+        home: (n) the start.
+        search: scores of configurations of the arm; None without an arm.
+        hand, frame: what was measured on the hand; None without one.
+        notes: for the user.
+    """
+
+    robot: RobotModel
+    parts: RobotParts
+    arm_name: str
+    hand_name: str
+    entries: Mapping[str, Entry]
+    home: Array
+    search: HomeSearch | None
+    closure: Closure | None
+    frame: ToolFrame | None
+    notes: tuple[str, ...]
+
+
+def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = None) -> RobotDraft:
+    """Everything about a robot that its description leaves open.
+
+    Args:
+        bare: the robot of a description, with its root at the world's origin.
+        scene: the floor.
+        stated: what an SRDF states; it replaces guesses.
+    """
+    kinematics = Kinematics(bare)
+    points = ShapePoints(kinematics)
+    parts = guess_parts(bare, points, kinematics)
+    if stated is not None:
+        parts = stated.merged(parts)
+    names = (stated.arm_name, stated.hand_name) if stated is not None else ("arm", "hand")
+    notes: list[str] = list(stated.notes) if stated is not None else []
+    arm = parts.arm.joints if parts.arm else ()
+    fingers = parts.hand.joints if parts.hand else ()
+    zero = zero_configuration(bare)
+    closure, frame, shape = _hand(bare, parts.hand, kinematics, points, zero, notes, stated)
+    limits = propose_limits(kinematics, arm, fingers, _lengths(kinematics, points, (*arm, *fingers), zero))
+    tool, tool_entry = _tool(parts, frame)
+    mount, mount_entry = guess_mount(kinematics, points, parts, shape, closure, zero)
+    robot = replace(bare, tool=tool, X_WB=mount, joints=_limited(bare, limits))
+    opened = np.array(zero) if closure is None or shape is None else np.array(shape.whole(closure.opened))
+    touching = stated.touching if stated is not None else ()
+    ignore = (*_within_hand(robot, parts.hand), *touching)
+    home, search = Home(opened, ""), None
+    ignored: tuple[tuple[str, str], ...] = ()
+    if parts.arm is not None:
+        search = HomeSearch(robot, scene, arm, q=opened, ignore=ignore, down=parts.hand is not None)
+        found = _stated_home(search, arm, stated, notes) or guess_home(search)
+        if found is None:
+            mount, mount_entry = hung_up(Kinematics(robot), points, opened, search.whole(search.middle))
+            robot = replace(robot, X_WB=mount)
+            search = HomeSearch(robot, scene, arm, q=opened, ignore=ignore, down=parts.hand is not None)
+            found = guess_home(search)
+        if found is None:
+            home, ignored = _least_touching(search, notes)
+        else:
+            home, ignored = found, found.touching
+    entries: dict[str, Entry] = {}
+    if mount_entry is not None:
+        entries["mount"] = mount_entry
+    entries["groups"] = Entry(group_entries(parts, *names))
+    if touching:
+        entries["collision_ignore"] = Entry([list(pair) for pair in touching], "`disable_collisions` of the SRDF")
+    if ignored:
+        entries["collision_ignore"] = Entry(
+            [list(pair) for pair in (*touching, *ignored)],
+            "they touch in nearly every configuration that was tried",
+            True,
+        )
+    poses = pose_entries(robot, parts, home, closure, *names, stated)
+    if poses:
+        entries["poses"] = Entry(poses)
+    if tool_entry is not None:
+        entries["tool"] = tool_entry
+    if limits:
+        entries["limits"] = Entry(limit_entries(limits))
+    return RobotDraft(
+        replace(robot, collision_ignore=(*touching, *ignored)),
+        parts,
+        *names,
+        entries,
+        home.q,
+        search,
+        closure,
+        frame,
+        tuple(notes),
+    )
+
+
+def _hand(
+    robot: RobotModel,
+    hand: Hand | None,
+    kinematics: Kinematics,
+    points: ShapePoints,
+    zero: Array,
+    notes: list[str],
+    stated: StatedParts | None,
+) -> tuple[Closure | None, ToolFrame | None, HandShape | None]:
+    if hand is None:
+        return None, None, None
+    shape = HandShape(hand, kinematics, points, zero)
+    links = [link for branch in hand.branches for link in branch]
+    bare = points.missing(links)
+    if len(bare) == len(links):
+        notes.append("the hand has no shapes at all: its poses and the tool are guessed from its frames alone")
+    touching = [link for link in links if robot.link(link).collisions]
+    if not touching:
+        notes.append("the hand has no collision shapes, so that it cannot hold anything")
+    closure = guess_closure(shape)
+    if stated is not None and (ends := stated.ends(shape)) is not None:
+        stops = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: widest and narrowest")
+        options: list[Closure | None] = [stops]
+    else:
+        options = [closure, knuckles_only(shape, closure)]
+    found = []
+    for option in filter(None, options):
+        stopped = replace(option, closed=_before_overlap(robot, kinematics, shape, option))
+        found.append((stopped, guess_tool_frame(shape, stopped, width=BLOCK)))
+    closure, frame = max(
+        found, key=lambda pair: (pair[1].narrowest < BLOCK, float(pair[1].X_PT.p @ pair[1].X_PT.R[:, 2]))
+    )
+    return closure, frame, shape
+
+
+def _before_overlap(robot: RobotModel, kinematics: Kinematics, shape: HandShape, closure: Closure) -> Array:
+    """(m) The closed hand, or where it stops because its fingers would overlap."""
+    finger_of = {link: k for k, links in enumerate(closure.fingers) for link in links}
+    query = CollisionChecker(kinematics, Scene((), (), np.array([0.0, 0.0, -9.81]))).at()
+
+    def overlapping(q: Array) -> set[frozenset[str]]:
+        found = set()
+        for hit in query.every(q):
+            a, b = hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")
+            if hit.distance < -OVERLAP and a in finger_of and b in finger_of and finger_of[a] != finger_of[b]:
+                found.add(frozenset((a, b)))
+        return found
+
+    at_first = overlapping(shape.whole(closure.opened))
+    last = closure.opened
+    for share in np.linspace(0.0, 1.0, STEPS + 1):
+        here = (1.0 - share) * closure.opened + share * closure.closed
+        if overlapping(shape.whole(here)) - at_first:
+            return last if share > 0.2 else closure.closed
+        last = here
+    return closure.closed
+
+
+def _within_hand(robot: RobotModel, hand: Hand | None) -> tuple[tuple[str, str], ...]:
+    """Pairs of links of the hand: fingers may meet."""
+    if hand is None:
+        return ()
+    links = {hand.palm, *hand.fixed, *(link for branch in hand.branches for link in branch)}
+    return tuple(combinations(sorted(links), 2))
+
+
+def _lengths(kinematics: Kinematics, points: ShapePoints, joints: Sequence[str], q: Array) -> dict[str, float]:
+    """[m] from the axis of each joint to the farthest point that it moves, where the robot is stretched most."""
+    robot, rng = kinematics.robot, np.random.default_rng(0)
+    ends = [joint.limits.within_soft for joint in robot.moving_joints]
+    lower = np.array([max(low, -np.pi) for low, _ in ends])
+    upper = np.array([min(high, np.pi) for _, high in ends])
+    found = dict.fromkeys(joints, 0.0)
+    for sample in (q, *rng.uniform(lower, upper, (12, len(lower)))):
+        here = np.array(with_mimics(robot, sample))
+        for name in joints:
+            joint = robot.joint(name)
+            X_WJ = kinematics.forward(here, joint.child)
+            links = sorted(robot.descendants(joint.child))
+            frames = np.array([kinematics.forward(here, link).p for link in links])
+            away = np.vstack([frames, points.at(here, links)]) - X_WJ.p
+            axis = X_WJ.R @ joint.axis
+            found[name] = max(found[name], float(np.linalg.norm(away - np.outer(away @ axis, axis), axis=1).max()))
+    return found
+
+
+def _tool(parts: RobotParts, frame: ToolFrame | None) -> tuple[Tool | None, Entry | None]:
+    if frame is not None:
+        pose: dict[str, Value] = {"xyz": [float(value) + 0.0 for value in frame.X_PT.p]}
+        rpy = [round(float(value), 5) + 0.0 for value in frame.X_PT.rpy]
+        if any(rpy):
+            pose["rpy"] = [*rpy]
+        X = Transform.of(xyz=frame.X_PT.p, rpy=rpy)
+        return Tool(frame.link, X), Entry({"link": frame.link, "pose": pose}, frame.evidence)
+    if parts.arm is not None:
+        why = "the last link of the arm, which has no hand"
+        return Tool(parts.arm.tip, Transform.identity()), Entry({"link": parts.arm.tip}, why)
+    return None, None
+
+
+def _limited(robot: RobotModel, limits: Mapping[str, ProposedLimits]) -> tuple[Joint, ...]:
+    """The joints with the proposed limits."""
+    found = []
+    for joint in robot.joints:
+        own = limits.get(joint.name)
+        if own is not None:
+            found.append(replace(joint, limits=replace(joint.limits, **own.spec.model_dump(exclude_unset=True))))
+        else:
+            found.append(joint)
+    return tuple(found)
+
+
+def _stated_home(search: HomeSearch, arm: tuple[str, ...], stated: StatedParts | None, notes: list[str]) -> Home | None:
+    """The state of the SRDF with the best score of those that are free; the one called `home` if it is."""
+    states = stated.arm_states(arm) if stated is not None else {}
+    search.keep(CLEARANCES[-1])
+    free = {name: q for name, q in states.items() if search.free(q) and search.within(q)}
+    if "home" in states and "home" not in free:
+        notes.append("the state 'home' of the SRDF is in collision or outside the limits; another home was searched")
+    best = "home" if "home" in free else max(free, key=lambda name: search.score(free[name]), default=None)
+    if best is None or (best != "home" and search.score(free[best]) <= 0.0):
+        return None
+    return Home(search.whole(free[best]), f"the state '{best}' of the SRDF")
+
+
+def _least_touching(search: HomeSearch, notes: list[str]) -> tuple[Home, tuple[tuple[str, str], ...]]:
+    """The middle of the ranges, and the pairs of links that touch there: nothing better was found."""
+    touching = search.lasting([search.middle])
+    notes.append(
+        "no start free of collision was found; 'home' is the middle of the ranges: move the robot or its obstacles"
+        + (f"; links that touch there are under `collision_ignore`: {len(touching)} pairs" if touching else "")
+    )
+    why = "the middle of the ranges: no configuration without contacts was found"
+    return Home(search.whole(search.middle), why), touching

@@ -1,0 +1,36 @@
+"""What a user reads after a robot was set up: what was found, what to check, and what the first task does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from manipcli.onboard.first_task import FirstTask
+from manipcli.report.text import FAIL, PASS
+
+
+def summary(
+    *, found: Sequence[str], checks: Sequence[tuple[str, str]], notes: Sequence[str], task: FirstTask
+) -> Iterator[str]:
+    """The lines.
+
+    Args:
+        found: what was measured.
+        checks: (path, evidence) of values that are only plausible.
+        notes: for the user.
+        task: the first task.
+    """
+    yield from found
+    if checks:
+        yield ""
+        yield "please check (CHECK in the files):"
+        for path, why in checks:
+            yield f"  {path}: {why}"
+    if notes or task.notes:
+        yield ""
+        yield from (f"note: {note}" for note in (*notes, *task.notes))
+    yield ""
+    yield (
+        f"{PASS} first task: {task.does}; its run passed"
+        if task.passed
+        else f"{FAIL} first task: {task.does}; no run passed"
+    )
