@@ -27,7 +27,8 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import configuration, position_limits
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.claimed_joints import Claims, arm_joints
-from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
+from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.pose_error import rotation_vector
 from manipcli.task.load_task import load_task
 
 ROOT: Final = Path(__file__).parents[1]

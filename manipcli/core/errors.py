@@ -108,9 +108,10 @@ class InvalidArgument(InvalidInput, ValueError):
         super().__init__((Diagnostic(code=code, message=message, hint=hint),))
 
 
-RefusalReason = Literal["orientation", "touches", "in_the_way", "line", "constraint"]
-"""`orientation`: the arm cannot reach the tool orientation; `touches`: every solution is in collision; `in_the_way`: an
-obstacle blocks the motion; `line`: the tool cannot follow a straight line; `constraint`: a `keep` is violated."""
+RefusalReason = Literal["reach", "orientation", "touches", "in_the_way", "line", "constraint"]
+"""`reach`: no joint positions reach the pose; `orientation`: the arm cannot reach the tool orientation; `touches`:
+every solution is in collision; `in_the_way`: an obstacle blocks the motion; `line`: the tool cannot follow a straight
+line; `constraint`: a `keep` is violated."""
 
 
 class NotPlannable(ManipcliError):

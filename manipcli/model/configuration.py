@@ -18,22 +18,32 @@ def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
     return frozen([lower for lower, _ in ranges]), frozen([upper for _, upper in ranges])
 
 
-def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
-    """(..., n) `q` with every mimic joint at multiplier * q_leader + offset."""
+def with_mimics(robot: RobotModel, q: npt.ArrayLike, *, rates: bool = False) -> Array:
+    """(..., n) `q` with every mimic joint at multiplier * q_leader + offset; of `rates`, without the offset."""
     position = np.array(q, dtype=np.float64)
     for k, joint in enumerate(robot.moving_joints):
         if joint.mimic is not None:
             leader = position[..., robot.joint_names.index(joint.mimic.joint)]
-            position[..., k] = joint.mimic.multiplier * leader + joint.mimic.offset
+            position[..., k] = joint.mimic.multiplier * leader + (0.0 if rates else joint.mimic.offset)
     return frozen(position)
 
 
-def with_joints(robot: RobotModel, rest: Array, names: Sequence[str], values: npt.ArrayLike) -> Array:
-    """(..., n) the positions `rest` (n) of all joints, with those of some joints at `values` (..., m)."""
+def leads(robot: RobotModel, names: Sequence[str]) -> bool:
+    """Whether another joint mimics one of these."""
+    return any(joint.mimic is not None and joint.mimic.joint in names for joint in robot.moving_joints)
+
+
+def with_joints(
+    robot: RobotModel, rest: Array, names: Sequence[str], values: npt.ArrayLike, *, rates: bool = False
+) -> Array:
+    """(..., n) the positions `rest` (n) of all joints, with those of some joints at `values` (..., m).
+
+    Joints that mimic these follow. The same of `rates`: velocities or accelerations.
+    """
     values = np.asarray(values, dtype=np.float64)
     position = np.tile(rest, (*values.shape[:-1], 1))
     position[..., robot.indices(tuple(names))] = values
-    return position
+    return with_mimics(robot, position, rates=rates) if leads(robot, names) else position
 
 
 def zero_configuration(robot: RobotModel) -> Array:

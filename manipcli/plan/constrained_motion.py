@@ -13,7 +13,6 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import with_joints
-from manipcli.plan.inverse_kinematics import Open
 from manipcli.plan.keep import Kept, refuse_unkept, reserving
 from manipcli.plan.kept_path import kept_paths
 from manipcli.plan.limit_check import verify
@@ -23,6 +22,7 @@ from manipcli.plan.motion_constraints import applying, bounds_of, keeps_of
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path_dynamics import PathDynamics
 from manipcli.plan.planner import Planner
+from manipcli.plan.pose_error import Leaving
 from manipcli.plan.retimer import retime
 from manipcli.plan.sweep import refuse_collision, swept
 from manipcli.plan.timing_bound import TimingBound, refuse_exceeded
@@ -81,7 +81,7 @@ def tool_motion(
     walk: Walk,
     *,
     insist: bool,
-    leaving: Open,
+    leaving: Leaving,
 ) -> JointTrajectory:
     """Along a path of the tool that `walk` solves; see `timed_line`.
 

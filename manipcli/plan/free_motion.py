@@ -115,17 +115,22 @@ def line_blocked(planner: Planner, state: PlanningState, X_WT: Transform, query:
     clearance from what it must not touch, and passes through every point of the path.
     """
     nearer = query.nearer(_SURE)
+    solver = planner.solver
 
     def visit(q: Array) -> None:
         hit = nearer.check(q)
         if hit is not None:
             raise NotPlannable(str(hit), reason="in_the_way", parts=frozenset((hit.a, hit.b)))
 
-    try:
-        linear_path(planner.solver, state.position, X_WT, visit)
-    except NotPlannable as refusal:
-        return refusal
-    return None
+    refused: NotPlannable | None = None
+    for each in (solver, solver.leaving("yaw")) if solver.few else (solver,):
+        try:
+            linear_path(each, state.position, X_WT, visit)
+        except NotPlannable as refusal:
+            refused = refused or refusal
+        else:
+            return None
+    return refused
 
 
 def refusing(

@@ -14,7 +14,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.collision import CollisionHit, CollisionQuery, Pair
-from manipcli.model.configuration import with_mimics
+from manipcli.model.configuration import leads, with_mimics
 from manipcli.model.edge_check import EdgeCheck
 from manipcli.model.robot import RobotModel
 
@@ -36,7 +36,7 @@ class FreeSpace:
         self._edges = EdgeCheck(query)
         self._columns = list(robot.indices(tuple(names)))
         self._others = [np.array(q) for q in others]
-        self._mimics = any(joint.mimic is not None and joint.mimic.joint in names for joint in robot.moving_joints)
+        self._mimics = leads(robot, names)
         self._blocked: list[Array] = []
         self.edges = 0
         """Number of edges that were checked."""

@@ -35,10 +35,14 @@ AROUND_DEG: Final = (60.0, -60.0, 90.0, -90.0, 120.0, -120.0, 150.0, -150.0, 180
 """Further rotations about the vertical: the rest of the circle around an object."""
 PITCHES_DEG: Final = (30.0, 60.0)
 """Further approaches between side (0) and top (90)."""
+STRAIGHT_FIRST_DEG: Final = (0.0, 90.0, 60.0, 30.0, 75.0, 45.0, 15.0)
+"""The same with side and top, for an arm that has a yaw of its own in each."""
 ALONG: Final = (0.75, 0.25)
 """Further shares of the height at which an object is grasped from the side."""
 ROLLS_DEG: Final = (45.0, -45.0, 22.5, -22.5, 67.5, -67.5)
 """Further yaws of a hand that comes from the top, relative to the object's."""
+TILTED: Final = math.radians(15.0)
+"""How far an approach to an antipodal pair may be from the stated pitch."""
 BELOW: Final = 0.2
 """Largest upward component of the approach to an antipodal pair: the hand does not come from below."""
 TURNS: Final = 8
@@ -64,6 +68,7 @@ class GraspFrames:
         R_WT: (3, 3) present orientation of the tool; grasps near it come first.
         direction: from where the hand comes; None for any.
         yaw: [rad] of the approach; None for any.
+        pitch: [rad] of an approach between side (0) and top (pi / 2), downwards; None for any.
         height: [m] of the tool above the object's bottom; None: its middle, or others.
     """
 
@@ -74,6 +79,7 @@ class GraspFrames:
     direction: Direction | None
     yaw: float | None
     height: float | None
+    pitch: float | None = None
 
     @property
     def bottom(self) -> float:
@@ -93,10 +99,23 @@ class GraspFrames:
             self._at(self.bottom + share * float(self.body.size[2]), R_WT) for share in HIGHER for R_WT in from_above
         )
 
+    def pitches(self) -> Iterator[GraspFrame]:
+        """Frames between side and top whose yaw only begins a search, by pitch, height and roll of the hand."""
+        straight = {"side": (0.0,), "top": (90.0,), None: STRAIGHT_FIRST_DEG}[self.direction]
+        pitches = np.radians(straight) if self.pitch is None else (self.pitch,)
+        shares = HIGHER if self.height is None and self._tall else ()
+        heights = [self._middle, *(self.bottom + share * float(self.body.size[2]) for share in shares)]
+        for rolls, z in itertools.product(((0.0, 180.0), (90.0, -90.0)), heights):
+            for pitch in pitches:
+                yield from self._level(z, self._nominal, rolls, float(pitch))
+
     def further(self) -> Iterator[GraspFrame]:
         """All other frames."""
         if self.body.kind in ("mesh", "urdf") and self.height is None and self.yaw is None:
             yield from self._antipodal()
+        if self.pitch is not None:
+            yield from self._pitched_further(self.pitch)
+            return
         if self.direction != "top":
             yield from self._around()
         if self.direction is None:
@@ -112,6 +131,10 @@ class GraspFrames:
                 for turn in (0.0, 180.0):
                     R_WT = _pitched(float(self.X_WO.rpy[2]) + math.radians(offset + turn), math.pi / 2)
                     yield self._at(self._middle, R_WT)
+
+    def turned(self, frame: GraspFrame, X_WT: Transform) -> GraspFrame:
+        """The same frame with another orientation."""
+        return GraspFrame(X_WT, frame.height, _name(X_WT.R, frame.height))
 
     @property
     def _tall(self) -> bool:
@@ -151,6 +174,12 @@ class GraspFrames:
         for yaw in yaws:
             yield from self._level(self._middle, yaw, (0.0, 180.0))
 
+    def _pitched_further(self, pitch: float) -> Iterator[GraspFrame]:
+        """At the stated pitch, from the other sides and with other rolls of the hand."""
+        for rolls, offsets in (((0.0, 180.0), AROUND_DEG), ((90.0, -90.0), YAWS_DEG)):
+            for yaw in self._yaws(offsets):
+                yield from self._level(self._middle, yaw, rolls, pitch)
+
     def _sloping(self) -> Iterator[GraspFrame]:
         """Between side and top."""
         for pitch, yaw in itertools.product(PITCHES_DEG, self._yaws((0.0, 35.0, -35.0, 90.0, -90.0, 180.0))):
@@ -177,6 +206,8 @@ class GraspFrames:
 
     def _from_here(self, z: float) -> bool:
         """Whether an approach with this vertical component is from where the hand may come."""
+        if self.pitch is not None:
+            return abs(math.asin(max(-1.0, min(1.0, -z))) - self.pitch) < TILTED
         return self.direction is None or (z < -0.9 if self.direction == "top" else abs(z) < 0.3)
 
 
@@ -210,6 +241,11 @@ def _orientations(frames: GraspFrames) -> list[Array]:
     The one nearer to the present orientation comes first: it leaves more range of the wrist for later steps.
     """
     found = []
+    if frames.pitch is not None:
+        for yaw in frames._yaws(YAWS_DEG):
+            R_WT = _pitched(yaw, frames.pitch)
+            found += _nearer_first(R_WT, R_WT @ np.diag([-1.0, -1.0, 1.0]), frames.R_WT)
+        return found
     if frames.direction != "top":
         for yaw in frames._yaws(YAWS_DEG):
             z = np.array([math.cos(yaw), math.sin(yaw), 0.0])

@@ -14,29 +14,24 @@ error is the angle between the two z axes), or the whole rotation.
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable, RefusalReason
-from manipcli.core.geometry import Array, Transform, cross, frozen, matrix_from_axis_angle
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.text import number_of
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.base_move import base_advice
-
-Open = Literal["nothing", "spin", "rotation"]
-"""The part of the tool's orientation that a goal leaves open: nothing, the rotation about its z axis, or all of it."""
-
-Solve = Callable[..., Any]
+from manipcli.plan.damped_step import damped_step
+from manipcli.plan.pose_error import RESOLUTION, Leaving, Open, PoseTolerance, forgive, pose_error
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
@@ -70,11 +65,15 @@ class Solution:
     def converged(self) -> bool:
         return self.position_error <= POSITION_TOLERANCE and self.angle_error <= ANGLE_TOLERANCE
 
-    def explain(self) -> str:
+    def within(self, tolerance: PoseTolerance) -> bool:
+        """Whether it is at most this far from the goal."""
+        return self.position_error <= tolerance.distance and self.angle_error <= tolerance.rotation
+
+    def explain(self, tolerance: PoseTolerance = RESOLUTION) -> str:
         """Why this attempt is not a solution, for a message."""
         away, turned = 1000.0 * self.position_error, math.degrees(self.angle_error)
         if away < 0.05 and turned < 0.05:
-            near = f"{1000.0 * POSITION_TOLERANCE:.2g} mm and {math.degrees(ANGLE_TOLERANCE):.2g} deg"
+            near = f"{1000.0 * tolerance.distance:.2g} mm and {math.degrees(tolerance.rotation):.2g} deg"
             text = f"the nearest pose is {away:.2g} mm and {turned:.2g} deg off, the tolerance is {near}"
             return f"{text}: an arm of few joints cannot reach every orientation"
         text = f"the nearest pose is {away:.1f} mm and {turned:.1f} deg off"
@@ -111,15 +110,32 @@ class InverseKinematics:
         adjacent = self.columns == tuple(range(first, first + len(self.columns)))
         # A slice of adjacent joints costs a fraction of an array of their indices.
         self._columns = slice(first, first + len(self.columns)) if adjacent else np.array(self.columns, dtype=np.intp)
+        # Joints of the chain that mimic the solver's: index among all joints, leader, multiplier, offset.
+        self._followers = tuple(
+            (k, self.joints.index(joint.mimic.joint), joint.mimic.multiplier, joint.mimic.offset)
+            for k, joint in enumerate(robot.moving_joints)
+            if joint.mimic is not None and joint.mimic.joint in self.joints and link in robot.descendants(joint.child)
+        )
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
         self._open: Open = "nothing"
+        self._tolerance = RESOLUTION
+        self._near = False
         self._tries = _TRIES
 
-    def leaving(self, open_: Open) -> InverseKinematics:
-        """The same solver for goals that leave this part of the orientation open."""
+    def leaving(self, open_: Leaving) -> InverseKinematics:
+        """The same solver for goals that leave this part of the orientation open, or that have this tolerance."""
         other = copy(self)
-        other._open = open_
+        if isinstance(open_, PoseTolerance):
+            other._tolerance, other._open = open_, open_.open
+        else:
+            other._open = open_
+        return other
+
+    def of(self, X_LT: Transform) -> InverseKinematics:
+        """The same solver for another frame of its link."""
+        other = copy(self)
+        other._X_LT = X_LT
         return other
 
     @contextmanager
@@ -190,6 +206,9 @@ class InverseKinematics:
                 best = attempt
         if found:
             return min(found, key=lambda solution: float(np.linalg.norm(solution.q - seed))).q
+        tolerated, refusal = self._tolerated(best, X_WT, seed, rng, refuse, refusal)
+        if tolerated is not None:
+            return tolerated
         distance = float(np.linalg.norm(X_WT.p - self._kinematics.robot.X_WB.p))
         place = ", ".join(f"{value:.3f}" for value in X_WT.p)
         rotate = "" if self._open == "rotation" else ", or change the orientation of the tool"
@@ -201,7 +220,7 @@ class InverseKinematics:
                 parts=getattr(refusal, "parts", frozenset()),
             )
         hint = f"move the goal nearer{rotate}"
-        kind: RefusalReason | None = None
+        kind: RefusalReason = "reach"
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
         elif self._open == "spin" and (alone := self.leaving("rotation").track(X_WT, seed)).converged:
@@ -209,17 +228,39 @@ class InverseKinematics:
             hint = f"remove `pointing`: the tool then reaches the point, pointing {off:.0f} deg off"
         elif best.angle_error > _TURNED:
             hint, kind = "change the orientation of the tool: the arm cannot reach it here", "orientation"
-        if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
+        if self.few and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
             hint += f"; an arm of {few} reaches few orientations: leave it open with `move: {{point: ...}}`"
+            if self.leaving("yaw").track(X_WT, best.q).converged:
+                hint += ", or only its yaw, with which it is reached: `tolerance: {about: {axis: [0, 0, 1]}}`"
         nearest = ", ".join(f"{value:.3f}" for value in self.forward(best.q).p)
         raise NotPlannable(
-            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}, "
-            f"with the tool at ({nearest}) m",
+            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: "
+            f"{best.explain(self._tolerance)}, with the tool at ({nearest}) m",
             hint=hint,
             reason=kind,
             remedy=None if distance > _FAR else partial(base_advice, self, X_WT, seed),
         )
+
+    def _tolerated(
+        self,
+        best: Solution,
+        X_WT: Transform,
+        seed: Array,
+        rng: np.random.Generator,
+        refuse: Callable[[Array], object | None] | None,
+        refusal: object | None,
+    ) -> tuple[Array | None, object | None]:
+        """Positions (n) within the tolerance of a goal that none reaches, the `best` ones if they are; else why not."""
+        starts = () if self._tolerance is RESOLUTION else (seed, *self.random_configurations(seed, rng, self._tries))
+        for attempt in (best, *(self.near(X_WT, start) for start in starts)):
+            if attempt.within(self._tolerance):
+                attempt = self._unwound(attempt, seed)
+                reason = None if refuse is None else refuse(attempt.q)
+                if reason is None:
+                    return attempt.q, None
+                refusal = refusal or reason
+        return None, refusal
 
     def random_configurations(self, seed: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
         """`count` copies of `seed` (n), each with the solver's joints uniform inside their limits, drawn as needed."""
@@ -231,6 +272,11 @@ class InverseKinematics:
             yield start
 
     @property
+    def few(self) -> bool:
+        """Whether there are too few joints for an arbitrary pose."""
+        return len(self.joints) < _ALL
+
+    @property
     def base(self) -> Transform:
         """X_WB."""
         return self._kinematics.robot.X_WB
@@ -239,7 +285,7 @@ class InverseKinematics:
         """One attempt from `seed` (n), without restarts, for the next point of a path."""
         q = np.array(seed, dtype=np.float64)
         columns, lower, upper = self._columns, self._lower, self._upper
-        q[columns] = np.minimum(np.maximum(q[columns], lower), upper)
+        self._put(q, np.minimum(np.maximum(q[columns], lower), upper))
         previous = math.inf
         stalled = 0
         for _ in range(_ITERATIONS):
@@ -254,10 +300,39 @@ class InverseKinematics:
                 return self._solution(q, position_error, axis_error)
             previous = cost
             here = q[columns]
-            step = _damped_step(J, error, cost + 1e-9, here, lower, upper)
-            q[columns] = np.minimum(np.maximum(here + step, lower), upper)
+            step = damped_step(J, error, cost + 1e-9, here, lower, upper)
+            self._put(q, np.minimum(np.maximum(here + step, lower), upper))
         error, _, axis_error = self._linearise(X_WT, q)
         return self._solution(q, float(np.linalg.norm(error[:3])), axis_error)
+
+    def reaches(self, X_WT: Transform, q: npt.ArrayLike) -> bool:
+        """Whether the tool is at `X_WT` with the joints at `q` (n), within the tolerance."""
+        error, _, angle = self._linearise(X_WT, np.asarray(q, dtype=np.float64))
+        return self._solution(np.array(q), float(np.linalg.norm(error[:3])), angle).within(self._tolerance)
+
+    def reachable(self, X_WT: Transform, seed: npt.ArrayLike) -> bool:
+        """Whether some joint positions reach `X_WT`, collisions aside; the same answer for the same arguments."""
+        try:
+            self.solve(X_WT, seed, np.random.default_rng(0))
+        except NotPlannable:
+            return False
+        return True
+
+    def near(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
+        """As `track`; where the goal is out of reach, any pose within the tolerance, and else the nearest."""
+        exact = self.track(X_WT, seed)
+        if exact.converged or exact.within(self._tolerance) or self._tolerance is RESOLUTION:
+            return exact
+        forgiving = copy(self)
+        forgiving._near = True
+        found = forgiving.track(X_WT, seed)
+        error, _, angle = self._linearise(X_WT, np.array(found.q))
+        return replace(found, position_error=float(np.linalg.norm(error[:3])), angle_error=angle)
+
+    @property
+    def tolerance(self) -> PoseTolerance:
+        """Of a goal."""
+        return self._tolerance
 
     def unit(self, joint: int) -> str:
         """Unit of the position of the solver's joint with this index."""
@@ -269,8 +344,21 @@ class InverseKinematics:
 
     def least_singular_value(self, q: npt.ArrayLike) -> float:
         """Of the tool's Jacobian over the solver's joints at `q` (n); metres and radians weighed alike."""
-        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
+        J = self._own(self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT))
         return float(np.linalg.svd(J, compute_uv=False)[-1])
+
+    def _put(self, q: Array, values: Array) -> None:
+        """Write the solver's joints (m), and those that mimic them, into q (n)."""
+        q[self._columns] = values
+        for k, leader, multiplier, offset in self._followers:
+            q[k] = multiplier * values[leader] + offset
+
+    def _own(self, whole: Array) -> Array:
+        """(6, m) The Jacobian over the solver's joints, with what mimics them, of that over all joints (6, n)."""
+        J = np.asfortranarray(whole[:, self._columns])
+        for k, leader, multiplier, _ in self._followers:
+            J[:, leader] += multiplier * whole[:, k]
+        return J
 
     def _solution(self, q: Array, position_error: float, angle_error: float) -> Solution:
         here = q[self._columns]
@@ -284,103 +372,19 @@ class InverseKinematics:
         turned = here - 2.0 * np.pi * np.round((here - seed[self._columns]) / (2.0 * np.pi))
         inside = self._turning & (turned >= self._lower) & (turned <= self._upper)
         q = np.array(solution.q)
-        q[self._columns] = np.where(inside, turned, here)
+        self._put(q, np.where(inside, turned, here))
         return replace(solution, q=frozen(q))
 
     def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
-        error, angle = _pose_error(X_WT, R, p, self._open)
-        J = np.asfortranarray(whole[:, self._columns])
-        if self._open == "spin":
-            z = X_WT.R[:, 2]
-            J[3:] -= np.outer(z, z @ J[3:])
+        error, free, angle = pose_error(X_WT, R, p, self._open, self._tolerance)
+        J = self._own(whole)
+        if free is not None:
+            J[3:] -= np.outer(free, free @ J[3:])
         elif self._open == "rotation":
             J[3:] = 0.0
+        if self._near:
+            forgive(error[:3], J[:3], self._tolerance.distance - POSITION_TOLERANCE)
+            angle = forgive(error[3:], J[3:], self._tolerance.rotation - ANGLE_TOLERANCE)
         return error, J, angle
-
-
-def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array, open_: Open) -> tuple[Array, float]:
-    """Pose error (6) in the world, without the part left open, and its angle [rad]."""
-    error = np.zeros(6)
-    error[:3] = X_WG.p - p_WT
-    if open_ == "nothing":
-        error[3:] = rotation_vector(X_WG.R @ R_WT.T)
-    elif open_ == "spin":
-        error[3:] = rotation_vector(pointed(R_WT, X_WG.R[:, 2]) @ R_WT.T)
-    x, y, z = error.tolist()[3:]
-    return error, math.sqrt(x * x + y * y + z * z)
-
-
-def pointed(R: Array, z: Array) -> Array:
-    """R (3, 3) after the smallest rotation that aligns its z axis with the unit vector `z` (3,)."""
-    axis, cosine = cross(R[:, 2], z), float(R[:, 2] @ z)
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return R if cosine > 0.0 else np.column_stack([R[:, 0], -R[:, 1], -R[:, 2]])
-    return np.asarray(matrix_from_axis_angle(axis / sine, math.atan2(sine, cosine)) @ R)
-
-
-def rotation_vector(R: Array) -> Array:
-    """log(R) (3,): axis times angle in [0, pi], of a rotation matrix (3, 3)."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()  # floats of Python: one by one they cost less than numpy's
-    x, y, z = zy - yz, xz - zx, yx - xy
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, 0.5 * (xx + yy + zz - 1.0))
-    if sine > 1e-7:
-        scale = 0.5 * angle / sine
-        return np.array([x * scale, y * scale, z * scale])
-    if angle < 1.0:
-        return np.array([x, y, z]) * 0.5
-    # Near pi the antisymmetric part vanishes; the axis is the largest column of R + I = 2 a a^T, normalised.
-    columns = R + np.eye(3)
-    axis = columns[:, int(np.argmax(np.diag(columns)))]
-    return np.asarray(axis / np.linalg.norm(axis) * angle)
-
-
-def solve_kernel(module: str = "numpy.linalg._umath_linalg") -> Solve:
-    """The kernel of numpy's `solve` (n, n), (n) -> (n) without its checks, which are a sixth of the cost of an attempt.
-
-    It is private to numpy: `solve` itself where it is missing, fails, or gives other bits.
-    """
-    H, b = np.array([[3.0, 1.0, 0.3], [1.0, 2.0, 0.1], [0.3, 0.1, 1.7]]), np.array([0.1, 0.7, -1.3])
-    try:
-        kernel: Solve = importlib.import_module(module).solve1
-        same = kernel(H, b).tobytes() == np.linalg.solve(H, b).tobytes()
-    except Exception:  # noqa: BLE001 - whatever a private function does in other versions
-        return np.linalg.solve
-    return kernel if same else np.linalg.solve
-
-
-_solve = solve_kernel()  # of a matrix that is positive definite
-
-
-def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array) -> Array:
-    """The step dq (m); 0 for joints that are held at their limits."""
-    n = len(q)
-    H = J.T @ J
-    H.flat[:: n + 1] += damping
-    gradient = J.T @ error
-    step: Array = _solve(H, gradient)
-    if not _outward(q, step, lower, upper):
-        return np.asarray(step)
-    held = np.zeros(n, dtype=bool)
-    for _ in range(n):
-        outward = ((q <= lower) & (step < 0.0)) | ((q >= upper) & (step > 0.0))
-        if not outward.any():
-            break
-        held |= outward
-        free = np.flatnonzero(~held)
-        step = np.zeros(n)
-        if not len(free):
-            break
-        step[free] = _solve(H[free[:, None], free], gradient[free])
-    return np.asarray(step)
-
-
-def _outward(q: Array, step: npt.NDArray[np.floating], lower: Array, upper: Array) -> bool:
-    """Whether a joint at its limit would be pushed further out; for a few joints quicker than with arrays."""
-    for x, dx, low, high in zip(q.tolist(), step.tolist(), lower.tolist(), upper.tolist(), strict=True):
-        if (dx < 0.0 and x <= low) or (dx > 0.0 and x >= high):
-            return True
-    return False

@@ -17,9 +17,9 @@ from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
 from manipcli.plan.attachment import attached, freed
 from manipcli.plan.blind_grasp import blindly_closed
-from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, line_blocked, refusing, tried
+from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
 from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values
-from manipcli.plan.inverse_kinematics import InverseKinematics, Open
+from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
@@ -28,6 +28,7 @@ from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
+from manipcli.plan.pose_error import Leaving
 from manipcli.plan.prediction import carried_along, spilled
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import JointTrajectory
@@ -68,6 +69,10 @@ class MotionBuilder:
         other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
+
+    def adopt(self, other: MotionBuilder) -> None:
+        """Continue where a copy has led."""
+        self._motions, self._now = other._motions, other._now
 
     def let_go(self, posture: str) -> PlanningState:
         """The present state with the hand at a pose and empty; collisions are not checked."""
@@ -116,7 +121,7 @@ class MotionBuilder:
         hand: str | None = None,
         free: bool = False,
         searched: bool = True,
-        leaving: Open = "nothing",
+        leaving: Leaving = "nothing",
         avoid: Sequence[Array] = (),
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
@@ -134,32 +139,18 @@ class MotionBuilder:
         limits = self._limits(solver.joints, speed)
 
         def goals(rng: np.random.Generator) -> Array:
-            return branches(solver, X_WT, goal, rng, query=self._query(), limits=limits)
+            return branches(solver, X_WT, goal, rng, query=self.query(), limits=limits)
 
         self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=X_WT)
 
-    def carry(self, label: str, X_WT: Transform, *, speed: float) -> None:
-        """Move the tool, with what it holds, on a straight line to a pose; where that is not free, around obstacles.
-
-        What has contents stays upright there, too, see `motion_constraints`.
-        """
-        planner = self._planner
-        search = None if self._now.carried is None else planner.searching(obstructed=False)
-        if search is None or line_blocked(planner, self._now, X_WT, self._query()) is None:
-            try:
-                return self.straight(label, X_WT, speed=speed)
-            except NotPlannable:
-                if self._now.carried is None or planner.searching() is None:
-                    raise
-        try:
-            self.reach(label, X_WT, speed=speed)
-        except NotPlannable as other:
-            if other.reason == "in_the_way":
-                raise
-            self.straight(label, X_WT, speed=speed)  # for its refusal
-
     def straight(
-        self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
+        self,
+        label: str,
+        X_WT: Transform,
+        *,
+        speed: float,
+        allowed: Pairs = NOTHING,
+        leaving: Leaving = "nothing",
     ) -> None:
         """Move the tool on a straight line to a pose; part of the orientation may be left open along the whole line.
 
@@ -170,7 +161,7 @@ class MotionBuilder:
             trajectory = self._timed(label, walk, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
 
-    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Open = "nothing") -> None:
+    def along(self, label: str, poses: Sequence[Transform], *, speed: float, leaving: Leaving = "nothing") -> None:
         """Move the tool through near poses, from the present one; part of the orientation may be left open."""
         with self._labelled(label):
             walk = partial(follow_poses, q=self._now.position, poses=poses)
@@ -267,7 +258,7 @@ class MotionBuilder:
             )
         stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
         try:
-            refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), CLOSING, None, stopped)
+            refuse_collision(planner, self._now, self.query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
             raise refusal.but(hint=roomier or None) from refusal
         X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
@@ -326,10 +317,11 @@ class MotionBuilder:
         """Collision-free position (n) with the tool at `X_WT`, and the hand where `grip` moves it."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        refuse = refusing(planner, self._query(), seed, free=free, avoid=avoid)
+        refuse = refusing(planner, self.query(), seed, free=free, avoid=avoid)
         return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
-    def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
+    def query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
+        """What the next motion must not touch, but for these pairs."""
         return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
@@ -346,7 +338,7 @@ class MotionBuilder:
 
         `line`: the tool pose at the target, if the arm may arrive there in another configuration.
         """
-        query, end = self._query(), self._with(limits.names, target)
+        query, end = self.query(), self._with(limits.names, target)
         with self._labelled(label):
             straight = timed.straight_motion(self._planner, self._now, label, limits, end, query=query, line=line)
         free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals, end)
@@ -355,7 +347,7 @@ class MotionBuilder:
             self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)
 
     def _timed(
-        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+        self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Leaving = "nothing"
     ) -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
         return timed.tool_motion(self._planner, self._now, label, limits, walk, insist=insist, leaving=leaving)
@@ -364,7 +356,7 @@ class MotionBuilder:
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
         """Accept a motion if it is free of collisions."""
-        query, move = self._query(allowed), self._verb == "move"
+        query, move = self.query(allowed), self._verb == "move"
         with tried(*self._motions, Motion(label, trajectory, None, 0.0, begins=self._now)):
             refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         self._accept(label, trajectory, grip, allowed=allowed)

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
-from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics, rotation_vector
+from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics
+from manipcli.plan.pose_error import rotation_vector
 
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
@@ -105,12 +106,12 @@ def follow_poses(
     for before, X_WT in pairwise(poses):
         walked += float(np.linalg.norm(X_WT.p - before.p))
         turned += float(np.linalg.norm(rotation_vector(before.R.T @ X_WT.R)))
-        found = solver.track(X_WT, q)
+        found = solver.near(X_WT, q)
         rotated = f" and {np.degrees(turned):.0f} deg" if turned > ANGLE_TOLERANCE else ""
         where = f"after {walked * 1000.0:.0f} mm{rotated}"
-        if not found.converged:
+        if not (found.converged or found.within(solver.tolerance)):
             raise NotPlannable(
-                f"the {shape} is unreachable {where}: {found.explain()}",
+                f"the {shape} is unreachable {where}: {found.explain(solver.tolerance)}",
                 hint=f"{otherwise}, make it shorter, or use `path: free`",
                 reason="line",
             )

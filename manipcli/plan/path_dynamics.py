@@ -50,7 +50,7 @@ class PathDynamics:
         return with_joints(self._robot, self._rest, self._names, q)
 
     def _padded(self, rates: Array) -> Array:
-        return with_joints(self._robot, np.zeros_like(self._rest), self._names, rates)
+        return with_joints(self._robot, np.zeros_like(self._rest), self._names, rates, rates=True)
 
 
 def _loaded(planner: Planner, state: PlanningState) -> Kinematics:

@@ -9,7 +9,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.model.collision import RESOLUTION, CollisionHit, CollisionQuery
-from manipcli.model.configuration import with_mimics
+from manipcli.model.configuration import leads, with_mimics
 from manipcli.model.edge_check import EdgeCheck
 from manipcli.plan.hand import ramp
 from manipcli.plan.motion import Grip, PlanningState
@@ -48,6 +48,8 @@ def swept(
         columns = robot.indices(trajectory.names)
         positions[:, columns] = trajectory.positions[-1]
         positions[: len(trajectory.times), columns] = trajectory.positions
+        if leads(robot, trajectory.names):
+            positions = np.array(with_mimics(robot, positions))
     if grip is not None:
         columns = robot.indices(grip.joints)
         positions[:, columns] = ramp(state.position[columns], grip.target, speed * times)

@@ -13,8 +13,8 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
-from manipcli.plan.inverse_kinematics import rotation_vector
 from manipcli.plan.path import ANGULAR_STEP, LINEAR_STEP
+from manipcli.plan.pose_error import rotation_vector
 
 _FEWEST: Final = 12  # points on an arc
 _FINE: Final = 100  # points on a rounded corner, before they are spaced evenly

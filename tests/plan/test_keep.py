@@ -14,6 +14,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.plan import constrained_motion, free_motion, kept_path, kept_problem
 from manipcli.plan.candidates import first
+from manipcli.plan.carrying import carry
 from manipcli.plan.keep import Kept, reserving
 from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -266,11 +267,12 @@ def test_a_cup_with_contents_is_carried_upright_around_an_obstacle(bench: Callab
     searching = told.planner.searching_paths()
     assert searching is not None
     builder = MotionBuilder(searching, told.now)
-    builder.carry("carry", Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now), speed=0.5)
-    (carry,) = builder.plan().motions
-    assert carry.label == "carry" and carry.trajectory is not None
-    q = np.tile(told.now.position, (len(carry.trajectory.positions), 1))
-    q[:, told.robot.indices(carry.trajectory.names)] = carry.trajectory.positions
+    X_WT = Transform.of(xyz=(0.0, 0.6, 0.0)) @ told.planner.tool_pose(told.now)
+    carry(searching, builder, "carry", X_WT, speed=0.5)
+    (moved,) = builder.plan().motions
+    assert moved.label == "carry" and moved.trajectory is not None
+    q = np.tile(told.now.position, (len(moved.trajectory.positions), 1))
+    q[:, told.robot.indices(moved.trajectory.names)] = moved.trajectory.positions
     X_TO = np.linalg.inv(told.tool(told.now.position)) @ told.body("cup").matrix
     X_WO = np.array([told.tool(row) @ X_TO for row in q[::10]])
     assert tilt(X_WO) <= 20.0

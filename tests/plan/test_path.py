@@ -10,10 +10,11 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
+from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limit_check import verify
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import follow_poses, interpolate, joint_path, linear_path
+from manipcli.plan.pose_error import rotation_vector
 from manipcli.plan.retimer import retime
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))

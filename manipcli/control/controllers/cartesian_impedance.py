@@ -48,7 +48,7 @@ from manipcli.description.elements import JointLimits, JointType
 from manipcli.description.transmission import Compat
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.plan.inverse_kinematics import rotation_vector
+from manipcli.plan.pose_error import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.base import Model
 from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, Interface, Role

@@ -4,6 +4,7 @@
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, velocity_scaling: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
 - move: {point: [0.4, 0.1, 0.3], pointing: [0, 0, -1]}
+- move: {pose: {xyz: [0.4, 0.2, 0.3], rpy: [180 deg, 0, 0]}, tolerance: {distance: 1 mm, about: {axis: z}}}
 - move: {pose: {xyz: [0.4, 0.2, 0.3], rpy: [180 deg, 0, 0]}, path: {arc: {via: [0.5, 0.1, 0.4]}}}
 - move: {point: [0.4, 0.2, 0.3], path: {via: [{xyz: [0.4, 0, 0.3], radius: 5 cm}]}}
 - move: {pose: {xyz: [0, 0, 12 cm]}, frame: tool, path: linear, touch: [box]}
@@ -25,13 +26,14 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
-from manipcli.plan.inverse_kinematics import Open, pointed
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import NOTHING, Planner
+from manipcli.plan.pose_error import Leaving, Open, pointed
 from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import StepMember
+from manipcli.plan.tolerance_spec import ToleranceSpec
 from manipcli.plan.tool_path import arc, blended
 from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
@@ -105,6 +107,9 @@ class MoveSpec(Model):
     pointing: tuple[float, float, float] | None = Field(
         None, description="With `point`: the direction of the tool's z axis, in `frame`. Default: any."
     )
+    tolerance: ToleranceSpec | None = Field(
+        None, description="How far from the `pose` or `point` the tool may be. Default: 0.1 mm and 1 mrad."
+    )
     frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
     path: Literal["free", "joint", "linear"] | ToolPathSpec = Field(
         "free",
@@ -141,6 +146,12 @@ class MoveSpec(Model):
         if self.to is not None and self.frame != "world":
             message = "`frame` applies to a tool `pose` or `point`, not to a named pose or joint positions"
             raise problem("conflict", message, at=("frame",), hint="remove `frame`", key=True)
+        if self.to is not None and self.tolerance is not None:
+            message = "`tolerance` applies to a tool `pose` or `point`, not to a named pose or joint positions"
+            raise problem("conflict", message, at=("tolerance",), hint="remove `tolerance`", key=True)
+        if self.point is not None and self.tolerance is not None and self.tolerance.about is not None:
+            message = "`about` applies to a `pose`; a `point` leaves the rotation open, with `pointing` that about z"
+            raise problem("conflict", message, at=("tolerance", "about"), hint="remove `about`", key=True)
         if self.pointing is not None and self.point is None:
             message = "`pointing` needs a `point`; a `pose` already sets the whole orientation"
             raise problem("conflict", message, at=("pointing",), hint="remove `pointing`", key=True)
@@ -215,9 +226,15 @@ def _plan(spec: MoveSpec, planner: Planner, state: PlanningState, *, avoid: Sequ
     return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded),), end)
 
 
-def _goal(spec: MoveSpec, planner: Planner, state: PlanningState) -> tuple[Transform, Open]:
-    """X_WT, and the open part of its orientation, which is as now, or the nearest that points as requested."""
+def _goal(spec: MoveSpec, planner: Planner, state: PlanningState) -> tuple[Transform, Leaving]:
+    """X_WT, and the open part of its orientation, with the tolerance if one is stated."""
     X_WF = planner.frame(spec.frame, state)
+    X_WT, open_ = _target(spec, X_WF, planner, state)
+    return X_WT, open_ if spec.tolerance is None else spec.tolerance.of(X_WF, X_WT, open_)
+
+
+def _target(spec: MoveSpec, X_WF: Transform, planner: Planner, state: PlanningState) -> tuple[Transform, Open]:
+    """X_WT, and the open part of its orientation, which is as now, or the nearest that points as requested."""
     if spec.pose is not None:
         return X_WF @ spec.pose.transform, "nothing"
     R = planner.tool_pose(state).R

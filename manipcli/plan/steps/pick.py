@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar, get_args
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
@@ -30,14 +30,15 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, NOTHING, Planner
 from manipcli.plan.ranges import Range, spread
+from manipcli.plan.reached_frames import reached_frames
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
-from manipcli.spec.base import Model
-from manipcli.spec.quantity import Length, Turn
+from manipcli.spec.base import Model, problem
+from manipcli.spec.quantity import Angle, Length, Turn
 
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Candidate slopes of the straight approach: along the hand's axis, or from above it, which folds the arm less."""
@@ -49,6 +50,8 @@ FEW = 8
 """Restarts of the inverse kinematics for a further frame, of which there are many."""
 BRANCHES = 6
 """Maximum number of frames that are tried in another configuration of the arm, if it cannot follow the approach."""
+LEVEL = 1e-6
+"""[rad] A pitch this near to 0 or 90 deg is one from the side or from the top."""
 
 WEAK = 6
 """Grasps that seem unable to hold the weight are tried last, and at once after so many of them."""
@@ -79,11 +82,26 @@ class ApproachSpec(Model):
         description="Direction of the approach about the vertical [rad]; from the top: the yaw of the hand. Default: "
         "away from the robot's base; from the top: the yaw of the object, plus quarter turns.",
     )
+    pitch: Annotated[Angle, Field(ge=-math.pi / 2, le=math.pi / 2)] | None = Field(
+        None,
+        description="Angle of the approach below the horizontal, instead of `from` [rad]: 0 is `from: side`, 90 deg is "
+        "`from: top`.",
+    )
     distance: Annotated[Range, Field(description="Length of the straight approach [m].")] = (0.08, 0.14)
+
+    @model_validator(mode="after")
+    def _one(self) -> ApproachSpec:
+        if self.from_ is not None and self.pitch is not None:
+            message = f"`pitch` and `from: {self.from_}` both set the angle of the approach"
+            raise problem("conflict", message, at=("pitch",), hint="remove one of them", key=True)
+        return self
 
     @property
     def direction(self) -> Direction | None:
-        """From where the hand comes; None if not set."""
+        """From where the hand comes; None if not set, or at an angle."""
+        if self.pitch is not None:
+            level, down = abs(self.pitch) < LEVEL, abs(self.pitch - math.pi / 2) < LEVEL
+            return "side" if level else "top" if down else None
         return "side" if self.from_ is None and self.yaw is not None else self.from_
 
 
@@ -104,7 +122,8 @@ class PickSpec(Model):
     The tool's +z is the direction of approach, its y the direction in which the fingers close. If a later step cannot
     be planned with this grasp, other grasps are tried, as far as `approach` and `height` leave them open: with the hand
     rotated by half a turn, from above, from the other sides, sloping from above, higher and lower, with other rolls of
-    the hand; at a mesh also at opposite points of its surface.
+    the hand; at a mesh also at opposite points of its surface. An arm of four or five joints also tries each pitch
+    between side and top at the yaw that it has there.
     """
 
     renamed: ClassVar = RENAMED
@@ -133,6 +152,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     frames = GraspFrames(
         body, planner.body_pose(state, spec.object), planner.robot.X_WB, planner.tool_pose(state).R,
         direction=spec.approach.direction, yaw=spec.approach.yaw, height=spec.grasp.height,
+        pitch=None if spec.approach.direction is not None else spec.approach.pitch,
     )  # fmt: skip
     fingerless = handless(planner.robot, spec.grasp.posture)
     touching = planner.hand_contacts(spec.object) if fingerless else NOTHING
@@ -142,6 +162,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     unlikely: set[GraspFrame] = set()  # no approach to these was within reach so far
     attempts = 0
     weak: list[Candidate] = []
+    starts: list[tuple[float, Transform]] = []  # of approaches, out of reach
 
     def attempt(frame: GraspFrame, distance: float, slope: float, further: bool, avoid: Array | None) -> StepPlan:
         nonlocal attempts
@@ -167,9 +188,16 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
                     hand=spec.open,
                     avoid=() if avoid is None else (avoid,),
                 )
-            except NotPlannable:
+            except NotPlannable as far:
                 unlikely.add(frame)
-                raise
+                if far.reason not in ("reach", "orientation"):
+                    raise
+                starts.append((distance, before_approach))
+                where = f"reach: the approach of {readable(distance, 'm')} starts out of reach: "
+                raise far.but(
+                    cause=where + far.cause.removeprefix("reach: "),
+                    hint=_shorter(spec.object, distance, before_approach),
+                ) from far
         try:
             builder.straight("approach", frame.X_WT, speed=spec.velocity_scaling / 2, allowed=touching)
             if fingerless:
@@ -226,6 +254,12 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         if fingerless or (not touched() and _beyond(planner, state, usual[0].X_WT)):
             return  # no other orientation is nearer
         overlapping = overlaps(planner, state, spec.object, spec.open)
+        reached = reached_frames(frames, planner.solver, state.position, planner.rng)
+        for frame in reached:
+            if overlapping(frame.X_WT):
+                continue
+            for distance, slope in itertools.product(spread(spec.approach.distance), slopes()):
+                yield candidate(frame, distance, slope)
         for frame in first_fitting(frames.further(), lambda X_WT: not overlapping(X_WT), FURTHER):
             for distance, slope in _brief(spec.approach.distance):
                 if attempts >= ATTEMPTS:
@@ -241,11 +275,19 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             return refusal
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
-        hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
+        nearer = _shorter(spec.object, *min(starts, key=lambda start: start[0])) if starts else None
+        hints = dict.fromkeys(hint for hint in (amiss or wide, nearer, refusal.hint) if hint is not None)
         # An earlier step may have put the object where it cannot be picked.
         return refusal.but(hint="; or ".join(hints) or None, parts=refusal.parts | {spec.object})
 
     return Candidates(options(), what=f"cannot pick '{spec.object}'", decides="grasp", explain=explain)
+
+
+def _shorter(body: str, distance: float, X_WT: Transform) -> str:
+    """The hint for an approach that starts out of reach of an arm that reaches the object."""
+    x, y, z = X_WT.p
+    where = f"({x:.3f}, {y:.3f}, {z:.3f}) m, {readable(distance, 'm')} before it"
+    return f"shorten `approach: {{distance: ...}}`: the arm reaches '{body}', but not the start at {where}"
 
 
 def _brief(distance: Range) -> tuple[tuple[float, float], ...]:

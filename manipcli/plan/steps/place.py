@@ -24,6 +24,7 @@ from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
+from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.free_motion import line_blocked
 from manipcli.plan.motion import PlanningState, StepPlan
@@ -61,6 +62,8 @@ _LOWER = (
     "else place it elsewhere, `at: [x, y]`, or rotate it, `yaw: ...`"
 )
 _WITHIN = "place it within reach, `at: [x, y]`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
+_LOWER_FROM = "lower it from less high, `clearance: ...`: the arm reaches the place, but not {}"
+_RETREAT = "withdraw the hand less, `retreat: ...`"
 _ROOMIER = "place it where the opening fingers have room, rotate it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
@@ -100,7 +103,11 @@ class PlaceSpec(Model):
         None,
         description="Where on the body `onto` it may stand, instead of `at`; the nearest to its centre is tried first.",
     )
-    yaw: Turn | None = Field(None, description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held.")
+    yaw: Turn | None = Field(
+        None,
+        description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held, or as an arm of few joints "
+        "can reach.",
+    )
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The named pose to which the hand opens.")
@@ -116,7 +123,9 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
     what = f"cannot place '{spec.object}'"
     if spec.region is None:
         X_WG = _goal(spec, planner, state)
-        return Candidates(_ways(spec, planner, state, X_WG), what=what, decides="place")
+        held_back: list[NotPlannable] = []
+        explain = partial(_explained, spec, planner, state, X_WG, held_back)
+        return Candidates(_at(spec, planner, state, X_WG, held_back), what=what, decides="place", explain=explain)
     region = spec.region.box
     _refuse_off_support(spec, planner, state, region)
 
@@ -137,9 +146,10 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
             if len(examined) == PLACES:
                 return
             share = np.subtract(at, region.centre) / np.maximum(region.size, 1e-9)
-            for way in itertools.islice(_ways(spec, planner, state, X_WG), WAYS):
-                plan, look = partial(examine, at, way.plan), partial(examine, at, way.look)
-                yield replace(way, name=f"{where}, {way.name}", place=share, plan=plan, look=look)
+            for X_WO in _yaws(spec, planner, state, X_WG):
+                for way in itertools.islice(_ways(spec, planner, state, X_WO, []), WAYS):
+                    plan, look = partial(examine, at, way.plan), partial(examine, at, way.look)
+                    yield replace(way, name=f"{where}, {way.name}", place=share, plan=plan, look=look)
 
     return Candidates(in_region(), what=what, decides="place")
 
@@ -191,10 +201,60 @@ def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     return standing(planner, state, spec.object, spec.onto, spec.at, spec.yaw)
 
 
-def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Candidate]:
+def _at(
+    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform, held_back: list[NotPlannable]
+) -> Iterator[Candidate]:
+    """The ways to set the object down at `X_WG`, then those at the yaw that an arm of few joints has there."""
+    for X_WO in _yaws(spec, planner, state, X_WG):
+        turned = "" if X_WO is X_WG else f"at a yaw of {math.degrees(X_WO.rpy[2]):.0f} deg, "
+        for way in _ways(spec, planner, state, X_WO, held_back):
+            yield replace(way, name=turned + way.name)
+
+
+def _explained(
+    spec: PlaceSpec,
+    planner: Planner,
+    state: PlanningState,
+    X_WG: Transform,
+    held_back: list[NotPlannable],
+    refusal: NotPlannable,
+) -> NotPlannable:
+    """The refusal, with hints if the arm reaches the place but not a point above it, or cannot withdraw from it."""
+    X_OT = planner.held_in_tool(state).inverse()
+
+    def reached(height: float) -> bool:
+        goals = [Transform.of(xyz=(0.0, 0.0, height)) @ X_WO @ X_OT for X_WO in _yaws(spec, planner, state, X_WG)]
+        return any(planner.solver.reachable(goal, state.position) for goal in goals)
+
+    hints = [_RETREAT] if held_back else []
+    high = next((height for height in spread(spec.clearance) if not reached(height)), None)
+    if high is not None and reached(0.0):
+        hints.insert(0, _LOWER_FROM.format(f"{readable(high, 'm')} above it"))
+    return refusal.but(hint="; or ".join(dict.fromkeys([*hints, *filter(None, [refusal.hint])])) or None)
+
+
+def _yaws(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Transform]:
+    """`X_WG`, and the same pose at the yaw that an arm of few joints has there, if no yaw is stated."""
+    yield X_WG
+    if not planner.solver.few or spec.yaw is not None or (spec.at == "start" and spec.region is None):
+        return
+    carried, tool = state.carried, planner.robot.tool
+    assert carried is not None and tool is not None  # `held` asks for it
+    solver = planner.solver.of(tool.X_LT @ planner.held_in_tool(state)).leaving("yaw")
+    try:
+        q = solver.solve(X_WG, state.position, planner.rng)
+    except NotPlannable:
+        return
+    yield Transform.of(xyz=X_WG.p, R=solver.forward(q).R)
+
+
+def _ways(
+    spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform, held_back: list[NotPlannable]
+) -> Iterator[Candidate]:
     """The ways to set the object down at `X_WG`.
 
-    The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`.
+    The object is placed upright; at [x, y] it keeps its yaw, or gets `yaw`. Withdrawals that the arm cannot follow are
+    appended to `held_back`.
 
     Paths on which the hand withdraws clear of the object are tried first, then those on which it may graze it; only the
     latter if the open hand is too near to it anyway, as around an object that sits deep in the hand. If the arm comes
@@ -225,7 +285,7 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
         X_WT = X_WL @ X_OT
         builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
-            builder.carry("carry", above(X_WL, clearance), speed=spec.velocity_scaling)
+            carry(planner, builder, "carry", above(X_WL, clearance), speed=spec.velocity_scaling)
         support = planner.touching(put(planner, builder.now, {spec.object: X_WL}), spec.object)
         with _hinted(_LOWER):
             builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
@@ -244,7 +304,14 @@ def _ways(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transfo
         with _hinted(_ROOMIER):
             builder.open(spec.posture, must_arrive=True)
         X_WT = planner.tool_pose(builder.now)
-        builder.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.velocity_scaling, grazing=grazing)
+        back = backed_off(X_WT, retreat, slope)
+        try:
+            builder.withdraw(back, spec.object, speed=spec.velocity_scaling, grazing=grazing)
+        except NotPlannable as refusal:
+            if refusal.reason != "line":
+                raise
+            held_back.append(refusal)
+            raise refusal.but(hint=_RETREAT) from refusal
         planned = builder.plan()
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}), placed=spec.object)
 

@@ -31,6 +31,7 @@ from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
+from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -93,7 +94,7 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         R_tilt = matrix_from_axis_angle(a, theta)
         p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, w) + R_WT0 @ X_TO.p)
         builder = MotionBuilder(planner, state, allowed=poured)
-        builder.carry("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
+        carry(planner, builder, "carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
         builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
         builder.dwell("dwell", spec.dwell)
         over = spec.tilt > math.pi / 2

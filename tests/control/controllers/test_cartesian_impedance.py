@@ -19,7 +19,7 @@ from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, matrix_from_axis_angle
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
-from manipcli.plan.inverse_kinematics import rotation_vector
+from manipcli.plan.pose_error import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.load import load_robot
 
