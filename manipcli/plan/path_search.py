@@ -25,6 +25,8 @@ from manipcli.spec.planner import PlannerSpec
 STEP = 2
 """A step may use this many times the samples of one search. Each search may use this part of what is left: all for the
 first candidate, half for the second, a quarter for the third."""
+TELLING = 0.05
+"""A search with a smaller share of the samples says nothing about the way: the refusal before it is repeated."""
 _UNLIMITED = np.pi  # rad or m beyond start and goals: samples of a joint without limits
 
 
@@ -36,7 +38,7 @@ class PathSearch:
     rng: np.random.Generator
     left: int
     failed: NotPlannable | None = None
-    """The latest refusal, which is repeated when no sample is left."""
+    """The latest refusal of a search with enough samples, which is repeated when fewer are left."""
 
     @staticmethod
     def of(spec: PlannerSpec, rng: np.random.Generator) -> PathSearch:
@@ -87,7 +89,8 @@ class PathSearch:
         found = member.make(settings).plan(problem, self.rng)
         if isinstance(found, PathFailure):
             self.left -= max(1, found.samples)
-            self.failed = self._refusal(space, found, keeps)
+            if self.failed is None or samples >= TELLING * self.spec.samples:
+                self.failed = self._refusal(space, found, keeps)
             raise self.failed
         return shortened(found, problem, self.rng, attempts=self.spec.shortcuts)
 

@@ -43,7 +43,7 @@ def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> s
         if isinstance(kind, type) and issubclass(kind, Model) and key in kind.renamed:
             return f"write `{kind.renamed[key]}`: `{key}` was renamed"
     for k in range(len(path) - 2, 0, -1):
-        if key in shape.keys_of(shape.at(model, path[:k], tags)):
+        if isinstance(path[k], str) and key in shape.keys_of(shape.at(model, path[:k], tags)):
             return f"put `{key}` next to `{path[k]}`, not inside it"
     known = shape.keys_of(shape.at(model, path[:-1], tags))
     inside = [name for name in known if key in shape.keys_of(shape.at(model, (*path[:-1], name), tags))]

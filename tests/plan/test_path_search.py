@@ -18,6 +18,7 @@ from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path_planners.ompl import OmplSpec
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
+from manipcli.plan.path_search import PathSearch
 from manipcli.plan.planner import CLEARANCE
 from manipcli.plan.steps import STEPS
 from manipcli.plan.sweep import swept
@@ -211,3 +212,19 @@ def test_a_line_that_is_surely_blocked_is_refused_by_its_plan_too(divided: Bench
                 assert look is None
     assert 0 < blocked < 18
     assert seen >= 0.8 * blocked
+
+
+def test_a_search_with_hardly_a_sample_left_repeats_what_one_with_enough_said(divided: Bench) -> None:
+    planner, state = divided.planner, divided.now
+    search = PathSearch.of(RrtConnectSpec(samples=40, range=0.01), np.random.default_rng(0))
+    arm = tuple(f"panda_joint{k}" for k in range(1, 8))
+    goal = np.array(state.position[list(planner.robot.indices(arm))])
+    goal[0] += 2 * TURN
+    told = []
+    while search.left > 0:
+        with pytest.raises(NotPlannable) as refusal:
+            search.path(planner.robot, state, planner.query(state), arm, goal[None], None)
+        told.append(int(refusal.value.cause.partition("within ")[2].partition(" sample")[0]))
+    assert told[:2] == [40, 20]
+    assert len(told) > 5
+    assert min(told) >= 2

@@ -279,3 +279,10 @@ def test_a_joint_that_stands_twice_is_told_without_a_robot() -> None:
     (finding,) = error.value.findings
     assert (finding.code, str(finding.place)) == ("CTRL210", "c.yaml:2:54")
     assert finding.message == "controllers.js.joints[2]: duplicate joint 'a'"
+
+
+def test_a_key_is_not_told_to_stand_next_to_a_number_of_a_list() -> None:
+    hint = told("steps: [wait: 1 s]\nexpect: [{duration: {below: 1 s}}, {never: {tool_speed: {above: 0.2}}}]").hint
+    assert hint is not None
+    assert "next to" not in hint
+    assert "below" in hint
