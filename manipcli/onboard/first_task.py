@@ -18,7 +18,7 @@ from manipcli.core.units import readable
 from manipcli.model.kinematics import Kinematics
 from manipcli.onboard.home import HomeSearch
 from manipcli.onboard.reachable import Spots, reachable_spots
-from manipcli.onboard.robot_draft import BLOCK, RobotDraft
+from manipcli.onboard.robot_draft import BLOCK, NOTHING_TO_HOLD_WITH, RobotDraft
 from manipcli.onboard.writer import Entry, Value, written
 from manipcli.task.load_task import LoadOptions
 
@@ -163,10 +163,13 @@ class TaskSearch:
         arm, frame = draft.parts.arm, draft.frame
         if arm is None or frame is None or draft.parts.hand is None:
             return
+        if not any(draft.robot.link(link).collisions for branch in draft.parts.hand.branches for link in branch):
+            self._causes.append(NOTHING_TO_HOLD_WITH)
+            return
         edge = block_edge(frame.narrowest, frame.widest)
         if edge is None:
             self._causes.append(
-                f"the finger tips are {readable(frame.narrowest, 'm')} to {readable(frame.widest, 'm')} apart"
+                f"between the fingers there are only {readable(frame.narrowest, 'm')} to {readable(frame.widest, 'm')}"
             )
             return
         assert draft.search is not None
