@@ -28,6 +28,9 @@ MARGIN: Final = 0.12
 """[m] of a desk around the places on it."""
 DENSITY: Final = 500.0
 """[kg/m3] of the block: wood."""
+UNDONE: Final = 0.25
+"""Share of its way that a hand may miss from closed."""
+LEAST_UNDONE: Final = {"rad": 0.09, "m": 0.003}
 MOVES: Final = 12
 """Pairs of poses that are tried."""
 
@@ -88,13 +91,16 @@ class TaskSearch:
         self._causes: list[str] = []
 
     def unsteady(self) -> str | None:
-        """Why the robot does not hold still with these controllers; None if it does."""
+        """Why the robot does not hold still with these controllers, or a hand alone does not close; None if it does."""
         self._causes.clear()
-        candidate = self._waits()
-        self._progress("holding still: a run")
-        if not self._plans(candidate) or self._passes(candidate):
-            return None  # a task without a plan is not the fault of controllers
-        return self._causes[-1]
+        candidates = [self._waits()]
+        if self._draft.parts.arm is None:
+            candidates += self._closes()
+        for candidate in candidates:
+            self._progress(f"{candidate.does}: a run")
+            if self._plans(candidate) and not self._passes(candidate):
+                return self._causes[-1]  # a task without a plan is not the fault of controllers
+        return None
 
     def search(self) -> FirstTask:
         """The most ambitious task that passes: pick and place, else moves, else open and close."""
@@ -212,16 +218,27 @@ class TaskSearch:
         if self._draft.parts.hand is None:
             return
         robot, hand = self._draft.robot, self._draft.parts.hand
+        group = self._draft.hand_name
         units = {robot.joint(name).unit for name in hand.joints}
         within: dict[str, Value] = {}
-        if "rad" in units:
-            within["within"] = "5 deg"
-        if "m" in units:
-            within["slide"] = "3 mm"
+        nearly: dict[str, Value] = {}  # closed fingers rest on each other, but have gone most of the way
+        closure = self._draft.closure
+        assert closure is not None
+        travel = np.abs(closure.opened - closure.closed)
+        for unit, field, near in (("rad", "within", "5 deg"), ("m", "slide", "3 mm")):
+            if unit in units:
+                within[field] = near
+                ways = [way for name, way in zip(hand.joints, travel, strict=True) if robot.joint(name).unit == unit]
+                nearly[field] = f"{float(f'{max(UNDONE * max(ways), LEAST_UNDONE[unit]):.2g}'):g} {unit}"
         entries = {
             **_head("open_close", "The hand closes and opens."),
             "steps": Entry([{"move": {"to": "closed"}}, {"move": {"to": "open"}}]),
-            "expect": Entry([{"at_pose": {"pose": "open", "group": self._draft.hand_name, **within}}]),
+            "expect": Entry(
+                [
+                    {"at_pose": {"pose": "closed", "group": group, **nearly}, "at": "move_1"},
+                    {"at_pose": {"pose": "open", "group": group, **within}},
+                ]
+            ),
         }
         yield _Candidate("open_close", entries, "the hand closes and opens", {})
 

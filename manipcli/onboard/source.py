@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed, number_of
@@ -18,10 +19,13 @@ from manipcli.model.build_robot import build_robot
 from manipcli.model.inertials import massless_bodies
 from manipcli.model.robot import RobotModel
 from manipcli.onboard.writer import Entry, plain
+from manipcli.spec.inertials import WATER
 from manipcli.spec.load import read_bytes
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Plain
 
+TOO_HEAVY: Final = "URDF112"
+"""Code of the check for links that are denser than any metal."""
 GENERIC = ("robot", "model", "urdf", "description")
 """Names of files that do not name a robot."""
 
@@ -68,7 +72,7 @@ def read_source(
     """
     path = _located(description, package_path)
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    checked = tuple(check for check in CHECKS if check.severity == "error")
+    checked = tuple(check for check in CHECKS if check.severity == "error" or check.code == TOO_HEAVY)
     examination = examine(path, packages=packages, arguments=arguments, checks=checked)
     parts = examination.parts
     if parts is None:
@@ -161,10 +165,17 @@ def _mended(parts: Parts, findings: Sequence[Diagnostic]) -> tuple[dict[str, Ent
     unusable = [link.name for link in parts.links if link.unusable is not None]
     massive = {link.name for link in parts.links if link.inertial is not None}
     massless = sorted(massless_bodies(parts.joints, massive))
-    if unusable or massless:
-        lacking = list(dict.fromkeys((*unusable, *massless)))
+    heavy = [
+        name for name in _named(finding for finding in findings if finding.code == TOO_HEAVY) if name not in unusable
+    ]
+    if unusable or massless or heavy:
+        lacking = list(dict.fromkeys((*unusable, *massless, *heavy)))
         why = f"missing or impossible in the description: {listed(lacking, most=6)}; from the volume of their shapes"
-        found["inertials"] = Entry("estimate", f"{why}, as heavy as water", True)
+        estimate: Plain = "estimate"
+        if heavy:
+            estimate = {"estimate": {}, "links": {name: {"density": WATER} for name in heavy}}
+            why = why.replace(";", ", or denser than any metal;", 1)
+        found["inertials"] = Entry(estimate, f"{why}, as heavy as water", True)
         notes.append(
             f"inertials of {number_of(len(lacking), 'link')} are estimated; `manipcli check robot.yaml` shows the table"
         )
@@ -176,12 +187,12 @@ def _mended(parts: Parts, findings: Sequence[Diagnostic]) -> tuple[dict[str, Ent
         if bare:
             why += f", or by none: {listed(bare)} without contacts"
         found["collision"] = Entry(rows, why, True)
-        lost = sorted({*_files(finding for link in missing for finding in link.missing)})
-        unseen = {*_files(finding for finding in findings if finding.code == MISSING_VISUAL)}
+        lost = sorted({*_named(finding for link in missing for finding in link.missing)})
+        unseen = {*_named(finding for finding in findings if finding.code == MISSING_VISUAL)}
         partial = [
             link.name
             for link in missing
-            if rows[link.name] == "from_visual" and unseen.intersection(_files(link.missing))
+            if rows[link.name] == "from_visual" and unseen.intersection(_named(link.missing))
         ]
         notes.append(
             f"{len(lost)} of its collision meshes are not found or unusable: {listed(lost, most=6)}; add them (where: "
@@ -200,7 +211,7 @@ def _mended(parts: Parts, findings: Sequence[Diagnostic]) -> tuple[dict[str, Ent
     return found, notes
 
 
-def _files(findings: Iterable[Diagnostic]) -> Iterator[str]:
-    """The files that these findings name."""
+def _named(findings: Iterable[Diagnostic]) -> Iterator[str]:
+    """What these findings name first: files, or links."""
     for finding in findings:
         yield finding.message.partition("'")[2].partition("'")[0]

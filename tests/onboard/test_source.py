@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from manipcli.onboard.first_task import FirstTask
 from manipcli.onboard.source import read_source
 from manipcli.onboard.summary import summary
@@ -42,3 +44,15 @@ def test_the_same_evidence_is_told_once() -> None:
     lines = list(summary(found=(), checks=[("a", "why"), ("b", ""), ("c", "other")], notes=(), task=task))
     assert "  a, b: why" in lines
     assert "  c: other" in lines
+
+
+def test_a_link_denser_than_metal_is_estimated(tmp_path: Path) -> None:
+    text = small.robot(small.arm(LINKS)).replace('<mass value="0.5"/>', '<mass value="5000"/>', 3)
+    (tmp_path / "small.urdf").write_text(text)
+    source = read_source(str(tmp_path / "small.urdf"), {}, tmp_path, package_path=(), allow_outside=False)
+    rows = {name: {"density": 1000.0} for name in ("l1", "l2")}  # the base, 0.1 m wide, is as dense as this allows
+    inertials = source.entries["inertials"]
+    assert inertials.value["links"].keys() >= rows.keys()
+    assert inertials.check and "denser than any metal" in inertials.why
+    volume = (0.2 - 0.08) * 0.05 * 0.05
+    assert source.robot.link("l2").inertial.mass == pytest.approx(1000.0 * volume, rel=0.01)
