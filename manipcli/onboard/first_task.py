@@ -28,8 +28,8 @@ MARGIN: Final = 0.12
 """[m] of a desk around the places on it."""
 DENSITY: Final = 500.0
 """[kg/m3] of the block: wood."""
-UNDONE: Final = 0.25
-"""Share of its way that a hand may miss from closed."""
+UNDONE: Final = 0.4
+"""Share of its way that a hand may miss from closed: fingers that come to rest on each other."""
 LEAST_UNDONE: Final = {"rad": 0.09, "m": 0.003}
 MOVES: Final = 12
 """Pairs of poses that are tried."""
