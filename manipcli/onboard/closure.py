@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array
-from manipcli.core.units import readable
 from manipcli.model.configuration import with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.onboard.parts import Hand
@@ -48,13 +47,15 @@ class Closure:
         out: (3,) unit vector in the palm's frame, from the palm to the finger tips.
         fingers: links of each finger, those of a linkage left out.
         evidence: why.
+        measured: on shapes; without any, which end opens the hand is only plausible.
     """
 
     opened: Array
     closed: Array
     out: Array
     fingers: tuple[tuple[str, ...], ...]
-    evidence: str
+    evidence: str = ""
+    measured: bool = True
 
 
 class HandShape:
@@ -187,7 +188,7 @@ def _ends(shape: HandShape, rest: Array, lower: Array, upper: Array) -> Closure:
     opened = np.where(idle, rest, np.where(upwards, lower, upper))
     closed = np.where(idle, rest, np.where(upwards, upper, lower))
     out = _outward(shape, fingers, opened, (opened + closed) / 2.0)
-    return Closure(opened, closed, out, fingers, _evidence(shape, fingers, opened, closed))
+    return Closure(opened, closed, out, fingers)
 
 
 def knuckles_only(shape: HandShape, closure: Closure) -> Closure | None:
@@ -206,12 +207,7 @@ def knuckles_only(shape: HandShape, closure: Closure) -> Closure | None:
     if not below:
         return None
     closed = np.where([name in below for name in joints], closure.opened, closure.closed)
-    return replace(closure, closed=closed, evidence=_evidence(shape, closure.fingers, closure.opened, closed))
-
-
-def _evidence(shape: HandShape, fingers: tuple[tuple[str, ...], ...], opened: Array, closed: Array) -> str:
-    wide, narrow = (tip_distance(shape, fingers, positions) for positions in (opened, closed))
-    return f"the finger tips are {readable(wide, 'm')} apart when open, {readable(narrow, 'm')} when closed"
+    return replace(closure, closed=closed)
 
 
 def _spreads(shape: HandShape, rest: Array, positions: Array) -> npt.NDArray[np.bool_]:

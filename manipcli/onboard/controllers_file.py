@@ -108,7 +108,8 @@ class ControllersGuess:
         file = {"controllers": Entry(entries)}
         notes = self._tuning.notes if self._tuning is not None else ()
         if by_position:
-            notes = (*notes, f"commanded by position: {' and '.join(by_position)}, because by effort: {why}")
+            parts = [name for name, own in (("arm", self._arm), ("hand", self._hand)) if own and name in by_position]
+            notes = (*notes, f"commanded by position: {' and '.join(parts)}, because by effort: {why}")
         return WrittenControllers(written(file, head=_HEAD), file, notes)
 
 

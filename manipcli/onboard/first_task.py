@@ -18,7 +18,7 @@ from manipcli.core.units import readable
 from manipcli.model.kinematics import Kinematics
 from manipcli.onboard.home import HomeSearch
 from manipcli.onboard.reachable import Spots, reachable_spots
-from manipcli.onboard.robot_draft import BLOCK, RobotDraft
+from manipcli.onboard.robot_draft import BLOCK, NOTHING_TO_HOLD_WITH, RobotDraft
 from manipcli.onboard.writer import Entry, Value, written
 from manipcli.task.load_task import LoadOptions
 
@@ -28,6 +28,11 @@ MARGIN: Final = 0.12
 """[m] of a desk around the places on it."""
 DENSITY: Final = 500.0
 """[kg/m3] of the block: wood."""
+UNDONE: Final = 0.25
+"""Share of its way that a hand may miss from closed: fingers that come to rest on each other."""
+SHARES: Final = (1.0, 0.75, 0.5)
+"""Of the way to closed, tried in turn."""
+LEAST_UNDONE: Final = {"rad": 0.09, "m": 0.003}
 MOVES: Final = 12
 """Pairs of poses that are tried."""
 
@@ -88,13 +93,16 @@ class TaskSearch:
         self._causes: list[str] = []
 
     def unsteady(self) -> str | None:
-        """Why the robot does not hold still with these controllers; None if it does."""
+        """Why the robot does not hold still with these controllers, or a hand alone does not close; None if it does."""
         self._causes.clear()
-        candidate = self._waits()
-        self._progress("holding still: a run")
-        if not self._plans(candidate) or self._passes(candidate):
-            return None  # a task without a plan is not the fault of controllers
-        return self._causes[-1]
+        candidates = [self._waits()]
+        if self._draft.parts.arm is None:
+            candidates += itertools.islice(self._closes(), 1)
+        for candidate in candidates:
+            self._progress(f"{candidate.does}: a run")
+            if self._plans(candidate) and not self._passes(candidate):
+                return self._causes[-1]  # a task without a plan is not the fault of controllers
+        return None
 
     def search(self) -> FirstTask:
         """The most ambitious task that passes: pick and place, else moves, else open and close."""
@@ -163,10 +171,13 @@ class TaskSearch:
         arm, frame = draft.parts.arm, draft.frame
         if arm is None or frame is None or draft.parts.hand is None:
             return
+        if not any(draft.robot.link(link).collisions for branch in draft.parts.hand.branches for link in branch):
+            self._causes.append(NOTHING_TO_HOLD_WITH)
+            return
         edge = block_edge(frame.narrowest, frame.widest)
         if edge is None:
             self._causes.append(
-                f"the finger tips are {readable(frame.narrowest, 'm')} to {readable(frame.widest, 'm')} apart"
+                f"between the fingers there are only {readable(frame.narrowest, 'm')} to {readable(frame.widest, 'm')}"
             )
             return
         assert draft.search is not None
@@ -209,18 +220,36 @@ class TaskSearch:
         if self._draft.parts.hand is None:
             return
         robot, hand = self._draft.robot, self._draft.parts.hand
+        group = self._draft.hand_name
         units = {robot.joint(name).unit for name in hand.joints}
         within: dict[str, Value] = {}
-        if "rad" in units:
-            within["within"] = "5 deg"
-        if "m" in units:
-            within["slide"] = "3 mm"
-        entries = {
-            **_head("open_close", "The hand closes and opens."),
-            "steps": Entry([{"move": {"to": "closed"}}, {"move": {"to": "open"}}]),
-            "expect": Entry([{"at_pose": {"pose": "open", "group": self._draft.hand_name, **within}}]),
-        }
-        yield _Candidate("open_close", entries, "the hand closes and opens", {})
+        nearly: dict[str, Value] = {}  # closed fingers rest on each other, but have gone most of the way
+        closure = self._draft.closure
+        assert closure is not None
+        for share in SHARES:
+            way = share * (closure.closed - closure.opened)
+            poses = {}
+            if share < 1.0:
+                closed: list[Value] = [round(float(value), 4) for value in closure.opened + way]
+                why = f"{share:.0%} of the way without overlaps; at its end the hand came to rest before closed"
+                poses["closed"] = Entry({group: closed}, why, True)
+            for unit, field, near in (("rad", "within", "5 deg"), ("m", "slide", "3 mm")):
+                if unit in units:
+                    within[field] = near
+                    own = [robot.joint(name).unit == unit for name in hand.joints]
+                    most = max(UNDONE * float(np.abs(way)[own].max()), LEAST_UNDONE[unit])
+                    nearly[field] = f"{float(f'{most:.2g}'):g} {unit}"
+            entries = {
+                **_head("open_close", "The hand closes and opens."),
+                "steps": Entry([{"move": {"to": "closed"}}, {"move": {"to": "open"}}]),
+                "expect": Entry(
+                    [
+                        {"at_pose": {"pose": "closed", "group": group, **nearly}, "at": "move_1"},
+                        {"at_pose": {"pose": "open", "group": group, **within}},
+                    ]
+                ),
+            }
+            yield _Candidate("open_close", entries, "the hand closes and opens", poses)
 
 
 def block_edge(narrowest: float, widest: float) -> float | None:

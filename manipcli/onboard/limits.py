@@ -11,10 +11,11 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
-from manipcli.core.units import readable
+from manipcli.core.units import EARTH_GRAVITY, readable
 from manipcli.description.elements import Joint
 from manipcli.model.configuration import with_mimics
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
 from manipcli.spec.robot import LimitsSpec
 
 SAMPLES: Final = 200
@@ -26,8 +27,15 @@ SLIDE: Final = 0.25
 """[m/s] Proposed for a prismatic joint."""
 FINGER_FORCE: Final = 40.0
 """[N] at a finger tip."""
+LOAD: Final = 0.05
+"""Share of the arm's mass that a joint can hold `LEVER` from its axis, however little is behind it now: a flange gets a
+tool."""
+LEVER: Final = 0.1
+"""[m]"""
 CLOSING: Final = 0.5
 """[s] in which a finger crosses its range."""
+TINY: Final = 1e-6
+"""[N m or N] Below this, a weight is rounding."""
 MOST_ACCELERATION: Final = 10.0
 LEAST_ACCELERATION: Final = 0.5
 
@@ -54,15 +62,17 @@ def propose_limits(
     """
     gravity, inertia = _loads(kinematics, seed)
     robot = kinematics.robot
+    least = LOAD * -EARTH_GRAVITY[2] * _mass(robot, arm)
     found = {}
     for name in (*arm, *hand):
         joint, k = robot.joint(name), robot.joint_names.index(name)
         length = max(lengths[name], 0.02)
-        found[name] = _finger(joint, length) if name in hand else _arm(joint, length, gravity[k], inertia[k])
+        found[name] = _finger(joint, length) if name in hand else _arm(joint, length, gravity[k], inertia[k], least)
     return found
 
 
-def _arm(joint: Joint, length: float, gravity: float, inertia: float) -> ProposedLimits:
+def _arm(joint: Joint, length: float, gravity: float, inertia: float, load: float) -> ProposedLimits:
+    """`load` [N]: weight that the joint can hold in any case."""
     velocity, effort = joint.limits.velocity, joint.limits.effort
     missing, why, update = [], [], {}
     if velocity is None:
@@ -71,10 +81,17 @@ def _arm(joint: Joint, length: float, gravity: float, inertia: float) -> Propose
         update["velocity"] = velocity
         why.append(f"velocity: {_reach(joint, length)}")
     if effort is None:
-        effort = rounded_up(2.0 * gravity + inertia * velocity / 0.5)
+        moving = 2.0 * gravity + inertia * velocity / 0.5
+        least = load if joint.unit == "m" else load * LEVER
+        effort = rounded_up(max(moving, least))
         missing.append("effort")
         update["effort"] = effort
-        why.append(f"effort: twice the weight, {digits(gravity)} {joint.effort_unit}, and full speed in 0.5 s")
+        why.append(
+            f"effort: a load of {LOAD:.0%} of the arm's mass{'' if joint.unit == 'm' else _lever(LEVER)}"
+            if moving < least
+            else f"effort: twice the weight, {digits(gravity) if gravity > TINY else 0} {joint.effort_unit}, and full "
+            "speed in 0.5 s"
+        )
     elif effort < 1.2 * gravity:
         update["effort"] = rounded_up(2.0 * gravity)
         missing.append("effort")
@@ -110,6 +127,14 @@ def _finger(joint: Joint, length: float) -> ProposedLimits:
     update["acceleration"] = rounded(max(10.0 * velocity, 0.5))
     why.append("acceleration: full speed in 0.1 s")
     return ProposedLimits(LimitsSpec(**update), "; ".join(why), tuple(missing))
+
+
+def _mass(robot: RobotModel, arm: Sequence[str]) -> float:
+    """[kg] that the first joint of the arm moves."""
+    if not arm:
+        return 0.0
+    moved = robot.descendants(robot.joint(arm[0]).child)
+    return sum(link.inertial.mass for link in robot.links if link.name in moved and link.inertial is not None)
 
 
 def _lever(length: float) -> str:

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.units import readable
 from manipcli.description.elements import Joint
 from manipcli.model.collision import CollisionChecker
 from manipcli.model.configuration import with_mimics, zero_configuration
@@ -29,8 +30,12 @@ from manipcli.scene.scene import Scene
 
 BLOCK: Final = 0.04
 """[m] Edge of the block that a hand is asked to pick."""
+NOTHING_TO_HOLD_WITH: Final = "the fingers have no collision shapes, so that they cannot hold anything"
 OVERLAP: Final = 1e-3
 """[m] Fingers that close stop before they overlap by more."""
+OVERLAP_PALM: Final = 5e-3
+"""[m] The same with the palm, whose hull is larger than it is."""
+PALM: Final = -1
 STEPS: Final = 40
 
 
@@ -148,13 +153,13 @@ def _hand(
     links = [link for branch in hand.branches for link in branch]
     bare = points.missing(links)
     if len(bare) == len(links):
-        notes.append("the hand has no shapes at all: its poses and the tool are guessed from its frames alone")
+        notes.append("the fingers have no shapes at all: poses and tool of the hand are guessed from its frames alone")
     touching = [link for link in links if robot.link(link).collisions]
     if not touching:
-        notes.append("the hand has no collision shapes, so that it cannot hold anything")
+        notes.append(f"{NOTHING_TO_HOLD_WITH}; add their meshes, or <collision> shapes to the description")
     closure = guess_closure(shape)
     if stated is not None and (ends := stated.ends(shape)) is not None:
-        stops = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: widest and narrowest")
+        stops = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: ")
         options: list[Closure | None] = [stops]
     else:
         options = [closure, knuckles_only(shape, closure)]
@@ -165,19 +170,27 @@ def _hand(
     closure, frame = max(
         found, key=lambda pair: (pair[1].narrowest < BLOCK, float(pair[1].X_PT.p @ pair[1].X_PT.R[:, 2]))
     )
-    return closure, frame, shape
+    if len(bare) == len(links):
+        why = "the fingers have no shapes to measure: which end opens the hand is not known"
+        frame = replace(frame, evidence="between the frames of the fingers, which have no shapes to measure")
+        return replace(closure, evidence=why, measured=False), frame, shape
+    wide, narrow = readable(frame.widest, "m"), readable(frame.narrowest, "m")
+    why = f"{closure.evidence}the gap between the fingers is at most {wide}, at least {narrow}"
+    return replace(closure, evidence=why), frame, shape
 
 
 def _before_overlap(robot: RobotModel, kinematics: Kinematics, shape: HandShape, closure: Closure) -> Array:
-    """(m) The closed hand, or where it stops because its fingers would overlap."""
+    """(m) The closed hand, or where it stops because its fingers would overlap each other or the palm."""
     finger_of = {link: k for k, links in enumerate(closure.fingers) for link in links}
+    part_of = dict.fromkeys((shape.hand.palm, *shape.hand.fixed), PALM) | finger_of
     query = CollisionChecker(kinematics, Scene((), (), np.array([0.0, 0.0, -9.81]))).at()
 
     def overlapping(q: Array) -> set[frozenset[str]]:
         found = set()
         for hit in query.every(q):
             a, b = hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")
-            if hit.distance < -OVERLAP and a in finger_of and b in finger_of and finger_of[a] != finger_of[b]:
+            parts = {part_of.get(a), part_of.get(b)}
+            if len(parts) == 2 and None not in parts and hit.distance < -(OVERLAP_PALM if PALM in parts else OVERLAP):
                 found.add(frozenset((a, b)))
         return found
 

@@ -48,7 +48,7 @@ def pose_entries(
         found["home"] = Entry({**hand})
     if closure is not None:
         rounded = [[round(float(value), 4) for value in values] for values in (closure.opened, closure.closed)]
-        found["open"] = Entry({hand_name: [*rounded[0]]}, closure.evidence)
+        found["open"] = Entry({hand_name: [*rounded[0]]}, closure.evidence, not closure.measured)
         found["closed"] = Entry({hand_name: [*rounded[1]]})
     return found
 

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed, number_of
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.link import MISSING_VISUAL
 from manipcli.description.urdf.urdf import Parts
 from manipcli.model.build_robot import build_robot
 from manipcli.model.inertials import massless_bodies
 from manipcli.model.robot import RobotModel
 from manipcli.onboard.writer import Entry, plain
+from manipcli.spec.inertials import WATER
 from manipcli.spec.load import read_bytes
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Plain
 
+TOO_HEAVY: Final = "URDF112"
+"""Code of the check for links that are denser than any metal."""
 GENERIC = ("robot", "model", "urdf", "description")
 """Names of files that do not name a robot."""
 
@@ -67,7 +72,7 @@ def read_source(
     """
     path = _located(description, package_path)
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    checked = tuple(check for check in CHECKS if check.severity == "error")
+    checked = tuple(check for check in CHECKS if check.severity == "error" or check.code == TOO_HEAVY)
     examination = examine(path, packages=packages, arguments=arguments, checks=checked)
     parts = examination.parts
     if parts is None:
@@ -76,7 +81,7 @@ def read_source(
         message = f"no joint of '{path.name}' moves: there is nothing to command"
         raise InvalidInput([Diagnostic("INIT002", message, Place(str(path), 0, 0))])
     name = parts.name if path.name.partition(".")[0] in GENERIC and parts.name else path.name.partition(".")[0]
-    mended, notes = _mended(parts)
+    mended, notes = _mended(parts, examination.findings)
     outer = _outer_packages(path, packages, allow_outside)
     spec = RobotSpec.model_validate(
         {
@@ -153,19 +158,26 @@ def _placed(description: str, path: Path, outer: Mapping[str, Path], folder: Pat
     return found
 
 
-def _mended(parts: Parts) -> tuple[dict[str, Entry], list[str]]:
+def _mended(parts: Parts, findings: Sequence[Diagnostic]) -> tuple[dict[str, Entry], list[str]]:
     """`inertials` and `collision` of the robot file, where the description lacks something."""
     found: dict[str, Entry] = {}
     notes: list[str] = []
     unusable = [link.name for link in parts.links if link.unusable is not None]
     massive = {link.name for link in parts.links if link.inertial is not None}
     massless = sorted(massless_bodies(parts.joints, massive))
-    if unusable or massless:
-        lacking = list(dict.fromkeys((*unusable, *massless)))
+    heavy = [
+        name for name in _named(finding for finding in findings if finding.code == TOO_HEAVY) if name not in unusable
+    ]
+    if unusable or massless or heavy:
+        lacking = list(dict.fromkeys((*unusable, *massless, *heavy)))
         why = f"missing or impossible in the description: {listed(lacking, most=6)}; from the volume of their shapes"
-        found["inertials"] = Entry("estimate", f"{why}, as heavy as water", True)
+        estimate: Plain = "estimate"
+        if heavy:
+            estimate = {"estimate": {}, "links": {name: {"density": WATER} for name in heavy}}
+            why = why.replace(";", ", or denser than any metal;", 1)
+        found["inertials"] = Entry(estimate, f"{why}, as heavy as water", True)
         notes.append(
-            f"{number_of(len(lacking), 'inertial')} are estimated; `manipcli check robot.yaml` shows the table"
+            f"inertials of {number_of(len(lacking), 'link')} are estimated; `manipcli check robot.yaml` shows the table"
         )
     missing = [link for link in parts.links if link.missing]
     if missing:
@@ -175,13 +187,31 @@ def _mended(parts: Parts) -> tuple[dict[str, Entry], list[str]]:
         if bare:
             why += f", or by none: {listed(bare)} without contacts"
         found["collision"] = Entry(rows, why, True)
-        lost = sorted(
-            {finding.message.partition("'")[2].partition("'")[0] for link in missing for finding in link.missing}
+        lost = sorted({*_named(finding for link in missing for finding in link.missing)})
+        unseen = {*_named(finding for finding in findings if finding.code == MISSING_VISUAL)}
+        partial = [
+            link.name
+            for link in missing
+            if rows[link.name] == "from_visual" and unseen.intersection(_named(link.missing))
+        ]
+        notes.append(
+            f"{len(lost)} of its collision meshes are not found or unusable: {listed(lost, most=6)}; add them (where: "
+            "`manipcli check-urdf` of the file) or name their package by --package-path, and repeat with --force"
         )
-        notes.append(f"{len(lost)} of its meshes are not found: {listed(lost, most=6)}")
+        if partial:
+            notes.append(
+                f"{number_of(len(partial), 'link')} with a part of the shapes alone, as visual meshes are not found "
+                f"either: {listed(partial, most=6)}"
+            )
         if bare:
             notes.append(
                 f"{number_of(len(bare), 'link')} without any shape, which planning and physics do not see: "
                 f"{listed(bare, most=6)}"
             )
     return found, notes
+
+
+def _named(findings: Iterable[Diagnostic]) -> Iterator[str]:
+    """What these findings name first: files, or links."""
+    for finding in findings:
+        yield finding.message.partition("'")[2].partition("'")[0]

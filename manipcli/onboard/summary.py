@@ -23,8 +23,7 @@ def summary(
     if checks:
         yield ""
         yield "please check (CHECK in the files):"
-        for path, why in checks:
-            yield f"  {path}: {why}"
+        yield from (f"  {', '.join(paths)}: {why}" for paths, why in _alike(checks))
     if notes or task.notes:
         yield ""
         yield from (f"note: {note}" for note in (*notes, *task.notes))
@@ -34,3 +33,14 @@ def summary(
         if task.passed
         else f"{FAIL} first task: {task.does}; no run passed"
     )
+
+
+def _alike(checks: Sequence[tuple[str, str]]) -> list[tuple[list[str], str]]:
+    """Paths with the same evidence, which is written at the first one alone."""
+    found: list[tuple[list[str], str]] = []
+    for path, why in checks:
+        if found and why in ("", found[-1][1]):
+            found[-1][0].append(path)
+        else:
+            found.append(([path], why))
+    return found

@@ -46,7 +46,8 @@ def render_text(
 
 MOST_ALIKE = 3
 """More findings with one cause than this are shown as one."""
-_PATH = re.compile(r"'(?:\w+://)?/?[^' ]*/[^' ]*'|(?<= )/[^ ]*")
+_PATH = re.compile(r"'(?:\w+://)?/?[^' ]*/[^' ]*'|(?<= )/[^ ]*|(?<=searched )[^ ]+|(?<=from )[^ ]+:\d+:\d+")
+"""Files in messages; those outside the working directory have absolute paths, those below it relative ones."""
 
 
 def alike(findings: Sequence[Diagnostic]) -> list[list[Diagnostic]]:
@@ -61,14 +62,15 @@ def alike(findings: Sequence[Diagnostic]) -> list[list[Diagnostic]]:
 
 
 def _described(group: Sequence[Diagnostic]) -> list[str]:
-    """The lines of findings with one cause."""
+    """The lines of findings with one cause: the first one, and all files that they name."""
     if len(group) <= MOST_ALIKE:
         return [*map(describe, group)]
     named = [found[0].strip("'") for finding in group if (found := _PATH.search(finding.message))]
     folder = _common_folder(named)
     more = f" (x {len(group)}{f', all below {folder}' if folder else ''})"
     first = group[0]
-    return [describe(replace(first, message=first.message + more))]
+    files = dict.fromkeys(uri.removeprefix(f"{folder}/") for uri in named)
+    return [describe(replace(first, message=first.message + more)), f"  files: {', '.join(files)}"]
 
 
 def _common_folder(uris: Sequence[str]) -> str:

@@ -72,6 +72,7 @@ def test_a_hand_alone_opens_and_closes(folder: Path) -> None:
     assert main(["init", "--robot", "hand.urdf", "p"]) == 0
     task = yaml.safe_load(Path("p/tasks/open_close.yaml").read_text())
     assert [step["move"]["to"] for step in task["steps"]] == ["closed", "open"]
+    assert [(row["at_pose"]["pose"], row.get("at")) for row in task["expect"]] == [("closed", "move_1"), ("open", None)]
     assert main(["run", "p/tasks/open_close.yaml"]) == 0
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +16,14 @@ from manipcli.model.configuration import zero_configuration
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.onboard.closure import HandShape, guess_closure
+from manipcli.onboard.first_task import TaskSearch
 from manipcli.onboard.limits import propose_limits
 from manipcli.onboard.onboard import floor_scene
 from manipcli.onboard.parts import RobotParts, guess_parts
-from manipcli.onboard.robot_draft import RobotDraft, draft_robot
+from manipcli.onboard.robot_draft import NOTHING_TO_HOLD_WITH, RobotDraft, draft_robot
 from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.tool_frame import INSIDE, ToolFrame, guess_tool_frame
+from manipcli.onboard.writer import Entry, block
 from manipcli.spec.robot import RobotSpec
 from tests.onboard import small_robots as small
 
@@ -154,3 +158,49 @@ def test_stated_limits_stay(tmp_path: Path) -> None:
     found = propose_limits(Kinematics(robot), joints, (), dict.fromkeys(joints, 1.0))
     assert {limits.missing for limits in found.values()} == {()}
     assert all(limits.spec.model_fields_set == {"acceleration"} for limits in found.values())
+
+
+def test_a_flange_without_weight_can_hold_a_tool(tmp_path: Path) -> None:
+    robot = built(tmp_path, small.robot(small.arm(LINKS, limits='velocity="2" effort="0"')))
+    joints = tuple(f"j_{name}" for name in LINKS[1:])
+    found = propose_limits(Kinematics(robot), joints, (), dict.fromkeys(joints, 1.0))
+    weight = 9.81 * 0.5 * len(joints)  # of the links that move
+    last = found[joints[-1]]
+    assert last.spec.effort == pytest.approx(0.05 * weight * 0.1, rel=0.1)
+    assert last.evidence.startswith("effort: a load of 5% of the arm's mass, 100 mm from its axis")
+
+
+def test_fingers_without_shapes_are_told_and_hold_nothing(tmp_path: Path) -> None:
+    bare = [re.sub("<collision>.*?</collision>", "", element) for element in small.gripper("p")]
+    robot = built(tmp_path, small.robot(small.arm(LINKS), small.palm("p", parent="l6"), bare))
+    draft = draft_robot(robot, floor_scene())
+    assert draft.closure is not None and draft.frame is not None
+    assert not draft.closure.measured
+    poses = block(draft.entries["poses"])
+    assert poses["open"].check and "no shapes to measure" in poses["open"].why
+    assert "mm" not in draft.frame.evidence
+    assert any(note.startswith(NOTHING_TO_HOLD_WITH) for note in draft.notes)
+
+
+def test_the_gap_of_the_fingers_is_told(whole: RobotDraft) -> None:
+    assert whole.closure is not None
+    assert whole.closure.evidence.startswith("the gap between the fingers is at most 80 mm, at least ")
+
+
+def test_a_hand_that_does_not_close_gets_a_wider_closed(tmp_path: Path) -> None:
+    robot = built(tmp_path, small.robot(small.palm("p"), small.gripper("p")))
+    draft = draft_robot(robot, floor_scene())
+    written: list[Mapping[str, Entry]] = []
+    search = TaskSearch(
+        tmp_path,
+        draft,
+        write_robot=written.append,
+        package_path=(),
+        allow_outside=False,
+        on_progress=lambda _: None,
+    )
+    assert not search.search().passed  # there are no files: no task passes
+    closed = [poses["closed"].value for poses in written if "closed" in poses]
+    assert draft.closure is not None
+    ends = [0.04 - share * (0.04 - float(draft.closure.closed[0])) for share in (0.75, 0.5)]
+    assert closed == [{"hand": pytest.approx([end] * 2, abs=1e-4)} for end in ends]

@@ -252,7 +252,7 @@ def role(element: Element) -> str:
 
 def _reduction(reader: Reader, element: Element, transmission: str) -> float:
     child = element.first("mechanicalReduction") or element.first("mechanical_reduction")
-    value = reader.text_number(child, 1.0)
+    value = reader.text_number(child, 1.0, severity="warning")
     if value == 0.0:
         message = f"transmission '{transmission}': reduction is 0; expected a number other than 0"
         reader.report("URDF015", message, (child or element).place)

@@ -122,14 +122,16 @@ class Reader:
     def missing(self, element: Element, attribute: str) -> None:
         self.report("URDF059", f"<{element.tag}> has no attribute '{attribute}'", element.place)
 
-    def text_number(self, element: Element | None, default: float) -> float:
-        """The number in the text of an element."""
+    def text_number(self, element: Element | None, default: float, *, severity: Severity = "error") -> float:
+        """The number in the text of an element; `default` without one, with a finding if the text is no number."""
         if element is None:
             return default
         value = finite(element.text)
         if value is None:
             message = f"<{element.tag}>{shorten(element.text)}</{element.tag}>: expected a finite number"
-            self.report("URDF004", message, element.place, hint=_dotted(element.text))
+            if severity != "error":
+                message += f"; {default:g} is used"
+            self.report("URDF004", message, element.place, hint=_dotted(element.text), severity=severity)
             return default
         return value
 

@@ -126,7 +126,7 @@ def test_a_long_name_is_told_with_the_limit_and_a_comma_with_the_dot(tmp_path: P
     assert finding.hint == "use a dot: 0.01"
 
 
-def test_findings_with_one_cause_are_one_line(tmp_path: Path) -> None:
+def test_findings_with_one_cause_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     meshes = "\n".join(
         f'<visual><geometry><mesh filename="/none/robot/{part}/m.stl"/></geometry></visual>' for part in range(29)
     )
@@ -139,8 +139,25 @@ def test_findings_with_one_cause_are_one_line(tmp_path: Path) -> None:
     examination = examined(tmp_path, f'<robot name="r"><link name="base">{relative}</link></robot>')
     shown = render_text("r.urdf", examination.findings, None, passed=True)
     assert [line.endswith("(x 29, all below parts)") for line in shown.splitlines() if "URDF033" in line] == [True]
+    assert f"  files: {', '.join(f'{part}/m.stl' for part in range(29))}" in shown.splitlines()
     assert sum(map(len, alike(examination.findings))) == len(examination.findings)
     assert len(alike(examination.findings[:2])) == 2
+    monkeypatch.chdir(tmp_path)  # places are then shown relative to it
+    assert (
+        len(alike(found(examined(tmp_path, f'<robot name="r"><link name="base">{relative}</link></robot>'), "URDF033")))
+        == 1
+    )
+
+
+def test_a_reduction_that_is_no_number_is_one(tmp_path: Path) -> None:
+    actuator = '<actuator name="m"><mechanicalReduction>reduction</mechanicalReduction></actuator>'
+    gears = f'<transmission name="t"><type>SimpleTransmission</type><joint name="j"/>{actuator}</transmission>'
+    joint = f'<joint name="j" type="revolute"><parent link="base"/><child link="tip"/>{LIMIT}</joint>'
+    examination = examined(tmp_path, f'<robot name="r"><link name="base"/><link name="tip"/>{joint}{gears}</robot>')
+    (finding,) = found(examination, "URDF004")
+    assert finding.severity == "warning" and finding.message.endswith("expected a finite number; 1 is used")
+    assert examination.parts is not None
+    assert [tag.actuator_reductions for tag in examination.parts.transmissions] == [(1.0,)]
 
 
 @pytest.mark.parametrize(("gain", "told"), [("", 1), ('k_position="0" ', 1), ('k_position="20" ', 0)])
