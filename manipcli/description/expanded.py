@@ -63,8 +63,7 @@ def read_description(
         words = {name: argument_text(value) for name, value in arguments.items()}
         document, findings = expand(path, words, packages, allow_env=allow_env)
     elif arguments and not declared:
-        names = ", ".join(arguments)
-        raise invalid("XACRO003", f"'{path.name}' is plain URDF and takes no arguments; given: {names}")
+        raise takes_no_arguments(path, arguments)
     assert document.documentElement is not None  # a document without a root element is not well-formed
     root = element_of(document.documentElement)
     if root.tag != "robot":
@@ -121,3 +120,8 @@ def _other_format(root: Element) -> InvalidInput:
 def argument_text(value: str | int | float | bool) -> str:
     """An argument as the text that xacro expects: `true`, `0.1`, `text`."""
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def takes_no_arguments(path: Path, arguments: Mapping[str, object]) -> InvalidInput:
+    """The error for arguments of a plain URDF file."""
+    return invalid("XACRO003", f"'{path.name}' is plain URDF and takes no arguments; given: {', '.join(arguments)}")

@@ -18,6 +18,7 @@ What planning checks does not depend on the matrix: `lasting_overlaps` and `spac
 from __future__ import annotations
 
 import heapq
+import threading
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -141,9 +142,13 @@ def overlapping(robot: RobotModel, pairs: Sequence[tuple[str, str]], q: Array) -
     return {pair: depth for pair, depth in depths.items() if depth > TOUCHING}
 
 
-@lru_cache(maxsize=2)
 def _links(robot: RobotModel) -> _Links:
-    """The links, kept: with detailed meshes, they take 30 ms to build."""
+    return _links_of_thread(robot, threading.get_ident())
+
+
+@lru_cache(maxsize=4)
+def _links_of_thread(robot: RobotModel, thread: int) -> _Links:
+    """The links, kept: with detailed meshes, they take 30 ms to build. A query moves them, so threads share none."""
     return _Links(Kinematics(robot), *_ranges(robot))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.geometry import Array
+from manipcli.description.expanded import is_plain, takes_no_arguments
 from manipcli.description.lint.inspection import DESCRIPTIONS
 from manipcli.model.build_robot import build_robot
 from manipcli.model.configuration import configuration
@@ -49,6 +50,8 @@ def load_sight(
     """
     if path.suffix.lower() in DESCRIPTIONS:
         load.read_bytes(path)  # same error for a missing file as for every other kind
+        if arguments and is_plain(path):
+            raise takes_no_arguments(path, arguments)
         spec = RobotSpec(robot=path.name.partition(".")[0], description=path.name, args=dict(arguments))
         robot, notes = build_robot(spec, file=path, package_path=package_path, allow_outside=allow_outside)
         # Only robot files set acceleration limits.
