@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -39,13 +39,13 @@ _HEAD: Final = (
 )
 
 
-def given_controllers(path: Path, robot: RobotModel) -> WrittenControllers:
+def given_controllers(path: Path, robot: RobotModel, arguments: Mapping[str, str]) -> WrittenControllers:
     """A file of the user, of ours or of ROS, unchanged.
 
     Raises:
         InvalidInput: it is invalid, or names joints that the robot does not have.
     """
-    file = load_controllers(path, model=controllers_spec())
+    file = load_controllers(path, model=controllers_spec(), args=dict(arguments))
     known = robot.joint_names
     findings = [
         Diagnostic(

@@ -152,8 +152,11 @@ class _Reader:
             link = self._above[link].parent
         return found[::-1]
 
-    def _joints(self, group: SrdfGroup | None) -> tuple[str, ...]:
-        """Independent joints of a group in the order of the robot; unknown names are findings."""
+    def _joints(self, group: SrdfGroup | None, within: frozenset[str] = frozenset()) -> tuple[str, ...]:
+        """Independent joints of a group in the order of the robot; unknown names are findings.
+
+        `within`: the groups that contain it, which it cannot contain again.
+        """
         if group is None:
             return ()
         found: set[str] = set()
@@ -167,8 +170,10 @@ class _Reader:
             base, tip = group.chain
             if all(self._known(name, self._link_names, "link", group.place) for name in (base, tip)):
                 found |= {joint.name for joint in self._between(base, tip, group)}
+        within |= {group.name}
         for name in group.groups:
-            found |= set(self._joints(self._srdf.group(name)) if name != group.name else ())
+            if name not in within:
+                found |= set(self._joints(self._srdf.group(name), within))
         return tuple(joint.name for joint in self._robot.joints if joint.independent and joint.name in found)
 
     @property

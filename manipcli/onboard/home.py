@@ -113,7 +113,7 @@ class HomeSearch:
         reduced = J[:, self._columns]
         singular = np.linalg.svd(reduced[:3] if len(self._columns) < 6 else reduced, compute_uv=False)
         bend = max(1e-3, float(singular[-1] / max(singular[0], 1e-9))) if len(self._columns) >= 3 else 1.0
-        half = (self.upper - self.lower) / 2.0
+        half = np.maximum((self.upper - self.lower) / 2.0, 1e-9)  # a joint whose two limits are equal stays there
         inside = np.where(self._limited, 1.0 - np.abs(arm - (self.lower + self.upper) / 2.0) / half, 1.0)
         room = float(np.clip(inside.min() / 0.3, 0.0, 1.0))
         pointing = 0.2 + 0.8 * max(0.0, -float(R[2, 2])) ** 2 if self._down else 1.0

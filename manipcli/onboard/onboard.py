@@ -83,7 +83,9 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         stated = stated_parts(source.robot, srdf)
     draft = draft_robot(source.robot, floor_scene(), stated)
     head = _head(request)
-    given = given_controllers(request.controllers, source.robot) if request.controllers is not None else None
+    given = None
+    if request.controllers is not None:
+        given = given_controllers(request.controllers, source.robot, request.arguments)
 
     with TemporaryDirectory(prefix="manipcli-") as scratch:
         folder = Path(scratch)

@@ -216,8 +216,7 @@ def _lengths(kinematics: Kinematics, points: ShapePoints, joints: Sequence[str],
     """[m] from the axis of each joint to the farthest point that it moves, where the robot is stretched most."""
     robot, rng = kinematics.robot, np.random.default_rng(0)
     ends = [joint.limits.within_soft for joint in robot.moving_joints]
-    lower = np.array([max(low, -np.pi) for low, _ in ends])
-    upper = np.array([min(high, np.pi) for _, high in ends])
+    lower, upper = np.clip(np.array(ends, dtype=float).reshape(-1, 2), -np.pi, np.pi).T
     found = dict.fromkeys(joints, 0.0)
     for sample in (q, *rng.uniform(lower, upper, (12, len(lower)))):
         here = np.array(with_mimics(robot, sample))

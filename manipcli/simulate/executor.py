@@ -27,7 +27,7 @@ Alarm = Callable[[WorldState], str]
 
 UNTIL_TICKS: Final = SLOW
 """Control ticks between two evaluations of an `until`."""
-ARRIVED: Final = 0.05
+ARRIVED: Final = {"revolute": 0.05, "continuous": 0.05, "prismatic": 0.005}
 """[rad or m] A joint further than this from the end of its motion has not arrived, whatever its controller says."""
 REST: Final = 0.5
 """[s] Time that the robot holds still after a stop."""
@@ -253,10 +253,10 @@ class Executor:
             abs(float(wrapped(error)) if joint.type == "continuous" else float(error))
             for joint, error in zip(joints, away, strict=True)
         ]
-        far, joint = max(zip(errors, joints, strict=True), key=lambda pair: pair[0])
-        if far <= ARRIVED:
+        far, joint = max(zip(errors, joints, strict=True), key=lambda pair: pair[0] / ARRIVED[pair[1].type])
+        if far <= ARRIVED[joint.type]:
             return ""
-        limit = f"limit {ARRIVED:g} {joint.unit}; its controller has no closer goal tolerance"
+        limit = f"limit {ARRIVED[joint.type]:g} {joint.unit}; its controller has no closer goal tolerance"
         return f"joint '{joint.name}' is {far:.3g} {joint.unit} from the end of this motion, {limit}"
 
     def _furthest(self) -> str:

@@ -23,6 +23,7 @@ from manipcli.record.definition import Array as ArrayType
 from manipcli.record.definition import Message, Number, Text, Type, read_definition
 from manipcli.record.read.reading import open_recording
 from manipcli.record.schemas import DEFINITIONS
+from manipcli.report.ros2.files import _script as ros2_script
 from manipcli.report.ros2.goals import LONGEST
 from manipcli.report.ros2.srdf import REASONS
 from manipcli.task.load_task import load_task
@@ -326,3 +327,8 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path, call_cli: RunC
     assert call_cli("export", robot, "--ros2", "out/robot.urdf", cwd=tmp_path).code == 4
     assert call_cli("export", robot, "--ros2", "other", "--seed", "1", cwd=tmp_path).code == 4
     assert not (tmp_path / "other").exists()
+
+
+def test_no_name_leaves_its_comment_in_the_script() -> None:
+    script = ros2_script("Task 't' of robot 'r\ntouch owned\r\nrm x'", (), ())
+    assert all(line.startswith("#") for line in script.splitlines() if "owned" in line or "rm x" in line)

@@ -252,7 +252,9 @@ def role(element: Element) -> str:
 
 def _reduction(reader: Reader, element: Element, transmission: str) -> float:
     child = element.first("mechanicalReduction") or element.first("mechanical_reduction")
-    value = reader.text_number(child, 1.0, severity="warning")
+    # Published files of ROS 1 have words there; what has digits or is of ros2_control was meant as a number.
+    words = child is not None and child.tag == "mechanicalReduction" and not any(map(str.isdigit, child.text))
+    value = reader.text_number(child, 1.0, severity="warning" if words else "error")
     if value == 0.0:
         message = f"transmission '{transmission}': reduction is 0; expected a number other than 0"
         reader.report("URDF015", message, (child or element).place)

@@ -99,9 +99,10 @@ def _of_plan(task: Task, parts: Sequence[Phase]) -> list[str]:
 
 def _script(title: str, controllers: Sequence[Exported], parts: Sequence[Phase]) -> str:
     active = [own.name for own in controllers if own.started]
-    lines = [_SEND.format(title=f"{title}: the goals of its plan, in order.", active=", ".join(active) or "none")]
+    heading = _one_line(f"{title}: the goals of its plan, in order.")
+    lines = [_SEND.format(title=heading, active=_one_line(", ".join(active)) or "none")]
     for phase in parts:
-        lines.append(f"# {phase.title}")
+        lines.append(f"# {_one_line(phase.title)}")
         if phase.activate or phase.deactivate:
             words = [
                 f"--{word} {' '.join(quote(name) for name in names)}"
@@ -117,6 +118,11 @@ def _script(title: str, controllers: Sequence[Exported], parts: Sequence[Phase])
         elif phase.pause > 0.0:
             lines.append(f"sleep {phase.pause:.3f}")
     return "\n".join(lines) + "\n"
+
+
+def _one_line(text: str) -> str:
+    """A text for a comment of the script, which no name of a file can leave."""
+    return " ".join(text.split())
 
 
 def _readme(title: str, robot: RobotModel, files: dict[str, str], notes: Sequence[str]) -> str:
