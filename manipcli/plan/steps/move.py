@@ -83,7 +83,7 @@ class MoveSpec(Model):
     and none may only rotate the tool about its z axis.
 
     It is done when every joint has arrived: those of the hand within their controller's tolerance, those of the arm
-    also within 0.05 rad or m of the end of the motion, unless the robot may touch something.
+    also within 0.05 rad or 5 mm of the end of the motion, unless the robot may touch something.
 
     After `pick` or `grasp` the hand stays closed, even if it met nothing, until `release` or `place` opens it. Until
     then a named pose moves only the joints of the arm, and explicit positions for joints of the hand are refused.
