@@ -21,7 +21,8 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.planner import Planner
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 from manipcli.task.robot_file import read_robot
 
 PANDA = Path(__file__).resolve().parents[1] / "robots" / "panda" / "robot.yaml"

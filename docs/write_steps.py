@@ -30,6 +30,7 @@ from manipcli.spec.plan import PlanSpec
 from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.quantity import Unit
 from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.recording import RecordSpec
 from manipcli.spec.robot import (
     ActuatorSpec,
     AttachSpec,
@@ -39,8 +40,9 @@ from manipcli.spec.robot import (
     ToolSpec,
     TransmissionSpec,
 )
+from manipcli.spec.scene import BodySpec, FrameSpec
 from manipcli.spec.simulation import SimulationSpec
-from manipcli.spec.task import BodySpec, FrameSpec, RecordSpec, StepSpec
+from manipcli.spec.step import StepSpec
 from manipcli.spec.vary import DistributionSpec, VarySpec
 
 PAGE = Path(__file__).with_name("steps.md")

@@ -29,7 +29,8 @@ from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.task import JUDGED, TaskSpec
+from manipcli.spec.recording import JUDGED
+from manipcli.spec.task import TaskSpec
 from manipcli.task.load_task import load_task
 
 PRODUCERS: Final[Mapping[str, str]] = {

@@ -25,7 +25,7 @@ from manipcli.plan.planner import Planner
 from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.source.tree import Plain
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 from manipcli.task.plan_task import plan_step
 
 COMMANDED: Final = 1e-4

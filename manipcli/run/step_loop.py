@@ -30,7 +30,7 @@ from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.retry import retried
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 from manipcli.task.plan_task import Plan, PlannedStep
 from manipcli.task.task import Task
 

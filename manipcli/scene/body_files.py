@@ -21,7 +21,7 @@ from manipcli.shapes.convex_parts import concave, convex_parts
 from manipcli.shapes.mesh import SUFFIXES
 from manipcli.shapes.primitives import Geometry, Mesh, Rgba
 from manipcli.shapes.proximity import coal_shape
-from manipcli.spec.task import MeshCollision, MeshSpec, UrdfSpec
+from manipcli.spec.scene import MeshCollision, MeshSpec, UrdfSpec
 
 
 def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:

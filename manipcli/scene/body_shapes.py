@@ -14,7 +14,7 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial
 from manipcli.scene.scene import Interior
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba, Shape, Sphere
-from manipcli.spec.task import BoxSpec, CupSpec, CylinderSpec, SphereSpec, TraySpec
+from manipcli.spec.scene import BoxSpec, CupSpec, CylinderSpec, SphereSpec, TraySpec
 
 COLORS: dict[str, Rgba] = {
     "floor": (0.80, 0.81, 0.82, 1.0),

@@ -21,7 +21,8 @@ from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
 from manipcli.spec.base import Model
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "at", "yaw")

@@ -20,7 +20,7 @@ from manipcli.spec.located import Area
 from manipcli.spec.source import shape
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, dotted, shown
 from manipcli.spec.source.yaml import parse
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 
 _FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
 

@@ -9,7 +9,8 @@ from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
 from manipcli.spec.located import Located, validate
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, child, mapped, node_at
-from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.step import StepSpec
+from manipcli.spec.task import TaskSpec
 
 
 def retried(file: Located[TaskSpec], index: int) -> StepSpec:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Final, Literal, get_args
+from typing import Annotated, Final
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -16,262 +16,22 @@ from manipcli.core.text import escape
 from manipcli.spec.agree import AgreeSpec
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
-from manipcli.spec.clearance import ClearanceSpec, PartPair
-from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
+from manipcli.spec.block import BlockSpec
+from manipcli.spec.clearance import ClearanceSpec
+from manipcli.spec.condition import ExpectationSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
-from manipcli.spec.keep import Keeps
 from manipcli.spec.plan import PlanSpec
 from manipcli.spec.planner import PlannerSpec
-from manipcli.spec.quantity import Frequency, Length, Mass, Pause, Turn
-from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
-from manipcli.spec.robot import PoseSpec, Vector3, Version
+from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.recording import JUDGED, SLOWEST, RecordSpec
+from manipcli.spec.robot import Version
+from manipcli.spec.scene import BodySpec, FrameSpec
 from manipcli.spec.simulation import SimulationSpec
+from manipcli.spec.step import StepSpec
 from manipcli.spec.vary import VarySpec
-
-__all__ = [
-    "BodySpec", "BoxSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "RatesSpec",
-    "RecordSpec", "Size", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
-]  # fmt: skip
-
-Fraction = Annotated[float, Field(ge=0, le=1)]
-Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
-
-
-class BoxSpec(Model):
-    """A solid box; its frame is at its centre."""
-
-    size: tuple[Size, Size, Size] = Field(description="Full lengths along x, y, z [m], 1 um to 100 m.")
-
-
-class SphereSpec(Model):
-    """A solid sphere; its frame is at its centre."""
-
-    radius: Size = Field(description="Radius [m], 1 um to 100 m.")
-
-
-class CylinderSpec(Model):
-    """A solid upright cylinder; its frame is in the middle of its bottom."""
-
-    radius: Size = Field(description="Radius [m], 1 um to 100 m.")
-    height: Size = Field(description="Height [m], 1 um to 100 m.")
-
-
-class CupSpec(Model):
-    """An open cup: a floor disc and a ring of `segments` wall boxes; its frame is in the middle of its bottom."""
-
-    radius: Size = Field(description="Outer radius [m], 1 um to 100 m.")
-    height: Size = Field(description="Outer height [m], 1 um to 100 m.")
-    wall: Size = Field(0.004, description="Thickness of wall and floor [m], 1 um to 100 m. Default 4 mm.")
-    segments: Annotated[int, Field(ge=6, le=64, description="Wall boxes, 6 to 64. Default 16.")] = 16
-
-
-class TraySpec(Model):
-    """An open tray: floor and four walls; its frame is in the middle of its bottom."""
-
-    size: tuple[Size, Size, Size] = Field(description="Outer lengths along x, y, z [m], 1 um to 100 m.")
-    wall: Size = Field(0.005, description="Thickness of walls and floor [m], 1 um to 100 m. Default 5 mm.")
-
-
-MeshCollision = Literal["hull", "parts"]
-"""The shape for contact of a mesh: its convex hull, or convex parts of it."""
-_COLLISION: Final = (
-    "Shape of a mesh for contact: `hull`, its convex hull; `parts`, its convex parts, so that a bowl is hollow (needs "
-    "`manipcli[coacd]`). Default: `hull` for a mesh that fills at least 90 % of its hull, else `parts`."
-)
-
-
-class MeshSpec(Model):
-    """A mesh file (STL, OBJ, Collada); for contact it is its convex hull or convex parts."""
-
-    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
-    scale: Annotated[float, Field(ge=1e-6, le=1e6, description="Factor on all three axes, 1e-6 to 1e6. Default 1.")] = (
-        1.0
-    )
-    collision: MeshCollision | None = Field(None, description=_COLLISION)
-
-
-class UrdfSpec(Model):
-    """A single-link URDF file as an object."""
-
-    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
-    collision: MeshCollision | None = Field(None, description=_COLLISION)
-
-
-class BodySpec(Model):
-    """A body of the scene: exactly one shape key, one placement, and contact parameters.
-
-    Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`, in
-    its middle or offset from it by `at: [x, y]`.
-    """
-
-    box: BoxSpec | None = Field(None, description="Shape: a solid box.")
-    sphere: SphereSpec | None = Field(None, description="Shape: a solid sphere.")
-    cylinder: CylinderSpec | None = Field(None, description="Shape: a solid upright cylinder.")
-    cup: CupSpec | None = Field(None, description="Shape: an open cup.")
-    tray: TraySpec | None = Field(None, description="Shape: an open tray.")
-    mesh: MeshSpec | None = Field(None, description="Shape: a mesh file.")
-    urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
-    pose: PoseSpec | None = Field(None, description="Start pose of its frame in the world.")
-    rests_on: str | None = Field(
-        None, description="The body it rests on, which must not be tilted; `at` gives the position."
-    )
-    at: tuple[Length, Length] | None = Field(
-        None,
-        description="x, y [m]. With `rests_on`, which needs it: in the world. With `inside`: from the middle of the "
-        "container, along its axes.",
-    )
-    yaw: Turn = Field(
-        0.0, description="Rotation about the world's z axis [rad]; with `inside`, the container's. Default 0."
-    )
-    inside: str | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
-    fixed: bool = Field(
-        False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
-    )
-    mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
-        None, description="Mass [kg], above 0 to 100 t; required unless `fixed` or `urdf`."
-    )
-    friction: Annotated[float, Field(ge=0)] = Field(
-        0.8,
-        description="Sliding friction coefficient, 0 or more; the engine multiplies it by the other body's. "
-        "Default 0.8.",
-    )
-    rolling_friction: Annotated[
-        float, Field(ge=0, description="Rolling friction coefficient, 0 or more. Default 0.")
-    ] = 0.0
-    spinning_friction: Annotated[
-        float, Field(ge=0, description="Spinning friction coefficient, 0 or more. Default 0.")
-    ] = 0.0
-    restitution: Fraction = Field(
-        0.0, description="Coefficient of restitution, 0 to 1; the engine multiplies it by the other body's. Default 0."
-    )
-    color: tuple[Fraction, Fraction, Fraction, Fraction] | None = Field(
-        None, description="Red, green, blue, opacity, each 0 to 1; only for pictures."
-    )
-
-
-class FrameSpec(Model):
-    """A named frame, fixed in `parent`: `world` or a body of the scene."""
-
-    parent: str = Field("world", description="`world` or a body. Default `world`.")
-    pose: PoseSpec = Field(PoseSpec(), description="Pose of the frame in its parent. Default: identity.")
-
-
-Rate = Annotated[Frequency, Field(gt=0)]
-SLOWEST: Final = 20.0
-"""Lowest rate [Hz] at which the end of a run can be judged."""
-
-
-class RatesSpec(Model):
-    """Recording rates of topics [Hz]: the control rate divided by a whole number."""
-
-    joint_states: Rate | None = Field(None, description="Measured joints [Hz], 20 or more. Default: the control rate.")
-    tf: Rate | None = Field(None, description="Links and bodies [Hz], 20 or more. Default: the control rate.")
-    controller_state: Rate | None = Field(
-        None, description="State of every controller [Hz], 20 or more. Default: the control rate."
-    )
-    reference: Rate | None = Field(None, description="Reference of every controller, for plots [Hz]. Default 100 Hz.")
-    error: Rate | None = Field(None, description="Error of every controller, for plots [Hz]. Default 100 Hz.")
-    actuator_states: Rate | None = Field(
-        None, description="Actuators, behind the transmissions [Hz]; efforts at the gears. Default 100 Hz."
-    )
-    wrench: Rate | None = Field(None, description="Wrench of every force sensor [Hz]. Default: the control rate.")
-
-    @property
-    def given(self) -> dict[str, float]:
-        """Rates that are set, by topic."""
-        rates = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: rate for name, rate in rates.items() if rate is not None}
-
-
-ChosenTopic = Literal[
-    "joint_states", "tf", "controller_state", "reference", "error", "actuator_states", "wrench", "contacts", "goals"
-]
-"""Optional topics; `goals` are the action topics of the controllers."""
-JUDGED: Final = ("joint_states", "tf", "controller_state")
-"""Topics that the judge reads together, at the ticks at which all of them are recorded."""
-
-
-class RecordSpec(Model):
-    """Recorded topics and their rates. Small topics, one-time messages and joint states are always recorded."""
-
-    rates: RatesSpec = Field(RatesSpec(), description="How often topics are recorded.")
-    topics: tuple[ChosenTopic, ...] | None = Field(
-        None, description="The optional topics to record; `joint_states` is always recorded. Default: all."
-    )
-
-    @model_validator(mode="after")
-    def _consistent(self) -> RecordSpec:
-        for name, rate in self.rates.given.items():
-            if name in self.left_out:
-                raise problem("conflict", f"'{name}' has a rate, but is not among `topics`", at=("rates", name))
-            if name in JUDGED and rate < SLOWEST:
-                message = f"'{name}' is recorded at {rate:g} Hz; judging needs at least {SLOWEST:g} Hz"
-                raise problem("conflict", message, at=("rates", name), hint=f"record it at {SLOWEST:g} Hz or more")
-        return self
-
-    def strides(self, period: float) -> dict[str, int]:
-        """Control ticks of `period` [s] between two messages of each topic with a rate."""
-        return {name: max(1, round(1.0 / (rate * period))) for name, rate in self.rates.given.items()}
-
-    @property
-    def left_out(self) -> frozenset[str]:
-        """Topics that are not recorded."""
-        return frozenset() if self.topics is None else frozenset(get_args(ChosenTopic)) - {*self.topics, "joint_states"}
-
 
 TAG: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _NAME = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
-
-
-class StepSpec(KeyedSpec):
-    """Common keys of every step. `body` is the validated block under the verb."""
-
-    id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
-    until: ConditionSpec | None = Field(
-        None,
-        description="Condition that the step waits for after its motion (`pour`: in its dwell; a `guarded` `move`: "
-        "also during the motion), for 30 s or until its `timeout`.",
-    )
-    timeout: Annotated[Pause, Field(gt=0)] | None = Field(
-        None, description="Time after which the step fails [s], above 0 to 1 h."
-    )
-    keep: Keeps = Field(
-        (),
-        description="Constraints on the step's motions, one mapping or a list: `keep: {upright: 10 deg, tool_speed: "
-        "0.25}`. A path that keeps them is searched; checked at every tick of the plan, not of the run.",
-    )
-    allow: tuple[PartPair, ...] = Field(
-        (),
-        description="Pairs of parts that may touch in this step: `[[robot/palm, shelf], [cup, tray]]`; a part is a "
-        "body, `robot/LINK`, or `robot` for each of its links.",
-    )
-    on_fail: OnFail = Field(
-        "stop",
-        description="After a failure: `stop` ends the run, `continue` goes on (the failure has no effect on the "
-        "verdict), `{retry: n, with: {param: value}}` re-plans and retries the step. Default `stop`.",
-    )
-
-    @property
-    def retry(self) -> RetrySpec | None:
-        """How the step is retried; None if it is not."""
-        return self.on_fail if isinstance(self.on_fail, RetrySpec) else None
-
-    @property
-    def may_fail(self) -> bool:
-        """Whether the run goes on after the last attempt failed."""
-        return (self.on_fail if self.retry is None else self.retry.then) == "continue"
-
-    @property
-    def verb(self) -> str:
-        """Verb of the step."""
-        return self.word
-
-    @field_validator("id", mode="after")
-    @classmethod
-    def _id(cls, own: str | None) -> str | None:
-        if own is not None and not ID.fullmatch(own):
-            raise problem("conflict", f"'{own}' is not a valid id", hint=ID_HINT)
-        return own
 
 
 def _usable(name: str) -> str:
@@ -325,6 +85,7 @@ class TaskSpec(Model):
     plan: PlanSpec = Field(PlanSpec(), description="How the plan is chosen.")
     agree: AgreeSpec = Field(AgreeSpec(), description="Allowed differences between the runs of several engines.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")
+    blocks: tuple[BlockSpec, ...] = Field((), description="Groups of `steps`; written by the loader.")
     expect: tuple[ExpectationSpec, ...] = Field(
         (), description="What must hold: at the end, at all times, or in a step."
     )

@@ -32,7 +32,8 @@ from manipcli.spec.condition import (
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.simulation import SimulationSpec
-from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.step import StepSpec
+from manipcli.spec.task import TaskSpec
 
 
 class SpecMember(Protocol):

@@ -29,7 +29,8 @@ from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.partial.partial_task import intended_ids
 from manipcli.spec.retry import retried
-from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.step import StepSpec
+from manipcli.spec.task import TaskSpec
 from manipcli.task.agree_limits import unusable_limits
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged

@@ -31,7 +31,7 @@ from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import explained
 from manipcli.spec.keep import KeepSpec
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 from manipcli.task.task import Task
 
 

@@ -10,7 +10,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claim, Claims
 from manipcli.plan.motion import Switch
 from manipcli.plan.steps import STEPS
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 
 
 def foreseen(switch: Switch, claims: Claims, robot: RobotModel) -> tuple[tuple[Problem, ...], Claims]:

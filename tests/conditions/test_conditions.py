@@ -20,7 +20,8 @@ from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
 from manipcli.model.state import WorldState
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
-from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
+from manipcli.spec.scene import BodySpec, FrameSpec
+from manipcli.spec.task import TaskSpec
 
 BODIES: dict[str, Any] = {
     "cup": {"cup": {"radius": 0.04, "height": 0.11, "wall": 0.01}, "mass": 0.15, "pose": {"xyz": [1, 0, 0.4]}},

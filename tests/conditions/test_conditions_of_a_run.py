@@ -20,7 +20,8 @@ from manipcli.model.robot import Group, RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.build_scene import build_scene
 from manipcli.shapes.primitives import Geometry, Sphere
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 
 PERIOD, T = 0.01, 101
 TIMES = np.arange(T) * PERIOD

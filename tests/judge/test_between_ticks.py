@@ -20,7 +20,8 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
 from manipcli.scene.build_scene import build_scene
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import task_spec
 
 PERIOD, EVERY, T = 0.001, 10, 101

@@ -21,7 +21,8 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.condition import ExpectationSpec
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import task_spec
 
 PERIOD = 0.01

@@ -24,7 +24,8 @@ from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEven
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.base import Model
 from manipcli.spec.condition import ExpectationSpec
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import task_spec
 
 PERIOD, T = 0.01, 201

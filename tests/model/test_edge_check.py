@@ -15,7 +15,8 @@ from manipcli.model.edge_check import SLACK, EdgeCheck
 from manipcli.model.kinematics import Kinematics
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 
 MARGIN = 0.004
 POLE = '<collision><origin xyz="0.5 0 0"/><geometry><box size="0.6 0.002 0.002"/></geometry></collision>'

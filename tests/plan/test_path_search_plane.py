@@ -20,7 +20,8 @@ from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_search import PathSearch
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 
 RADIUS, MARGIN = 0.02, 0.004
 GANTRY = f"""<robot name="gantry">

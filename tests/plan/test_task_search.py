@@ -21,7 +21,7 @@ from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.plan.task_search import MOST, search_task
 from manipcli.run import replan
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import Plan, plan_step, plan_task
 from manipcli.task.task import Task

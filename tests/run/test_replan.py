@@ -25,7 +25,7 @@ from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
-from manipcli.spec.task import StepSpec
+from manipcli.spec.step import StepSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import Plan, plan_step, plan_task
 from manipcli.task.task import Task

@@ -16,7 +16,8 @@ from manipcli.description.packages import Packages
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.shapes.primitives import Box, Cylinder
-from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
+from manipcli.spec.scene import BodySpec, FrameSpec
+from manipcli.spec.task import TaskSpec
 
 DESK: dict[str, Any] = {"box": {"size": [0.6, 1.0, 0.4]}, "pose": {"xyz": [0.85, 0, 0.2]}, "fixed": True}
 CUP: dict[str, Any] = {"cup": {"radius": 0.036, "height": 0.11, "wall": 0.004}, "mass": 0.15}

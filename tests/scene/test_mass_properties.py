@@ -10,7 +10,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.scene import body_shapes
 from manipcli.scene.mass_properties import union
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Sphere
-from manipcli.spec.task import CupSpec, TraySpec
+from manipcli.spec.scene import CupSpec, TraySpec
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 

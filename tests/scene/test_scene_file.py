@@ -14,7 +14,8 @@ from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.scene.scene_file import scene_from_json, scene_to_json
 from manipcli.shapes.primitives import Geometry, Mesh
-from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
+from manipcli.spec.scene import BodySpec, FrameSpec
+from manipcli.spec.task import TaskSpec
 
 BODIES: dict[str, Any] = {
     "desk": {"box": {"size": [0.6, 1.0, 0.4]}, "pose": {"xyz": [0.85, 0, 0.2], "rpy": [0, 0, 0.3]}, "fixed": True},

@@ -25,7 +25,8 @@ from manipcli.shapes import convex_parts as module
 from manipcli.shapes.convex_parts import concave, convex_parts
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import ConvexPart, Mesh
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 
 RADIUS, WALL = 0.08, 0.008
 LAYERS: tuple[Layer, ...] = ("visual", "collision")

@@ -16,7 +16,8 @@ from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Body
 from manipcli.simulate.engines import pybullet_world
 from manipcli.simulate.engines.pybullet_world import add_body
-from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.spec.scene import BodySpec
+from manipcli.spec.task import TaskSpec
 
 RADIUS, WALL, HEIGHT, MASS = 0.03, 0.003, 0.1, 0.12
 

@@ -31,7 +31,7 @@ from manipcli.record.write.container import Container
 from manipcli.record.write.goals import GoalLog
 from manipcli.record.write.rows import message_record
 from manipcli.scene.scene import Scene
-from manipcli.spec.task import JUDGED
+from manipcli.spec.recording import JUDGED
 
 BLOCK_SECONDS = 0.5
 

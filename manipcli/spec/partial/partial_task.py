@@ -16,7 +16,8 @@ from manipcli.spec.explain import explain
 from manipcli.spec.located import Located, Source
 from manipcli.spec.override import step_ids
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at, without
-from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.step import StepSpec
+from manipcli.spec.task import TaskSpec
 
 LISTS = ("steps", "expect", "watch")
 """Lists whose invalid items are removed one by one."""

@@ -1,0 +1,133 @@
+"""Specs of the scene: bodies with one shape each, and named frames."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Length, Mass, Turn
+from manipcli.spec.robot import PoseSpec
+
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
+
+
+class BoxSpec(Model):
+    """A solid box; its frame is at its centre."""
+
+    size: tuple[Size, Size, Size] = Field(description="Full lengths along x, y, z [m], 1 um to 100 m.")
+
+
+class SphereSpec(Model):
+    """A solid sphere; its frame is at its centre."""
+
+    radius: Size = Field(description="Radius [m], 1 um to 100 m.")
+
+
+class CylinderSpec(Model):
+    """A solid upright cylinder; its frame is in the middle of its bottom."""
+
+    radius: Size = Field(description="Radius [m], 1 um to 100 m.")
+    height: Size = Field(description="Height [m], 1 um to 100 m.")
+
+
+class CupSpec(Model):
+    """An open cup: a floor disc and a ring of `segments` wall boxes; its frame is in the middle of its bottom."""
+
+    radius: Size = Field(description="Outer radius [m], 1 um to 100 m.")
+    height: Size = Field(description="Outer height [m], 1 um to 100 m.")
+    wall: Size = Field(0.004, description="Thickness of wall and floor [m], 1 um to 100 m. Default 4 mm.")
+    segments: Annotated[int, Field(ge=6, le=64, description="Wall boxes, 6 to 64. Default 16.")] = 16
+
+
+class TraySpec(Model):
+    """An open tray: floor and four walls; its frame is in the middle of its bottom."""
+
+    size: tuple[Size, Size, Size] = Field(description="Outer lengths along x, y, z [m], 1 um to 100 m.")
+    wall: Size = Field(0.005, description="Thickness of walls and floor [m], 1 um to 100 m. Default 5 mm.")
+
+
+MeshCollision = Literal["hull", "parts"]
+"""The shape for contact of a mesh: its convex hull, or convex parts of it."""
+_COLLISION: Final = (
+    "Shape of a mesh for contact: `hull`, its convex hull; `parts`, its convex parts, so that a bowl is hollow (needs "
+    "`manipcli[coacd]`). Default: `hull` for a mesh that fills at least 90 % of its hull, else `parts`."
+)
+
+
+class MeshSpec(Model):
+    """A mesh file (STL, OBJ, Collada); for contact it is its convex hull or convex parts."""
+
+    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
+    scale: Annotated[float, Field(ge=1e-6, le=1e6, description="Factor on all three axes, 1e-6 to 1e6. Default 1.")] = (
+        1.0
+    )
+    collision: MeshCollision | None = Field(None, description=_COLLISION)
+
+
+class UrdfSpec(Model):
+    """A single-link URDF file as an object."""
+
+    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
+    collision: MeshCollision | None = Field(None, description=_COLLISION)
+
+
+class BodySpec(Model):
+    """A body of the scene: exactly one shape key, one placement, and contact parameters.
+
+    Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`, in
+    its middle or offset from it by `at: [x, y]`.
+    """
+
+    box: BoxSpec | None = Field(None, description="Shape: a solid box.")
+    sphere: SphereSpec | None = Field(None, description="Shape: a solid sphere.")
+    cylinder: CylinderSpec | None = Field(None, description="Shape: a solid upright cylinder.")
+    cup: CupSpec | None = Field(None, description="Shape: an open cup.")
+    tray: TraySpec | None = Field(None, description="Shape: an open tray.")
+    mesh: MeshSpec | None = Field(None, description="Shape: a mesh file.")
+    urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
+    pose: PoseSpec | None = Field(None, description="Start pose of its frame in the world.")
+    rests_on: str | None = Field(
+        None, description="The body it rests on, which must not be tilted; `at` gives the position."
+    )
+    at: tuple[Length, Length] | None = Field(
+        None,
+        description="x, y [m]. With `rests_on`, which needs it: in the world. With `inside`: from the middle of the "
+        "container, along its axes.",
+    )
+    yaw: Turn = Field(
+        0.0, description="Rotation about the world's z axis [rad]; with `inside`, the container's. Default 0."
+    )
+    inside: str | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
+    fixed: bool = Field(
+        False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
+    )
+    mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
+        None, description="Mass [kg], above 0 to 100 t; required unless `fixed` or `urdf`."
+    )
+    friction: Annotated[float, Field(ge=0)] = Field(
+        0.8,
+        description="Sliding friction coefficient, 0 or more; the engine multiplies it by the other body's. "
+        "Default 0.8.",
+    )
+    rolling_friction: Annotated[
+        float, Field(ge=0, description="Rolling friction coefficient, 0 or more. Default 0.")
+    ] = 0.0
+    spinning_friction: Annotated[
+        float, Field(ge=0, description="Spinning friction coefficient, 0 or more. Default 0.")
+    ] = 0.0
+    restitution: Fraction = Field(
+        0.0, description="Coefficient of restitution, 0 to 1; the engine multiplies it by the other body's. Default 0."
+    )
+    color: tuple[Fraction, Fraction, Fraction, Fraction] | None = Field(
+        None, description="Red, green, blue, opacity, each 0 to 1; only for pictures."
+    )
+
+
+class FrameSpec(Model):
+    """A named frame, fixed in `parent`: `world` or a body of the scene."""
+
+    parent: str = Field("world", description="`world` or a body. Default `world`.")
+    pose: PoseSpec = Field(PoseSpec(), description="Pose of the frame in its parent. Default: identity.")
