@@ -9,13 +9,14 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Final
 
 import typer
 from typer.exceptions import TyperException
 
-from manipcli.cli import console
+from manipcli.cli import console, option_defaults
 from manipcli.cli.commands import (
     at,
     bless,
@@ -38,6 +39,7 @@ from manipcli.cli.commands import (
     view,
 )
 from manipcli.cli.commands import list as list_
+from manipcli.cli.volume import with_volume
 from manipcli.core import collector
 from manipcli.core.activity import announced_to
 from manipcli.core.errors import Diagnostic, ExitCode, ManipcliError
@@ -106,13 +108,35 @@ def _app(words: Sequence[str]) -> typer.Typer:
         # Rich help doubles the time of --help; plain help is within 10 % of importing typer.
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback(epilog=_EXIT_CODES)(_root)
     called = next((word for word in words if not word.startswith("-")), None)
     for name, function in COMMANDS.items():
         shown = name == called or _COMPLETION in os.environ
-        app.command(name)(function if shown else _without_parameters(function))
+        app.command(name)(with_volume(function) if shown else _without_parameters(function))
     return app
+
+
+def _defaults(words: Sequence[str]) -> tuple[dict[str, object], tuple[str, ...]]:
+    """Defaults of the called command from a file, as Typer takes them, and a line for each; told with --verbose.
+
+    Raises:
+        InvalidInput: the file is invalid.
+    """
+    from pathlib import Path
+
+    called = next((word for word in words if not word.startswith("-")), None)
+    if called not in COMMANDS or option_defaults.WITHOUT in os.environ:
+        return {}, ()
+    try:
+        found = option_defaults.defaults_of(called, COMMANDS, folder=Path.cwd())
+    except FileNotFoundError:  # the working directory has been removed, which the command tells
+        return {}, ()
+    if {"-v", "--verbose"} & {*words}:
+        for line in found.told:
+            console.error(f"default: {line}")
+    return {called: dict(found.values)}, found.told
 
 
 def _without_parameters(function: Callable[..., object]) -> Callable[[], None]:
@@ -144,14 +168,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not os.environ.get("MANIPCLI_DEBUG"):
             warnings.simplefilter("ignore")  # findings report what numpy warns of
     console.prepare()
+    told: tuple[str, ...] = ()
     try:
         with announced_to(console.talk):
-            code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
+            defaults, told = _defaults(words)
+            code = _app(words)(
+                args=words or ["--help"], prog_name="manipcli", standalone_mode=False, default_map=defaults
+            )
         if code == _INTERRUPTED_BY_TYPER:
             raise KeyboardInterrupt
         return int(code or ExitCode.PASSED)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (the last resort: one message and an exit code)
-        return _fail(error, format_=_wanted_format(words))
+        return _fail(error, format_=_wanted_format(words), told=told)
 
 
 def _is_interrupt(error: BaseException) -> bool:
@@ -161,16 +189,23 @@ def _is_interrupt(error: BaseException) -> bool:
     return of_a_model or isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
 
 
-def _fail(error: BaseException, *, format_: str) -> ExitCode:
-    """Prints an error: as text on stderr; or as one JSON object, or SARIF, on stdout."""
+def _fail(error: BaseException, *, format_: str, told: Sequence[str]) -> ExitCode:
+    """Prints an error: as text on stderr; or as one JSON object, or SARIF, on stdout.
+
+    `told`: a line for each default from a file, which a usage error names.
+    """
     code, findings = _classify(error)
+    if isinstance(error, TyperException):
+        for line in told:
+            if f"'{line.split()[0]}'" in findings[0].message:
+                findings = (replace(findings[0], hint=f"it is a default: {line}"),)
     try:
         from manipcli.report import json, text
     except ImportError:  # an interrupt in the import of a library, which then cannot be imported any more
-        console.talk("\n".join(finding.message for finding in findings))
+        console.error("\n".join(finding.message for finding in findings))
         return code
     if os.environ.get("MANIPCLI_DEBUG"):
-        console.talk("".join(traceback.format_exception(error)).rstrip())
+        console.error("".join(traceback.format_exception(error)).rstrip())
     try:
         written = not (isinstance(error, OSError) and error.filename == console.STDOUT)
         if format_ == "sarif" and written:
@@ -181,7 +216,7 @@ def _fail(error: BaseException, *, format_: str) -> ExitCode:
             known = error.known if isinstance(error, RecordingFailed) else {}
             console.result(json.render_errors(findings, "failed" if code is ExitCode.FAILED else "error", known=known))
         else:
-            console.talk("\n".join(map(text.describe, findings)))
+            console.error("\n".join(map(text.describe, findings)))
     except OSError:
         return ExitCode.INTERNAL  # no stream is left to print to
     return code

@@ -1,8 +1,8 @@
 """Printing: results to stdout, everything else to stderr. No other file prints.
 
 Text is made safe for a terminal (control characters escaped, characters outside the encoding written as `\\x..`) and
-coloured only on a terminal without NO_COLOR; colour adds no information. A reader that closes the pipe
-(`manipcli list | head`) does not change the exit code. Only a file that is written to stdout must be complete.
+coloured only on a terminal without NO_COLOR, or with FORCE_COLOR; colour adds no information. A reader that closes the
+pipe (`manipcli list | head`) does not change the exit code. Only a file that is written to stdout must be complete.
 """
 
 from __future__ import annotations
@@ -26,11 +26,22 @@ _COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[":
 _PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
 
 
+_quiet = _verbose = False
+
+
+def set_volume(*, quiet: bool, verbose: bool) -> None:
+    """How much this command says: `talk` is silent if `quiet`, `detail` speaks only if `verbose`."""
+    global _quiet, _verbose
+    _quiet, _verbose = quiet, verbose
+
+
 def prepare() -> None:
     """Prepares the streams, once: every character can be printed, and no file replaces a closed stream.
 
-    Started with `>&-`, the next opened file would get descriptor 1 and receive what libraries print.
+    A command line begins with the usual volume. Started with `>&-`, the next opened file would get descriptor 1 and
+    receive what libraries print.
     """
+    set_volume(quiet=False, verbose=False)
     for descriptor in (0, 1, 2):
         try:
             os.fstat(descriptor)
@@ -65,9 +76,21 @@ def result_bytes(path: Path) -> None:
         shutil.copyfileobj(file, stream.buffer)
 
 
-def talk(text: str) -> None:
-    """Prints progress, notes and errors to stderr."""
+def error(text: str) -> None:
+    """Prints an error to stderr."""
     _write(sys.stderr, f"{_dressed(text, sys.stderr)}\n")
+
+
+def talk(text: str) -> None:
+    """Prints progress and notes to stderr, unless --quiet is given."""
+    if not _quiet:
+        error(text)
+
+
+def detail(text: str) -> None:
+    """Prints to stderr what only --verbose asks for."""
+    if _verbose:
+        error(text)
 
 
 def not_drawn(lines: Sequence[str]) -> None:
@@ -80,8 +103,8 @@ def not_drawn(lines: Sequence[str]) -> None:
 
 
 def is_live() -> bool:
-    """Whether stderr is a terminal whose line can be redrawn."""
-    return _is_terminal(sys.stderr) and os.environ.get("TERM") != "dumb"
+    """Whether stderr is a terminal whose line can be redrawn, and --quiet is not given."""
+    return not _quiet and _is_terminal(sys.stderr) and os.environ.get("TERM") != "dumb"
 
 
 def redraw(text: str) -> None:
@@ -101,7 +124,12 @@ def _is_terminal(stream: TextIO | None) -> bool:
 
 
 def _is_coloured(stream: TextIO | None) -> bool:
-    return _is_terminal(stream) and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    """NO_COLOR counts before FORCE_COLOR, and any other value than "" and 0 of that before the stream."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR", "0") not in ("", "0"):
+        return stream is not None and not stream.closed
+    return _is_terminal(stream) and os.environ.get("TERM") != "dumb"
 
 
 def _dressed(text: str, stream: TextIO | None) -> str:

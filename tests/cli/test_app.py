@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 import manipcli
 from manipcli.cli.app import COMMANDS, main
+from manipcli.cli.volume import with_volume
 from manipcli.core import collector
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
 from manipcli.core.geometry import Transform
@@ -421,10 +422,10 @@ def test_what_is_known_of_a_run_whose_log_the_disk_refused_is_told(
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_help_of_a_command_is_as_if_all_were_shown(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    whole = typer.Typer(rich_markup_mode=None)
+    whole = typer.Typer(rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
     whole.callback()(lambda: None)
     for name, function in COMMANDS.items():
-        whole.command(name)(function)
+        whole.command(name)(with_volume(function))
     expected = CliRunner().invoke(whole, [command, "--help"], prog_name="manipcli").output
     assert main([command, "--help"]) == 0
     shown = capsys.readouterr().out

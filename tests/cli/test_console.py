@@ -35,7 +35,8 @@ def test_a_title_in_a_file_cannot_recolour_the_terminal(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize(
-    ("environment", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)]
+    ("environment", "coloured"),
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)],
 )
 def test_colour_is_for_terminals_that_want_it(
     monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], coloured: bool
@@ -75,3 +76,19 @@ def test_of_much_that_is_not_drawn_some_is_told_and_the_rest_counted(
     assert len(lines) == told
     if count > told:
         assert lines[-1] == f"not drawn: {count - told + 1} more"
+
+
+@pytest.mark.parametrize(
+    ("environment", "coloured"),
+    [({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": "0"}, False), ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False)],
+)
+def test_colour_can_be_forced_into_a_pipe(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], coloured: bool
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    pipe = io.StringIO()
+    monkeypatch.setattr("sys.stdout", pipe)
+    console.result("✓ passed")
+    assert ("\x1b[" in pipe.getvalue()) is coloured

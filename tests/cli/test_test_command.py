@@ -276,6 +276,17 @@ def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.Captu
     assert "b.yaml::b" in told.err
 
 
+def test_collect_only_lists_what_would_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(folder, "a")
+    write(folder, "b")
+    assert main(["test", "--collect-only", "-k", "a or b"]) == 0
+    assert capsys.readouterr().out == "a.yaml::a\nb.yaml::b\n2 tests in 2 files\n"
+    assert main(["test", "--collect-only", "-k", "b", "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"total": 1, "tests": ["b.yaml::b"]}
+    assert not (folder / "runs").exists()
+    assert main(["test", "--collect-only", "-k", "none"]) == 5
+
+
 @pytest.mark.slow
 def test_good_and_bad_tasks_with_everything_written(folder: Path, call_cli: Any) -> None:
     write(folder, "good")

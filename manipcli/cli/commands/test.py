@@ -63,6 +63,12 @@ def test(
         typer.Option("--logs", metavar="DIR", help="Write logs and pictures to DIR [default: runs/test]."),
     ] = None,
     keep_logs: Annotated[bool, typer.Option("--keep-logs", help="Keep the logs of passed runs, too.")] = False,
+    collect_only: Annotated[
+        bool, typer.Option("--collect-only", "--co", help="List the tests that would run, and run none.")
+    ] = False,
+    durations: Annotated[
+        int | None, typer.Option("--durations", metavar="N", min=0, help="List the N slowest tests; 0: all.")
+    ] = None,
     engines: Engines = None,
     check_step: CheckStep = False,
     seed: Seed = None,
@@ -83,6 +89,7 @@ def test(
     with Interrupts():
         from manipcli.batch.job import FOLDER, Settings, limit
         from manipcli.cli.task_session import TaskSession
+        from manipcli.report.suite.suite_text import slowest_lines
 
         settings = Settings(
             overrides=tuple(overrides or ()),
@@ -103,11 +110,30 @@ def test(
         _check_folder("--logs", settings.folder, hint=None if logs else "name another folder with --logs DIR")
         places = paths or [Path()]
         with TaskSession(places, settings, keyword=keyword, samples=samples, last_failed=last_failed) as session:
+            if collect_only:
+                return _listed(session, format_)
             with _Lines(session, text=format_ == "text", quiet=quiet) as lines:
                 suite = session.run(at_once=jobs or _cores(), ended=lines.ended, first=first)
             unwritten = _write(suite, session, junit, report)
-        _show(replace(suite, notes=(*suite.notes, *unwritten)), format_, github=github)
+        slowest = slowest_lines(suite, durations) if durations is not None and format_ == "text" else ()
+        _show(replace(suite, notes=(*slowest, *suite.notes, *unwritten)), format_, github=github)
         return suite.exit_code or (ExitCode.INTERNAL if unwritten else ExitCode.PASSED)
+
+
+def _listed(session: TaskSession, format_: str) -> ExitCode:
+    """Prints the ids of the tests."""
+    from manipcli.report.suite.suite_json import render_tests
+
+    for note in session.notes:
+        console.talk(note)
+    console.result(render_tests([*session.jobs]) if format_ == "json" else "\n".join([*session.jobs, _count(session)]))
+    return ExitCode.PASSED if session.jobs else ExitCode.NOTHING_TO_RUN
+
+
+def _count(session: TaskSession) -> str:
+    from manipcli.core.text import number_of
+
+    return f"{number_of(len(session.jobs), 'test')} in {number_of(len(session.files), 'file')}"
 
 
 class _Lines:

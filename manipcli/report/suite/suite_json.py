@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 from manipcli.core.errors import Place
 from manipcli.report.agreement.agreement_json import agreement_object
@@ -27,6 +28,11 @@ def render_suite(suite: Suite) -> str:
             "cases": [_case(report) for report in suite.reports],
         }
     )
+
+
+def render_tests(ids: Sequence[str]) -> str:
+    """The JSON object of tests that are only listed."""
+    return dumps({"total": len(ids), "tests": list(ids)})
 
 
 def _case(report: CaseReport) -> Json:

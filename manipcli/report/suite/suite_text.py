@@ -103,6 +103,12 @@ def render_summary(suite: Suite) -> str:
     return f"{PASS if good else FAIL} {text} in {suite.duration:.1f} s, {number_of(suite.jobs, 'process')}{why}"
 
 
+def slowest_lines(suite: Suite, most: int) -> tuple[str, ...]:
+    """The `most` slowest cases, or all of them for 0: `  5.22 s  tasks/pour.yaml::pour`."""
+    slowest = sorted(suite.reports, key=lambda report: (-report.duration, report.case.id))
+    return tuple(f"{report.duration:7.2f} s  {report.case.id}" for report in slowest[: most or None])
+
+
 def render_suite(suite: Suite) -> str:
     """Failures, notes and summary after the lines of all cases; errors of a file are shown once, not per sample."""
     failures = [render_case(report) for report in once_a_file(suite.reports) if not report.passed]

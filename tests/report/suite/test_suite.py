@@ -27,7 +27,7 @@ from manipcli.report.suite.suite import (
     troubles_of,
     warnings_of,
 )
-from manipcli.report.suite.suite_text import gist, render_case, render_line, render_suite, render_summary
+from manipcli.report.suite.suite_text import gist, render_case, render_line, render_suite, render_summary, slowest_lines
 
 NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5, relative=0.78)
 UPRIGHT = ExpectationOutcome("upright", "passed", 0.0873, "rad", 14.4, relative=0.99)
@@ -257,3 +257,10 @@ def test_the_page_tells_all_that_is_wrong_with_what_has_no_page_of_its_own() -> 
 def test_signals_have_names() -> None:
     assert signal_name(11) == "signal 11 (SIGSEGV)"
     assert signal_name(200) == "signal 200"
+
+
+def test_the_slowest_come_first() -> None:
+    reports = tuple(replace(PASSED, duration=seconds) for seconds in (1.0, 30.25, 2.0))
+    suite = Suite(reports, total=3, jobs=1, duration=33.0)
+    assert slowest_lines(suite, 2) == ("  30.25 s  tasks/pour.yaml::pour", "   2.00 s  tasks/pour.yaml::pour")
+    assert len(slowest_lines(suite, 0)) == 3
