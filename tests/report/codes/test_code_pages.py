@@ -1,0 +1,108 @@
+"""Every code has a page, and every example is what it says: the faulty one gets the code, the sound one does not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from manipcli import pipeline
+from manipcli.cli import app
+from manipcli.core.errors import ExitCode, InvalidInput
+from manipcli.description.lint.checks import CHECKS
+from manipcli.report.codes.code_page import CodePage, Kind, code_pages, render_markdown, render_text
+from manipcli.spec.source.tree import MappingNode
+from manipcli.spec.source.yaml import parse
+
+ROOT = Path(__file__).parents[3]
+SOURCE = [path for path in (ROOT / "manipcli").rglob("*.py") if "codes" not in path.parts]
+LITERAL = re.compile(
+    r"""["']((?:BLE|CTRL|INIT|INT|LOG|PLAN|PLOT|REPLAY|ROBOT|RUN|SIM|SRDF|TASK|TRAJ|TRAN|TUNE|URDF|USE|VIEW|XACRO|YAML)\d{3})["']"""
+)
+BASES: Mapping[Kind, str] = {
+    "task": f"""\
+task: example
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+simulation: {{engine: kinematic}}
+steps: [{{wait: 0.1 s}}]
+""",
+    "robot": "robot: example\ndescription: arm.urdf\n",
+    "controllers": "",
+}
+ARM = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="1" effort="10"/></joint>
+</robot>
+"""
+"""`arm.urdf` beside the examples of robot and controllers files."""
+PAGES = code_pages()
+CHECKED = {check.code for check in CHECKS}
+FILES = [page for page in PAGES.values() if page.kind in BASES or (page.kind in ("urdf", "xacro") and page.good)]
+
+
+def written(page: CodePage, text: str, folder: Path) -> Path:
+    """The example as a complete file: the keys of its base that it does not have are added."""
+    (folder / "arm.urdf").write_text(ARM)
+    for name, content in page.files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(content)
+    if page.kind in ("urdf", "xacro"):
+        path = folder / ("example.urdf.xacro" if page.kind == "xacro" else "example.urdf")
+        path.write_text(text)
+        return path
+    base = parse(BASES[page.kind], "base")
+    try:
+        own = parse(text, "example")
+    except InvalidInput:  # an example of invalid YAML is a whole file
+        own = None
+    keys = set(own.entries) if isinstance(own, MappingNode) else set()
+    added = [
+        line for line in BASES[page.kind].splitlines()
+        if isinstance(base, MappingNode) and line.partition(":")[0] not in keys and own is not None
+    ]  # fmt: skip
+    path = folder / "example.yaml"
+    path.write_text("\n".join([*added, text]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("page", FILES, ids=lambda page: page.code)
+def test_the_faulty_example_gets_the_code_and_the_sound_one_no_error(page: CodePage, tmp_path: Path) -> None:
+    if page.bad and page.code not in CHECKED:
+        found = pipeline.check_files([written(page, page.bad, tmp_path)])
+        assert page.code in {finding.code for finding in found}, found
+    if page.good:
+        found = pipeline.check_files([written(page, page.good, tmp_path)])
+        assert page.code not in {finding.code for finding in found}, found
+        assert not [finding for finding in found if finding.severity == "error"], found
+
+
+def test_every_code_in_the_source_has_a_page() -> None:
+    written_down = {code for path in SOURCE for code in LITERAL.findall(path.read_text(encoding="utf-8"))}
+    assert sorted(written_down - set(PAGES)) == []
+
+
+@pytest.mark.parametrize("page", PAGES.values(), ids=lambda page: page.code)
+def test_every_page_is_whole(page: CodePage) -> None:
+    assert page.title and not page.title.endswith("."), "a few words"
+    assert page.why.endswith("."), "one or two sentences"
+    if page.kind != "situation":
+        assert page.bad
+    assert page.code in render_text(page) and page.code in render_markdown(page)
+
+
+def test_the_docs_are_those_of_the_pages() -> None:
+    for code, page in PAGES.items():
+        assert (ROOT / "docs" / "codes" / f"{code}.md").read_text(encoding="utf-8") == render_markdown(page)
+
+
+def test_the_command_prints_a_page(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["explain", "task203"]) == ExitCode.PASSED
+    assert capsys.readouterr().out.startswith("TASK203: unknown parameter\n")
+    assert app.main(["explain", "TASK2O3"]) == ExitCode.USAGE
+    assert "did you mean 'TASK203'" in capsys.readouterr().err
