@@ -23,6 +23,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
+from manipcli.conditions.frames import unknown_frame
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
@@ -36,7 +37,7 @@ from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import StepMember
 from manipcli.plan.tolerance_spec import ToleranceSpec
 from manipcli.plan.tool_path import arc, blended
-from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
+from manipcli.plan.unknown_names import unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue, Length, Share
