@@ -80,3 +80,11 @@ def unknown_part(scene: Scene, body: str, part: str, loc: Loc) -> tuple[Problem,
         return ()
     hint = did_you_mean(part, scene.parts(body), kind=f"parts of '{body}'")
     return (Problem(loc, f"'{body}' has no part '{part}'", hint),)
+
+
+def fixed_frame(robot: RobotModel, scene: Scene, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """A problem if the frame is unknown, or moves with the robot."""
+    if name == "tool" or (name.startswith(f"{ROBOT}{SEPARATOR}") and not unknown_frame(robot, scene, name, loc)):
+        message = f"'{name}' moves with the robot; a place cannot refer to it"
+        return (Problem(loc, message, "use `base`, a body, a part of one or a named frame"),)
+    return unknown_frame(robot, scene, name, loc)
