@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.conditions.frames import carrier, fixed_frame, unknown_part
@@ -134,6 +134,17 @@ class PlaceSpec(Model):
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying; lowering uses half."
     )
 
+    @field_validator("at", mode="before")
+    @classmethod
+    def _two(cls, at: object) -> object:
+        if isinstance(at, list | tuple) and len(at) == 3:
+            hint = "for a point write `at: {of: world, xyz: [x, y, z]}`"
+            raise problem("count", "`at: [x, y]` has 2 numbers, not 3", hint=hint)
+        if isinstance(at, str) and at != "start":
+            hint = f"for the middle of a body write `onto: {at}`"
+            raise problem("name", f"expected `start`, [x, y] or a relation, not '{at}'", hint=hint)
+        return at
+
     @property
     def support(self) -> str | None:
         """The body that it is set down on or in."""
@@ -165,7 +176,8 @@ def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
         if known and spec.object in {body.name for body in scene.bodies}:
             found += unknown_part(scene, spec.object, spec.part, ("part",))
         if not isinstance(spec.at, RelationSpec) or spec.at.xyz is None:
-            hint = "`at: {of: FRAME, xyz: [x, y, z]}`, or remove `part`"
+            under = f"{spec.support}/top" if spec.onto is not None else "FRAME"
+            hint = f"write `at: {{of: {under}, xyz: [x, y, z]}}`, or remove `part`"
             found.append(Problem(("part",), "`part` needs a point to which it goes", hint))
     return tuple(found)
 
@@ -195,23 +207,25 @@ def _support(spec: PlaceSpec, scene: Scene) -> Iterator[Problem]:
         return
     if name == spec.object:
         itself = "placed on itself" if word == "onto" else "put into itself"
-        yield Problem((word,), f"'{name}' cannot be {itself}")
+        yield Problem((word,), f"'{name}' cannot be {itself}", "name another body")
         return
     unknown = unknown_body(scene, name, (word,))
     if unknown:
         yield from unknown
         return
     under = scene.body(name)
-    if name == "floor" and spec.at is None and spec.region is None:
+    if name == "floor" and word == "onto" and spec.at is None and spec.region is None:
         yield Problem((word,), "the floor has no middle to place it on", "add `at: [x, y]`")
     if under.fixed and under.X_WO.R[2, 2] < UPRIGHT:
-        yield Problem((word,), f"'{name}' is tilted; '{spec.object}' cannot be placed on it")
+        hint = "place it on an upright body, or at a point: `at: {of: ..., xyz: [x, y, z]}`"
+        yield Problem((word,), f"'{name}' is tilted; '{spec.object}' cannot be placed on it", hint)
     elif word == "into" and under.interior is None and under.kind not in FORMED:
         hollow = [body.name for body in scene.bodies if body.interior is not None]
         hint = f"containers here: {', '.join(hollow)}" if hollow else f"to set it on top, write `onto: {name}`"
         yield Problem((word,), f"'{name}' is a {under.kind} and has no hollow", hint)
     elif under.kind == "sphere":
-        yield Problem((word,), f"'{name}' is a sphere; nothing stands on it")
+        hint = "place it on a box, a cylinder or the floor"
+        yield Problem((word,), f"'{name}' is a sphere; nothing stands on it", hint)
     elif any(body.name == spec.object for body in scene.bodies):
         yield from _size(scene.body(spec.object), under, word)
 
