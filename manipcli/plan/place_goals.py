@@ -37,10 +37,11 @@ def standing(
     yaw: float | None,
     word: str = "at",
     key: str = "onto",
+    frame: str = "world",
 ) -> Transform:
     """X_WG of an object that stands upright on a body at [x, y] in the world, with this yaw [rad] or its present one.
 
-    `word` and `key` are the keys of the step that set the place and the support.
+    `word` and `key` are the keys of the step that set the place and the support, `frame` what the place refers to.
 
     Raises:
         NotPlannable: the support is tilted, or is not below this place.
@@ -54,7 +55,7 @@ def standing(
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
         raise NotPlannable(
             f"[{at[0]:g}, {at[1]:g}] m is outside '{onto}', whose centre is at [{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`{word}` is in the world frame; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
+            hint=f"`{word}` is in {'the world frame' if frame == 'world' else f"the frame of '{frame}'"}; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
             loc=(word,),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
@@ -101,19 +102,25 @@ def crowded(
 
     What lies wholly below the object does not crowd it: the desk under a tray with a thin floor.
     """
-    root = planner.robot.root
-    carried = Carried(body=name, link=root, X_LO=planner.robot.X_WB.inverse() @ X_WG)
-    there = planner.checker.at(
-        state.bodies, carried=carried, margin=ROOM, only=name, absent=planner.contents(state, name)
-    )
     bottom = drop_test.bottom(planner.scene.body(name), X_WG) + LEVEL
 
     def beside(hit: CollisionHit) -> bool:
         other = hit.a if hit.b == name else hit.b
         return drop_test.top(planner.scene.body(other), planner.body_pose(state, other)) > bottom
 
-    near = [hit for hit in there.every(state.position) if not {hit.a, hit.b} & {onto} and _is_body(hit) and beside(hit)]
+    found = hits_at(planner, state, name, X_WG, margin=ROOM)
+    near = [hit for hit in found if not {hit.a, hit.b} & {onto} and beside(hit)]
     return min(near, key=lambda hit: hit.distance, default=None)
+
+
+def hits_at(
+    planner: Planner, state: PlanningState, name: str, X_WG: Transform, *, margin: float
+) -> tuple[CollisionHit, ...]:
+    """Every body within `margin` [m] of an object at `X_WG`, without what the object contains."""
+    carried = Carried(body=name, link=planner.robot.root, X_LO=planner.robot.X_WB.inverse() @ X_WG)
+    absent = planner.contents(state, name)
+    there = planner.checker.at(state.bodies, carried=carried, margin=margin, only=name, absent=absent)
+    return tuple(hit for hit in there.every(state.position) if _is_body(hit))
 
 
 def _is_body(hit: CollisionHit) -> bool:

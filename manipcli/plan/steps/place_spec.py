@@ -14,7 +14,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -136,7 +136,7 @@ class PlaceSpec(Model):
 
     @field_validator("at", mode="before")
     @classmethod
-    def _two(cls, at: object) -> object:
+    def _two(cls, at: Any) -> Any:
         if isinstance(at, list | tuple) and len(at) == 3:
             hint = "for a point write `at: {of: world, xyz: [x, y, z]}`"
             raise problem("count", "`at: [x, y]` has 2 numbers, not 3", hint=hint)

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
+from manipcli.core.units import readable
 from manipcli.plan.beside import beside
 from manipcli.plan.motion import PlanningState
-from manipcli.plan.place_goals import UPRIGHT, floor_of, heading, standing
+from manipcli.plan.place_goals import UPRIGHT, floor_of, heading, hits_at, standing
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps.place_spec import PlaceSpec, RegionSpec, RelationSpec
 from manipcli.scene import drop_test
-from manipcli.scene.drop_test import FORMED
+from manipcli.scene.drop_test import FORMED, drop_height
 
+DEEPEST: Final = 0.002
+"""[m] A deeper overlap at a place is refused; contacts of meshes are not exact."""
+MOST_FALL: Final = 0.01
+"""[m] A placed object is within this of its place."""
 Spot = tuple[float, float]
 """[x, y] [m]."""
 
@@ -31,6 +37,14 @@ def goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
         raise NotPlannable(message, loc=(spec.support_key,))
     if spec.at_start:
         return planner.scene.body(spec.object).X_WO
+    X_WG = _goal(spec, planner, state)
+    _refuse_overlap(spec, planner, state, X_WG)
+    if spec.support is None:
+        _refuse_fall(spec, planner, state, X_WG)
+    return X_WG
+
+
+def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     if isinstance(spec.at, RelationSpec):
         return _related(spec, spec.at, planner, state)
     if isinstance(spec.at, tuple):
@@ -39,6 +53,45 @@ def goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     X_WU = planner.body_pose(state, under.name)
     x, y, _ = X_WU.apply(under.centre)
     return _on_support(spec, planner, state, (float(x), float(y)), _yaw(spec, X_WU), word=spec.support_key)
+
+
+def _refuse_overlap(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> None:
+    """Check that the place is not inside another body.
+
+    Raises:
+        NotPlannable: names the deepest overlap.
+    """
+    hit = min(hits_at(planner, state, spec.object, X_WG, margin=0.0), key=lambda hit: hit.distance, default=None)
+    if hit is None or hit.distance > -DEEPEST:
+        return
+    other = hit.a if hit.b == spec.object else hit.b
+    cause = f"'{spec.object}' would overlap '{other}' by {readable(-hit.distance, 'm')} at its place"
+    hint = (
+        f"to set it on top, write `onto: {other}`" if spec.support is None else f"place it elsewhere, or move '{other}'"
+    )
+    unmoved = planner.body_pose(state, other) is planner.scene.body(other).X_WO
+    # What no step has moved does not depend on earlier choices.
+    loc = (("at",) if spec.at is not None else (spec.support_key,)) if unmoved else ()
+    raise NotPlannable(cause, hint=hint, parts=frozenset((other,)), loc=loc)
+
+
+def _refuse_fall(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> None:
+    """Check that something is below a place without a support.
+
+    Raises:
+        NotPlannable: it would fall.
+    """
+    body, inside = planner.scene.body(spec.object), planner.contents(state, spec.object)
+    falls = [
+        drop_height(body, X_WG, other, planner.body_pose(state, other.name))
+        for other in planner.scene.bodies
+        if other.name not in (spec.object, *inside)
+    ]
+    fall = min((height for height in falls if height is not None), default=None)
+    if fall is None or fall > MOST_FALL:
+        far = "without end" if fall is None else f"by {readable(fall, 'm')}"
+        hint = "lower it, or name what it stands on: `onto: BODY`"
+        raise NotPlannable(f"'{spec.object}' would fall {far}: nothing is below its place", hint=hint, loc=("at",))
 
 
 def located(region: RegionSpec, planner: Planner, state: PlanningState) -> Callable[[Spot], Spot]:
@@ -69,7 +122,12 @@ def _on_support(
     spec: PlaceSpec, planner: Planner, state: PlanningState, at: Spot, yaw: float | None, *, word: str = "at"
 ) -> Transform:
     assert spec.support is not None  # `check` asks for it
-    return standing(planner, state, spec.object, spec.support, at, yaw, word, spec.support_key)
+    frame = "world"
+    if isinstance(spec.at, RelationSpec):
+        frame = spec.at.of
+    elif spec.region is not None and spec.region.frame is not None:
+        frame = spec.region.frame
+    return standing(planner, state, spec.object, spec.support, at, yaw, word, spec.support_key, frame)
 
 
 def _yaw(spec: PlaceSpec, X_WF: Transform) -> float | None:
@@ -94,7 +152,7 @@ def _related(spec: PlaceSpec, at: RelationSpec, planner: Planner, state: Plannin
     return _on_support(spec, planner, state, (float(x), float(y)), heading(R))
 
 
-def _beside(spec: PlaceSpec, at: RelationSpec, planner: Planner, state: PlanningState, R: np.ndarray) -> Transform:
+def _beside(spec: PlaceSpec, at: RelationSpec, planner: Planner, state: PlanningState, R: Array) -> Transform:
     """X_WG on one side of a body: as high as that, or on a support with a flat top."""
     body, other = planner.scene.body(spec.object), planner.scene.body(at.of)
     X_WU = _level(at.of, planner, state, ("at", "of"))
