@@ -53,9 +53,10 @@ def standing(
     floor, size = floor_of(under)
     x, y, _ = X_WU.inverse().apply([*at, 0.0]) - under.centre
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
+        refers = "the world frame" if frame == "world" else f"the frame of '{frame}', these points in the world"
         raise NotPlannable(
             f"[{at[0]:g}, {at[1]:g}] m is outside '{onto}', whose centre is at [{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`{word}` is in {'the world frame' if frame == 'world' else f"the frame of '{frame}'"}; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
+            hint=f"`{word}` is in {refers}; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
             loc=(word,),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
