@@ -11,15 +11,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
 
-from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.core.units import readable
 from manipcli.plan.antipodal import antipodal_pairs
-from manipcli.scene.scene import Body
+from manipcli.scene.scene import Body, Frame
 
 Direction = Literal["side", "top"]
 
@@ -209,6 +209,18 @@ class GraspFrames:
         if self.pitch is not None:
             return abs(math.asin(max(-1.0, min(1.0, -z))) - self.pitch) < TILTED
         return self.direction is None or (z < -0.9 if self.direction == "top" else abs(z) < 0.3)
+
+
+def part_alone(body: Body, part: Frame) -> Body:
+    """The part of a body as an object of its own, whose frame is that of the part: a box of its size, or a point."""
+    X_PO = part.X_PF.inverse()
+    return replace(
+        body,
+        kind="sphere" if part.size is None else "box",
+        geometries=tuple(replace(each, X_LS=X_PO @ each.X_LS) for each in body.geometries),
+        size=frozen(np.zeros(3) if part.size is None else part.size),
+        centre=frozen(np.zeros(3)),
+    )
 
 
 def first_fitting(frames: Iterator[GraspFrame], fits: Callable[[Transform], bool], most: int) -> Iterator[GraspFrame]:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried, CollisionHit
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
@@ -36,10 +36,12 @@ def standing(
     at: tuple[float, float],
     yaw: float | None,
     word: str = "at",
+    key: str = "onto",
+    frame: str = "world",
 ) -> Transform:
     """X_WG of an object that stands upright on a body at [x, y] in the world, with this yaw [rad] or its present one.
 
-    `word` is the key of the step that sets the place.
+    `word` and `key` are the keys of the step that set the place and the support, `frame` what the place refers to.
 
     Raises:
         NotPlannable: the support is tilted, or is not below this place.
@@ -47,18 +49,18 @@ def standing(
     body, under = planner.scene.body(name), planner.scene.body(onto)
     X_WU = planner.body_pose(state, onto)
     if X_WU.R[2, 2] < UPRIGHT:
-        raise NotPlannable(f"'{onto}' is tilted; '{name}' cannot be placed on it", loc=("onto",))
-    floor, size = _surface(under)
+        raise NotPlannable(f"'{onto}' is tilted; '{name}' cannot be placed on it", loc=(key,))
+    floor, size = floor_of(under)
     x, y, _ = X_WU.inverse().apply([*at, 0.0]) - under.centre
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
+        refers = "the world frame" if frame == "world" else f"the frame of '{frame}', these points in the world"
         raise NotPlannable(
             f"[{at[0]:g}, {at[1]:g}] m is outside '{onto}', whose centre is at [{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`{word}` is in the world frame; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
+            hint=f"`{word}` is in {refers}; '{onto}' offers {size[0]:g} m x {size[1]:g} m about its centre",
             loc=(word,),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
-    x_axis = planner.body_pose(state, name).R[:, 0]
-    turned = float(np.arctan2(x_axis[1], x_axis[0])) if yaw is None else yaw
+    turned = heading(planner.body_pose(state, name).R) if yaw is None else yaw
     X_WG = Transform.of(xyz=(*at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, turned))
     if under.kind not in FORMED:
         return X_WG
@@ -70,6 +72,11 @@ def standing(
             loc=(word,),
         )
     return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
+
+
+def heading(R: Array) -> float:
+    """[rad] Angle of the x axis of a rotation (3, 3) about the vertical."""
+    return float(np.arctan2(R[1, 0], R[0, 0]))
 
 
 def spots(centre: tuple[float, float], size: tuple[float, float]) -> Iterator[tuple[float, float]]:
@@ -89,24 +96,32 @@ def _halton(k: int, base: int) -> float:
     return value
 
 
-def crowded(planner: Planner, state: PlanningState, name: str, X_WG: Transform, onto: str) -> CollisionHit | None:
+def crowded(
+    planner: Planner, state: PlanningState, name: str, X_WG: Transform, onto: str | None
+) -> CollisionHit | None:
     """The nearest body within `ROOM` of an object at `X_WG`, other than its support; None without any.
 
     What lies wholly below the object does not crowd it: the desk under a tray with a thin floor.
     """
-    root = planner.robot.root
-    carried = Carried(body=name, link=root, X_LO=planner.robot.X_WB.inverse() @ X_WG)
-    there = planner.checker.at(
-        state.bodies, carried=carried, margin=ROOM, only=name, absent=planner.contents(state, name)
-    )
     bottom = drop_test.bottom(planner.scene.body(name), X_WG) + LEVEL
 
     def beside(hit: CollisionHit) -> bool:
         other = hit.a if hit.b == name else hit.b
         return drop_test.top(planner.scene.body(other), planner.body_pose(state, other)) > bottom
 
-    near = [hit for hit in there.every(state.position) if not {hit.a, hit.b} & {onto} and _is_body(hit) and beside(hit)]
+    found = hits_at(planner, state, name, X_WG, margin=ROOM)
+    near = [hit for hit in found if not {hit.a, hit.b} & {onto} and beside(hit)]
     return min(near, key=lambda hit: hit.distance, default=None)
+
+
+def hits_at(
+    planner: Planner, state: PlanningState, name: str, X_WG: Transform, *, margin: float
+) -> tuple[CollisionHit, ...]:
+    """Every body within `margin` [m] of an object at `X_WG`, without what the object contains."""
+    carried = Carried(body=name, link=planner.robot.root, X_LO=planner.robot.X_WB.inverse() @ X_WG)
+    absent = planner.contents(state, name)
+    there = planner.checker.at(state.bodies, carried=carried, margin=margin, only=name, absent=absent)
+    return tuple(hit for hit in there.every(state.position) if _is_body(hit))
 
 
 def _is_body(hit: CollisionHit) -> bool:
@@ -114,7 +129,7 @@ def _is_body(hit: CollisionHit) -> bool:
     return not hit.a.startswith("robot/") and not hit.b.startswith("robot/")
 
 
-def _surface(under: Body) -> tuple[float, tuple[float, float]]:
+def floor_of(under: Body) -> tuple[float, tuple[float, float]]:
     """Height [m] of the supporting surface of a body above its O, and its size (x, y) [m]."""
     if under.interior is None:
         return float(under.centre[2] + under.size[2] / 2), (float(under.size[0]), float(under.size[1]))

@@ -182,16 +182,18 @@ class Planner:
         return body.X_WO if body.fixed else state.bodies[self.scene.movable.index(body)]
 
     def frame(self, name: str, state: PlanningState) -> Transform:
-        """X_WF of `world`, `base`, `tool`, a body, or a named frame."""
+        """X_WF of `world`, `base`, `tool`, `robot/LINK`, a body, a part of one, or a named frame."""
         if name == "world":
             return Transform.identity()
         if name == "base":
             return self.robot.X_WB
         if name == "tool":
             return self.tool_pose(state)
-        for frame in self.scene.frames:
-            if frame.name == name:
-                return self.frame(frame.parent, state) @ frame.X_PF
+        frame = self.scene.frame(name)
+        if frame is not None:
+            return self.frame(frame.parent, state) @ frame.X_PF
+        if name.startswith(ROBOT):
+            return self.kinematics.forward(state.position, name.removeprefix(ROBOT))
         return self.body_pose(state, name)
 
     def held(self, state: PlanningState, body: str) -> None:

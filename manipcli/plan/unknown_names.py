@@ -1,4 +1,4 @@
-"""Unknown names in steps: poses, joints and frames, each with the nearest known name."""
+"""Unknown names in steps: poses and joints, each with the nearest known name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.plan.hand import handless
-from manipcli.scene.scene import Scene
 
 
 def unknown_pose(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
@@ -34,12 +33,6 @@ def unknown_joint(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]
     """A problem if the robot has no independent joint of this name, else empty."""
     known = (joint.name for joint in robot.joints if joint.independent)
     return _unknown(name, known, f"joint '{name}' is not a movable joint of robot '{robot.name}'", loc)
-
-
-def unknown_frame(scene: Scene, name: str, loc: Loc) -> tuple[Problem, ...]:
-    """A problem unless `name` is `world`, `base`, `tool`, a body or a named frame."""
-    known = ["world", "base", "tool", *(body.name for body in scene.bodies), *(frame.name for frame in scene.frames)]
-    return _unknown(name, known, f"unknown frame '{name}'", loc)
 
 
 def _unknown(name: str, known: Iterable[str], message: str, loc: Loc) -> tuple[Problem, ...]:

@@ -199,7 +199,7 @@ class Measured:
         it: it does not affect paths."""
         scene = self._planner.scene
         named = _texts(step.body.model_dump())
-        named |= {frame.parent for frame in scene.frames if frame.name in named}
+        named |= {frame.parent for frame in map(scene.frame, named) if frame is not None}
         where, planned_where = self._containers(now), self._containers(planned)
         held = {each.body for each in (planned.carried, now.carried) if each is not None}
         for body in scene.movable:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape
 from manipcli.scene.drop_test import FORMED, drop_height
 from manipcli.scene.mass_properties import union
-from manipcli.scene.scene import Body, Frame, Interior, Scene
+from manipcli.scene.named_frames import in_owner, named_frames, owner
+from manipcli.scene.scene import Body, Interior, Scene
 from manipcli.scene.scene_names import Locate, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
@@ -25,7 +26,7 @@ from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
-PLACING = ("pose", "rests_on", "inside", "at", "yaw")
+PLACING = ("pose", "rests_on", "inside", "frame", "at", "yaw")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 LONGEST = 10.0
 """[m] Longest movable body: a longer one was probably meant in millimetres."""
@@ -77,7 +78,7 @@ class _Builder:
             X_WO = self._pose(name)
             if X_WO is not None and name in self.shapes:
                 bodies.append(self._body(name, self.spec.scene[name], X_WO))
-        frames = tuple(self._frames())
+        frames = tuple(named_frames(self.spec))
         if not self.findings:
             for a, b, depth in overlaps(bodies):
                 self._error(
@@ -205,7 +206,10 @@ class _Builder:
         if name in self.waiting:
             circle = " -> ".join((*self.waiting[self.waiting.index(name) :], name))
             last = self.waiting[-1]
-            word = "inside" if self.spec.scene[last].inside is not None else "rests_on"
+            follower = self.spec.scene[last]
+            word = next(
+                word for word in ("inside", "rests_on", "frame") if owner(self.spec, getattr(follower, word)) == name
+            )
             self._error("TASK225", f"circular placement of bodies: {circle}", ("scene", last, word))
             return None
         self.waiting.append(name)
@@ -236,7 +240,14 @@ class _Builder:
             if spec.yaw != 0.0:
                 hint = "write the yaw in the pose: `rpy: [0, 0, yaw]`"
                 self._error("TASK224", f"body '{name}' has both `pose` and `yaw`", (*loc, "yaw"), hint)
-            return spec.pose.transform
+            if spec.frame is None or spec.frame == "world":
+                return spec.pose.transform
+            X_WF = self._frame_pose(spec.frame)
+            return None if X_WF is None else X_WF @ spec.pose.transform
+        if spec.inside is not None and spec.frame is not None:
+            message = f"body '{name}' has both `inside` and `frame`"
+            self._error("TASK224", message, (*loc, "frame"), "remove `frame`: `at` is relative to the container")
+            return None
         word = "rests_on" if spec.rests_on is not None else "inside"
         other = spec.rests_on or spec.inside or ""
         known = other in self.spec.scene or other in self.poses  # unknown bodies are already reported
@@ -246,6 +257,14 @@ class _Builder:
         if word == "inside":
             return self._inside(name, spec, other, X_WB)
         return self._resting(name, spec, other, X_WB)
+
+    def _frame_pose(self, name: str) -> Transform | None:
+        """X_WF of the `frame` of a body at the start; None with a finding, here or elsewhere."""
+        body = owner(self.spec, name)
+        known = body in self.spec.scene or body in self.poses  # unknown names are already reported
+        X_WP = Transform.identity() if body == "world" else self._pose(body) if known else None
+        X_PF = in_owner(self.spec, name, self.shapes.get(body))
+        return None if X_WP is None or X_PF is None else X_WP @ X_PF
 
     def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
         """X_WO with the body's bottom on the top face of the other, or, for a body from a file, where a drop ends."""
@@ -262,8 +281,19 @@ class _Builder:
             message = f"body '{name}' cannot rest on '{other}': a {self.kinds[other]} has no flat top"
             self._error("TASK224", message, loc, hint)
             return None
+        at, yaw = spec.at, spec.yaw
+        if spec.frame is not None and spec.frame != "world":
+            X_WF = self._frame_pose(spec.frame)
+            if X_WF is None:
+                return None
+            if X_WF.R[2, 2] < UPRIGHT:
+                message = f"'{spec.frame}' is tilted: its `at: [x, y]` is not level"
+                self._error("TASK292", message, ("scene", name, "frame"), "use `pose` instead")
+                return None
+            x, y, _ = X_WF.apply([*at, 0.0])
+            at, yaw = (float(x), float(y)), yaw + float(X_WF.rpy[2])
         top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
-        X_WO = Transform.of(xyz=(*spec.at, top - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        X_WO = Transform.of(xyz=(*at, top - _bottom(shape)), rpy=(0.0, 0.0, yaw))
         x, y = X_WB.inverse().apply(X_WO.p)[:2] - support.centre[:2]
         beside = (
             np.hypot(x, y) > support.radius
@@ -271,11 +301,11 @@ class _Builder:
             else abs(x) > support.size[0] / 2.0 or abs(y) > support.size[1] / 2.0
         )
         if beside:
-            at = f"[{spec.at[0]:g}, {spec.at[1]:g}]"
+            where = f"[{spec.at[0]:g}, {spec.at[1]:g}] m" + (f" in '{spec.frame}'" if spec.frame else "")
             middle = X_WB.apply(support.centre)
             across = f"{support.size[0]:g} by {support.size[1]:g} m"
             hint = f"the top of '{other}' is {across}, centred at [{middle[0]:g}, {middle[1]:g}] m"
-            self._error("TASK224", f"'{name}' at {at} m is not above '{other}'", ("scene", name, "at"), hint)
+            self._error("TASK224", f"'{name}' at {where} is not above '{other}'", ("scene", name, "at"), hint)
             return None
         if not formed:
             return X_WO
@@ -311,12 +341,6 @@ class _Builder:
             return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
         return X_WB @ interior.X_OS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
-
-    # -- frames
-
-    def _frames(self) -> Iterable[Frame]:
-        for name, frame in self.spec.frames.items():
-            yield Frame(name=name, parent=frame.parent, X_PF=frame.pose.transform)
 
     # -- findings
 

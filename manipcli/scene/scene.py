@@ -9,9 +9,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.shapes.primitives import Box, Cylinder, Geometry
+
+SEPARATOR: Final = "/"
+"""Between a body and its part: `cup/handle`."""
+FACES: Final = {"top": 1.0, "bottom": -1.0}
+"""Parts that every body has: the middles of the upper and the lower face of its bounding box."""
+RIM: Final = "rim"
+"""Part of a container: the middle of its opening."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +76,18 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A named frame, fixed in `parent`: 'world' or a body."""
+    """A named frame, fixed in `parent`: 'world' or a body. A part of a body is a frame named `cup/handle`.
+
+    Attributes:
+        name, parent: as in the task.
+        X_PF: its pose in the parent.
+        size: (3,) [m] of a part, about its frame; None: it is a point.
+    """
 
     name: str
     parent: str
     X_PF: Transform
+    size: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -92,5 +107,38 @@ class Scene:
     def _bodies(self) -> dict[str, Body]:
         return {body.name: body for body in self.bodies}
 
+    @cached_property
+    def _frames(self) -> dict[str, Frame]:
+        return {frame.name: frame for frame in self.frames}
+
     def body(self, name: str) -> Body:
         return self._bodies[name]
+
+    def frame(self, name: str) -> Frame | None:
+        """The frame of this name: a named frame, a part of a body, or a part that the body has by its shape."""
+        if name in self._frames:
+            return self._frames[name]
+        owner, _, part = name.rpartition(SEPARATOR)
+        body = self._bodies.get(owner)
+        X_OP = None if body is None else ready_part(part, body.size, body.centre, body.interior)
+        return None if X_OP is None else Frame(name, owner, X_OP)
+
+    def parts(self, body: str) -> tuple[str, ...]:
+        """The names of a body's parts, without that of the body: those of the task first."""
+        own = [part for owner, _, part in (each.name.rpartition(SEPARATOR) for each in self.frames) if owner == body]
+        rim = () if self.body(body).interior is None else (RIM,)
+        return tuple(dict.fromkeys((*own, *FACES, *rim)))
+
+
+def ready_part(part: str, size: Array, centre: Array, interior: Interior | None) -> Transform | None:
+    """X_OP of a part that a body has by its shape, with the axes of the body's frame; None: it has no such part.
+
+    Args:
+        part: `top`, `bottom`, or `rim` of a container.
+        size, centre: (3,) [m] of the bounding box in O.
+        interior: the hollow.
+    """
+    side = FACES.get(part, 1.0 if part == RIM and interior is not None else 0.0)
+    if side == 0.0:
+        return None
+    return Transform.of(xyz=(centre[0], centre[1], centre[2] + side * size[2] / 2.0))

@@ -97,6 +97,7 @@ class _Frame(Model):
     name: str
     parent: str
     pose: _Pose
+    size: Numbers3 | None = None
 
 
 class _Scene(Model):
@@ -130,9 +131,17 @@ def scene_to_json(scene: Scene) -> bytes:
         )
         for body in scene.bodies
     )
-    frames = tuple(_Frame(name=frame.name, parent=frame.parent, pose=_pose(frame.X_PF)) for frame in scene.frames)
+    frames = tuple(
+        _Frame(
+            name=frame.name,
+            parent=frame.parent,
+            pose=_pose(frame.X_PF),
+            size=None if frame.size is None else _three(frame.size),
+        )
+        for frame in scene.frames
+    )
     made = _Scene(bodies=bodies, frames=frames, gravity=_three(scene.gravity))
-    return (json.dumps(made.model_dump(mode="json"), indent=1) + "\n").encode()
+    return (json.dumps(made.model_dump(mode="json", exclude_defaults=True), indent=1) + "\n").encode()
 
 
 def scene_from_json(text: bytes) -> Scene:
@@ -166,7 +175,15 @@ def scene_from_json(text: bytes) -> Scene:
             )
             for body in made.bodies
         ),
-        frames=tuple(Frame(name=frame.name, parent=frame.parent, X_PF=_transform(frame.pose)) for frame in made.frames),
+        frames=tuple(
+            Frame(
+                name=frame.name,
+                parent=frame.parent,
+                X_PF=_transform(frame.pose),
+                size=None if frame.size is None else frozen(frame.size),
+            )
+            for frame in made.frames
+        ),
         gravity=frozen(made.gravity),
     )
 

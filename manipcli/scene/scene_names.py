@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 
 from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.text import did_you_mean
+from manipcli.scene.scene import FACES, RIM, SEPARATOR
+from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
 Locate = Callable[[Loc], Place | None]
@@ -15,7 +17,7 @@ RESERVED = ("world", "base", "tool", "robot", "start", "floor")
 
 def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
     """TASK220: reserved name of a body. TASK225: unknown body in `rests_on` or `inside`. TASK227: reserved or duplicate
-    name of a frame, or unknown parent."""
+    name of a frame, or unknown parent. TASK290: invalid name of a part. TASK291: unknown `frame` of a body."""
     bodies = (*spec.scene, *(("floor",) if spec.floor else ()))
     for name, body in spec.scene.items():
         if name in RESERVED or "/" in name:
@@ -26,6 +28,13 @@ def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
         for word, other in (("rests_on", body.rests_on), ("inside", body.inside)):
             if other is not None and other not in bodies:
                 yield _unknown("TASK225", other, bodies, place(("scene", name, word)))
+        for part in body.parts or ():
+            if SEPARATOR in part or not part:
+                message = f"invalid name of a part: '{part}'"
+                yield Diagnostic(
+                    "TASK290", message, place(("scene", name, "parts", part)), hint="use a name without '/'"
+                )
+        yield from _unknown_frame(spec, name, body.frame, place)
     for name, frame in spec.frames.items():
         if name in RESERVED or "/" in name or name in spec.scene:
             message = f"invalid name of a frame: '{name}' is already in use"
@@ -37,6 +46,31 @@ def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
             yield Diagnostic("TASK227", message, place(("frames", name, "parent")), hint=other)
         elif frame.parent not in ("world", *bodies):
             yield _unknown("TASK227", frame.parent, ("world", *bodies), place(("frames", name, "parent")))
+
+
+def parts_of(body: BodySpec) -> tuple[str, ...]:
+    """The names of the parts of a body: those of the task, and those that its shape has."""
+    rim = (RIM,) if body.cup is not None or body.tray is not None else ()
+    return tuple(dict.fromkeys((*(body.parts or ()), *FACES, *rim)))
+
+
+def _unknown_frame(spec: TaskSpec, name: str, frame: str | None, place: Locate) -> Iterator[Diagnostic]:
+    """A finding if the `frame` of a body is not the world, another body, a part of one, or a named frame."""
+    bodies = (*spec.scene, *(("floor",) if spec.floor else ()))
+    if frame is None or frame in ("world", *bodies, *spec.frames):
+        return
+    at = place(("scene", name, "frame"))
+    owner, _, part = frame.rpartition(SEPARATOR)
+    if owner in spec.scene:
+        parts = parts_of(spec.scene[owner])
+        if part not in parts:
+            message = f"'{owner}' has no part '{part}'"
+            yield Diagnostic("TASK291", message, at, hint=did_you_mean(part, parts, kind=f"parts of '{owner}'"))
+    elif frame in ("base", "tool") or owner == "robot":
+        message = f"'{frame}' is a frame of the robot; a body is placed in the scene"
+        yield Diagnostic("TASK291", message, at, hint="use `world`, a body, a part of one or a named frame")
+    else:
+        yield _unknown("TASK291", frame, ("world", *bodies, *spec.frames), at)
 
 
 def _unknown(code: str, name: str, known: tuple[str, ...], place: Place | None) -> Diagnostic:

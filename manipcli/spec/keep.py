@@ -14,9 +14,9 @@ Side = Annotated[Length, Field(gt=0, le=100.0)]
 
 
 class VolumeSpec(Model):
-    """A box along the axes of the world."""
+    """A box along the axes of `frame`."""
 
-    centre: Vector3 = Field(description="Its centre [x, y, z] in the world.")
+    centre: Vector3 = Field(description="Its centre [x, y, z] in `frame`.")
     size: tuple[Side, Side, Side] = Field(description="Its sides [m].")
 
 
@@ -24,6 +24,10 @@ class InsideSpec(Model):
     """A volume that the tool, or the held object, stays in."""
 
     box: VolumeSpec = Field(description="A box.")
+    frame: str | None = Field(
+        None,
+        description="`base`, a body, a part of one or a named frame, as it is before the step. Default: `world`.",
+    )
 
 
 class KeepSpec(Model):

@@ -74,11 +74,20 @@ class UrdfSpec(Model):
     collision: MeshCollision | None = Field(None, description=_COLLISION)
 
 
+class PartSpec(Model):
+    """A named part of a body: a frame fixed to it, `BODY/PART` wherever a frame is named."""
+
+    pose: PoseSpec = Field(PoseSpec(), description="Pose of the part in the frame of the body. Default: identity.")
+    size: tuple[Size, Size, Size] | None = Field(
+        None, description="Its lengths along its x, y, z [m], for `pick` with `part`. Default: it is a point."
+    )
+
+
 class BodySpec(Model):
     """A body of the scene: exactly one shape key, one placement, and contact parameters.
 
-    Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`, in
-    its middle or offset from it by `at: [x, y]`.
+    Placement: `pose` in `frame`, or `rests_on: BODY` with `at: [x, y]` in `frame` (yaw by `yaw`), or `inside:
+    CONTAINER`, in its middle or offset from it by `at: [x, y]`.
     """
 
     box: BoxSpec | None = Field(None, description="Shape: a solid box.")
@@ -88,17 +97,24 @@ class BodySpec(Model):
     tray: TraySpec | None = Field(None, description="Shape: an open tray.")
     mesh: MeshSpec | None = Field(None, description="Shape: a mesh file.")
     urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
-    pose: PoseSpec | None = Field(None, description="Start pose of its frame in the world.")
+    pose: PoseSpec | None = Field(None, description="Start pose of its frame, in `frame`.")
+    frame: str | None = Field(
+        None,
+        description="What `pose`, or `at` and `yaw` with `rests_on`, refer to: `world`, a body, a part of one "
+        "(`desk/top`) or a named frame, as it is at the start. Default: `world`.",
+    )
     rests_on: str | None = Field(
         None, description="The body it rests on, which must not be tilted; `at` gives the position."
     )
     at: tuple[Length, Length] | None = Field(
         None,
-        description="x, y [m]. With `rests_on`, which needs it: in the world. With `inside`: from the middle of the "
+        description="x, y [m]. With `rests_on`, which needs it: in `frame`. With `inside`: from the middle of the "
         "container, along its axes.",
     )
     yaw: Turn = Field(
-        0.0, description="Rotation about the world's z axis [rad]; with `inside`, the container's. Default 0."
+        0.0,
+        description="Rotation about the vertical [rad], from the x axis of `frame`; with `inside`, of the container. "
+        "Default 0.",
     )
     inside: str | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
     fixed: bool = Field(
@@ -123,6 +139,9 @@ class BodySpec(Model):
     )
     color: tuple[Fraction, Fraction, Fraction, Fraction] | None = Field(
         None, description="Red, green, blue, opacity, each 0 to 1; only for pictures."
+    )
+    parts: dict[str, PartSpec] | None = Field(
+        None, description="Named parts, for steps and conditions to refer to: `BODY/PART`."
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from manipcli.conditions.condition import CheckContext, Problem, unknown_body
+from manipcli.conditions.frames import fixed_frame
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
@@ -134,6 +135,9 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
                 yield from (
                     (ABSENT, ("steps", k, "keep"), p) for p in unknown_body(context.scene, keep.above, (j, "above"))
                 )
+            if keep.inside is not None and keep.inside.frame is not None:
+                problems = fixed_frame(robot, context.scene, keep.inside.frame, (j, "inside", "frame"))
+                yield from ((ABSENT, ("steps", k, "keep"), p) for p in problems)
         if member.guarded(step.body):
             yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
 

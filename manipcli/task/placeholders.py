@@ -13,7 +13,7 @@ from manipcli.conditions.touch import ROBOT
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
-from manipcli.scene.scene import Body, Frame, Interior, Scene
+from manipcli.scene.scene import SEPARATOR, Body, Frame, Interior, Scene
 from manipcli.shapes.primitives import Box
 from manipcli.spec.task import TaskSpec
 
@@ -31,7 +31,8 @@ def named_scene(spec: TaskSpec) -> Scene:
         )
         for name in (*(("floor",) if spec.floor else ()), *spec.scene)
     )  # fmt: skip
-    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in spec.frames)
+    parts = (f"{name}{SEPARATOR}{part}" for name, body in spec.scene.items() for part in body.parts or ())
+    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in (*spec.frames, *parts))
     return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]))
 
 

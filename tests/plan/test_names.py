@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from manipcli.conditions.condition import unknown_body
-from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
+from manipcli.conditions.frames import unknown_frame
+from manipcli.plan.unknown_names import unknown_joint, unknown_pose
 
 Make = Callable[..., Any]  # fixture of conftest.py: a Bench of a robot and a scene
 
@@ -15,7 +16,7 @@ def test_what_is_known_is_no_problem(bench: Make) -> None:
     assert unknown_joint(arm.robot, "joint_1", ()) == ()
     assert unknown_body(arm.scene, "desk", ()) == ()
     for name in ("world", "base", "tool", "cup", "above", "floor"):
-        assert unknown_frame(arm.scene, name, ()) == ()
+        assert unknown_frame(arm.robot, arm.scene, name, ()) == ()
 
 
 def test_what_is_not_known_is_told_at_its_place_with_the_nearest(bench: Make) -> None:
@@ -25,7 +26,7 @@ def test_what_is_not_known_is_told_at_its_place_with_the_nearest(bench: Make) ->
     (problem,) = unknown_joint(arm.robot, "joint1", ("a", 0))
     assert (problem.loc, problem.hint) == (("a", 0), "did you mean 'joint_1'?")
     assert unknown_body(arm.scene, "dask", ())[0].hint == "did you mean 'desk'?"
-    assert unknown_frame(arm.scene, "tol", ())[0].hint == "did you mean 'tool'?"
+    assert unknown_frame(arm.robot, arm.scene, "tol", ())[0].hint == "did you mean 'tool'?"
 
 
 def test_a_fixed_body_is_no_movable_one_and_a_mimic_no_joint_to_move(bench: Make) -> None:

@@ -315,9 +315,9 @@ def test_a_place_is_said_completely_and_consistently(bench: Make) -> None:
     assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "onto": "cup"})[0][1] == (
         "'cup' cannot be placed on itself"
     )
-    assert [loc for loc, _, _ in arm.problems("place", {"object": "cup", "onto": "desk", "yaw": 1.0})] == [
-        ("onto",), ("yaw",)
-    ]  # fmt: skip
+    start = {"object": "cup", "at": "start", "onto": "desk", "yaw": 1.0}
+    assert [loc for loc, _, _ in arm.problems("place", start)] == [("onto",), ("yaw",)]
+    assert arm.problems("place", {"object": "cup", "onto": "desk", "yaw": 1.0}) == []
     assert arm.problems("pour", {"object": "cup", "into": "cup"})[0][1] == "'cup' cannot be poured into itself"
     assert arm.problems("pour", {"object": "cup", "into": "trey"})[0][2] == "did you mean 'tray'?"
 

@@ -1,4 +1,4 @@
-"""`inside`: the held object, or the tool, in a box of the world."""
+"""`inside`: the held object, or the tool, in a box that is fixed in a frame."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
     """By the corners of the held object's bounding box."""
     if spec.inside is None:
         return None
+    frame = spec.inside.frame
+    X_FW = None if frame is None else planner.frame(frame, state).inverse()
     centre, half = np.array(spec.inside.box.centre), 0.5 * np.array(spec.inside.box.size)
     name = held_points(planner, state)[0]
 
     def room(q: Array) -> Array:
         """(k, 3) the least distance to the sides along each axis [m]."""
-        return np.asarray((half - np.abs(points_of(planner, state, q) - centre)).min(axis=1))
+        p = points_of(planner, state, q)
+        p = p if X_FW is None else X_FW.apply(p.reshape(-1, 3)).reshape(p.shape)
+        return np.asarray((half - np.abs(p - centre)).min(axis=1))
 
     def text(q: Array) -> str:
         left = room(q[None])[0]

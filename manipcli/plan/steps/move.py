@@ -4,6 +4,7 @@
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, velocity_scaling: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
 - move: {point: [0.4, 0.1, 0.3], pointing: [0, 0, -1]}
+- move: {point: [0, 0, 5 cm], frame: cup/rim, pointing: [0, 0, -1]}
 - move: {pose: {xyz: [0.4, 0.2, 0.3], rpy: [180 deg, 0, 0]}, tolerance: {distance: 1 mm, about: {axis: z}}}
 - move: {pose: {xyz: [0.4, 0.2, 0.3], rpy: [180 deg, 0, 0]}, path: {arc: {via: [0.5, 0.1, 0.4]}}}
 - move: {point: [0.4, 0.2, 0.3], path: {via: [{xyz: [0.4, 0, 0.3], radius: 5 cm}]}}
@@ -22,6 +23,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
+from manipcli.conditions.frames import unknown_frame
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
@@ -35,7 +37,7 @@ from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import StepMember
 from manipcli.plan.tolerance_spec import ToleranceSpec
 from manipcli.plan.tool_path import arc, blended
-from manipcli.plan.unknown_names import unknown_frame, unknown_joint, unknown_pose
+from manipcli.plan.unknown_names import unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue, Length, Share
@@ -110,7 +112,10 @@ class MoveSpec(Model):
     tolerance: ToleranceSpec | None = Field(
         None, description="How far from the `pose` or `point` the tool may be. Default: 0.1 mm and 1 mrad."
     )
-    frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
+    frame: str = Field(
+        "world",
+        description="`world`, `base`, `tool`, `robot/LINK`, a body, a part of one (`cup/rim`), or a named frame.",
+    )
     path: Literal["free", "joint", "linear"] | ToolPathSpec = Field(
         "free",
         description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
@@ -259,7 +264,7 @@ def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
         return found + unknown_pose(robot, spec.to, ("to",))
     if spec.to is not None:
         return found + tuple(problem for name in spec.to for problem in unknown_joint(robot, name, ("to", name)))
-    return found + unknown_frame(scene, spec.frame, ("frame",))
+    return found + unknown_frame(robot, scene, spec.frame, ("frame",))
 
 
 def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:

@@ -1,6 +1,7 @@
 """`pick`: reach an object, approach it straight, and close the hand on it.
 
 - pick: {object: cup, approach: {from: side, distance: [8 cm, 14 cm]}, grasp: {posture: wrap, force: 8 N}}
+- pick: {object: drawer, part: handle, approach: {from: side, yaw: 180 deg, frame: drawer/handle}}
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Annotated, ClassVar, get_args
 from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
+from manipcli.conditions.frames import fixed_frame, unknown_part
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
@@ -23,11 +25,12 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.face_frames import clear_of, face_frames
-from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting
+from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting, part_alone
 from manipcli.plan.grasp_margin import carries
 from manipcli.plan.hand import handless
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
+from manipcli.plan.place_goals import heading
 from manipcli.plan.planner import CLEARANCE, NOTHING, Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.reached_frames import reached_frames
@@ -36,7 +39,7 @@ from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
-from manipcli.scene.scene import Scene
+from manipcli.scene.scene import SEPARATOR, Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import Angle, Length, Turn
 
@@ -82,6 +85,11 @@ class ApproachSpec(Model):
         description="Direction of the approach about the vertical [rad]; from the top: the yaw of the hand. Default: "
         "away from the robot's base; from the top: the yaw of the object, plus quarter turns.",
     )
+    frame: str | None = Field(
+        None,
+        description="Frame from whose x axis `yaw` is measured: `base`, a body, a part of one or a named frame. "
+        "Default: `world`.",
+    )
     pitch: Annotated[Angle, Field(ge=-math.pi / 2, le=math.pi / 2)] | None = Field(
         None,
         description="Angle of the approach below the horizontal, instead of `from` [rad]: 0 is `from: side`, 90 deg is "
@@ -94,6 +102,8 @@ class ApproachSpec(Model):
         if self.from_ is not None and self.pitch is not None:
             message = f"`pitch` and `from: {self.from_}` both set the angle of the approach"
             raise problem("conflict", message, at=("pitch",), hint="remove one of them", key=True)
+        if self.frame is not None and self.yaw is None:
+            raise problem("conflict", "`frame` needs `yaw`", at=("frame",), hint="add `yaw: 0`", key=True)
         return self
 
     @property
@@ -111,8 +121,8 @@ class PickGraspSpec(GraspSpec):
     object: None = Field(None, description="Not allowed: the pick has the object.")
     height: Length | None = Field(
         None,
-        description="Of the tool above the object's bottom [m]. Default: its middle; from the top higher, if that is "
-        "out of reach.",
+        description="Of the tool above the bottom of the object, or of its `part` [m]. Default: its middle; from the "
+        "top higher, if that is out of reach.",
     )
 
 
@@ -129,6 +139,9 @@ class PickSpec(Model):
     renamed: ClassVar = RENAMED
 
     object: str = Field(description="The object to pick.")
+    part: str | None = Field(
+        None, description="The part of the object that the hand closes on (`handle`). Default: the whole object."
+    )
     approach: ApproachSpec = Field(ApproachSpec(), description="From where the hand comes.")
     grasp: PickGraspSpec = Field(PickGraspSpec(), description="How the hand closes.")
     open: str = Field("open", description="The pose of the hand while approaching.")
@@ -149,9 +162,15 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
     state = before.end
     planner.free_start(state)
     body = planner.scene.body(spec.object)
+    X_WO, yaw = planner.body_pose(state, spec.object), spec.approach.yaw
+    part = None if spec.part is None else planner.scene.frame(f"{spec.object}{SEPARATOR}{spec.part}")
+    if part is not None:
+        body, X_WO = part_alone(body, part), X_WO @ part.X_PF
+    if yaw is not None and spec.approach.frame is not None:
+        yaw += heading(planner.frame(spec.approach.frame, state).R)
     frames = GraspFrames(
-        body, planner.body_pose(state, spec.object), planner.robot.X_WB, planner.tool_pose(state).R,
-        direction=spec.approach.direction, yaw=spec.approach.yaw, height=spec.grasp.height,
+        body, X_WO, planner.robot.X_WB, planner.tool_pose(state).R,
+        direction=spec.approach.direction, yaw=yaw, height=spec.grasp.height,
         pitch=None if spec.approach.direction is not None else spec.approach.pitch,
     )  # fmt: skip
     fingerless = handless(planner.robot, spec.grasp.posture)
@@ -335,9 +354,14 @@ def slopes() -> tuple[float, ...]:
 
 
 def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown object or postures."""
+    """Unknown object, part, frame or postures."""
+    unknown = unknown_body(scene, spec.object, ("object",), movable=True)
+    if spec.part is not None and not unknown:
+        unknown += unknown_part(scene, spec.object, spec.part, ("part",))
+    if spec.approach.frame is not None:
+        unknown += fixed_frame(robot, scene, spec.approach.frame, ("approach", "frame"))
     return (
-        unknown_body(scene, spec.object, ("object",), movable=True)
+        unknown
         + unknown_posture(robot, spec.grasp.posture, ("grasp", "posture"))
         + unknown_posture(robot, spec.open, ("open",))
     )

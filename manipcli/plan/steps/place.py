@@ -1,9 +1,4 @@
-"""`place`: set a held object down, let go, and withdraw.
-
-- place: {object: cup, at: start}
-- place: {object: block, at: [0.5, 0.2], onto: table, yaw: 90 deg}
-- place: {object: block, onto: table, region: {box: {centre: [0.5, 0.2], size: [20 cm, 30 cm]}}}
-"""
+"""`place`: set a held object down, let go, and withdraw."""
 
 from __future__ import annotations
 
@@ -13,12 +8,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
-from pydantic import Field
 
-from manipcli.conditions.condition import Problem, unknown_body
+from manipcli.conditions.condition import Problem
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.core.units import readable
@@ -29,17 +23,15 @@ from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.free_motion import line_blocked
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.place_goals import ROOM, UPRIGHT, crowded, spots, standing
+from manipcli.plan.place_goals import ROOM, UPRIGHT, crowded, spots
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
-from manipcli.plan.ranges import Range, spread
+from manipcli.plan.ranges import spread
 from manipcli.plan.step import StepMember
-from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.steps.pick import backed_off, slopes
-from manipcli.plan.unknown_names import unknown_posture
-from manipcli.scene.scene import Body, Scene
-from manipcli.spec.base import Model
-from manipcli.spec.quantity import Length, Turn
+from manipcli.plan.steps.place_spec import PlaceSpec, RegionSpec, check
+from manipcli.plan.steps.placed import goal, in_region, located
+from manipcli.scene.scene import Body
 
 T = TypeVar("T")
 
@@ -67,67 +59,18 @@ _RETREAT = "withdraw the hand less, `retreat: ...`"
 _ROOMIER = "place it where the opening fingers have room, rotate it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
-class RectangleSpec(Model):
-    """A rectangle along the axes of the world."""
-
-    centre: tuple[Length, Length] = Field(description="Its centre [x, y] in the world.")
-    size: tuple[Annotated[Length, Field(ge=0)], Annotated[Length, Field(ge=0)]] = Field(description="Its sides [m].")
-
-
-class RegionSpec(Model):
-    """A region for an object's frame."""
-
-    box: RectangleSpec = Field(description="A rectangle.")
-
-
-class PlaceSpec(Model):
-    """Set down a held object: carry it above its place, lower it straight, let go, and withdraw upwards.
-
-    At [x, y] the object is placed upright, even if it was picked lying. The step is done when the hand has let go and
-    withdrawn, and the object is within 1 cm and 10 deg of its place then; rotations about the axis of a round object do
-    not matter.
-    """
-
-    renamed: ClassVar = {**RENAMED, "on": "onto"}
-
-    object: str = Field(description="The held object to set down.")
-    at: Literal["start"] | tuple[Length, Length] = Field(
-        "start", description="`start`: its pose at the start; or [x, y] in the world, on the body `onto`."
-    )
-    onto: str | None = Field(
-        None,
-        description="The supporting body at [x, y]: on its top, or inside a tray; in or on a URDF or a mesh, at the "
-        "first contact from above.",
-    )
-    region: RegionSpec | None = Field(
-        None,
-        description="Where on the body `onto` it may stand, instead of `at`; the nearest to its centre is tried first.",
-    )
-    yaw: Turn | None = Field(
-        None,
-        description="Rotation about the world's z axis, at [x, y] [rad]. Default: as held, or as an arm of few joints "
-        "can reach.",
-    )
-    clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
-    retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
-    posture: str = Field("open", description="The named pose to which the hand opens.")
-    velocity_scaling: VelocityScaling = Field(
-        0.5, description="Share of the velocity, acceleration and jerk limits while carrying; lowering uses half."
-    )
-
-
 def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candidates:
     """Places in the region, and at each the tilts of the object, clearances, and withdrawals of the hand."""
     planner.held(state, spec.object)
     planner.free_start(state)
     what = f"cannot place '{spec.object}'"
     if spec.region is None:
-        X_WG = _goal(spec, planner, state)
+        X_WG = goal(spec, planner, state)
         held_back: list[NotPlannable] = []
         explain = partial(_explained, spec, planner, state, X_WG, held_back)
         return Candidates(_at(spec, planner, state, X_WG, held_back), what=what, decides="place", explain=explain)
-    region = spec.region.box
-    _refuse_off_support(spec, planner, state, region)
+    region, in_world = spec.region.box, located(spec.region, planner, state)
+    _refuse_off_support(spec, planner, state, spec.region)
 
     examined: set[tuple[float, float]] = set()  # a place that the search skips does not count
 
@@ -135,8 +78,9 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
         examined.add(at)
         return done()
 
-    def in_region() -> Iterator[Candidate]:
-        for at in spots(region.centre, region.size):
+    def places() -> Iterator[Candidate]:
+        for spot in spots(region.centre, region.size):
+            at = in_world(spot)
             where = f"at [{at[0]:.3f}, {at[1]:.3f}] m"
             try:
                 X_WG = _free(spec, planner, state, at)
@@ -145,32 +89,32 @@ def candidates(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Candi
                 continue
             if len(examined) == PLACES:
                 return
-            share = np.subtract(at, region.centre) / np.maximum(region.size, 1e-9)
+            share = np.subtract(spot, region.centre) / np.maximum(region.size, 1e-9)
             for X_WO in _yaws(spec, planner, state, X_WG):
                 for way in itertools.islice(_ways(spec, planner, state, X_WO, []), WAYS):
                     plan, look = partial(examine, at, way.plan), partial(examine, at, way.look)
                     yield replace(way, name=f"{where}, {way.name}", place=share, plan=plan, look=look)
 
-    return Candidates(in_region(), what=what, decides="place")
+    return Candidates(places(), what=what, decides="place")
 
 
-def _refuse_off_support(spec: PlaceSpec, planner: Planner, state: PlanningState, region: RectangleSpec) -> None:
+def _refuse_off_support(spec: PlaceSpec, planner: Planner, state: PlanningState, region: RegionSpec) -> None:
     """Check that a place in the region is on the support, which depends on no other step.
 
     Raises:
         NotPlannable: none is.
     """
-    assert spec.onto is not None  # `check` asks for it
     refusal: NotPlannable | None = None
-    for at in spots(region.centre, region.size):
+    in_world = located(region, planner, state)
+    for spot in spots(region.box.centre, region.box.size):
         try:
-            standing(planner, state, spec.object, spec.onto, at, spec.yaw, "region")
+            in_region(spec, planner, state, in_world(spot))
         except NotPlannable as other:
             refusal = refusal or other
         else:
             return
     if refusal is not None:
-        raise refusal.but(cause=f"no place in the region is on '{spec.onto}': {refusal.cause}")
+        raise refusal.but(cause=f"no place in the region is on '{spec.support}': {refusal.cause}")
 
 
 def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[float, float]) -> Transform:
@@ -179,9 +123,8 @@ def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[flo
     Raises:
         NotPlannable: it is not on the support, or too near to another body.
     """
-    assert spec.onto is not None  # `check` asks for it
-    X_WG = standing(planner, state, spec.object, spec.onto, at, spec.yaw, "region")
-    hit = crowded(planner, state, spec.object, X_WG, spec.onto)
+    X_WG = in_region(spec, planner, state, at)
+    hit = crowded(planner, state, spec.object, X_WG, spec.support)
     if hit is None:
         return X_WG
     other = hit.a if hit.b == spec.object else hit.b
@@ -191,14 +134,6 @@ def _free(spec: PlaceSpec, planner: Planner, state: PlanningState, at: tuple[flo
 
 def _refused(refusal: NotPlannable) -> StepPlan:
     raise refusal
-
-
-def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
-    """X_WG: the goal pose of the object's frame."""
-    if spec.at == "start":
-        return planner.scene.body(spec.object).X_WO
-    assert spec.onto is not None  # `check` asks for it
-    return standing(planner, state, spec.object, spec.onto, spec.at, spec.yaw)
 
 
 def _at(
@@ -236,7 +171,7 @@ def _explained(
 def _yaws(spec: PlaceSpec, planner: Planner, state: PlanningState, X_WG: Transform) -> Iterator[Transform]:
     """`X_WG`, and the same pose at the yaw that an arm of few joints has there, if no yaw is stated."""
     yield X_WG
-    if not planner.solver.few or spec.yaw is not None or (spec.at == "start" and spec.region is None):
+    if not planner.solver.few or spec.yaw is not None or spec.at_start:
         return
     carried, tool = state.carried, planner.robot.tool
     assert carried is not None and tool is not None  # `held` asks for it
@@ -362,34 +297,6 @@ def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transf
     up = np.array([0.0, 0.0, edge * np.sin(tilt)])
     about = Transform.of(xyz=foot.p + up, R=R) @ Transform.of(xyz=-foot.p)
     return about @ X_WG
-
-
-def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown bodies and postures; a place without a support."""
-    found = unknown_body(scene, spec.object, ("object",), movable=True)
-    found += unknown_posture(robot, spec.posture, ("posture",))
-    if spec.onto is not None and spec.onto == spec.object:
-        found += (Problem(loc=("onto",), message=f"'{spec.object}' cannot be placed on itself"),)
-    elif spec.onto is not None:
-        found += unknown_body(scene, spec.onto, ("onto",))
-    elif spec.at != "start" or spec.region is not None:
-        word, example = ("region", "region") if spec.at == "start" else ("at", "at: [x, y]")
-        message = f"`{example}` needs a supporting body"
-        found += (Problem(loc=(word,), message=message, hint="add `onto: BODY`"),)
-    if spec.at != "start" and spec.region is not None:
-        message = "`region` and `at` both set the place"
-        found += (Problem(loc=("region",), message=message, hint="remove one of them"),)
-    if spec.at == "start" and spec.region is None:
-        found += tuple(
-            Problem(
-                loc=(word,),
-                message=f"`{word}` needs `at: [x, y]` or `region`",
-                hint=f"remove `{word}`: `at: start` sets the pose",
-            )
-            for word, value in (("onto", spec.onto), ("yaw", spec.yaw))
-            if value is not None
-        )
-    return found
 
 
 def uncommanded(spec: PlaceSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
