@@ -23,6 +23,7 @@ from manipcli.spec.source.tree import Plain
 from manipcli.task.load_task import load_task
 from manipcli.task.robot_file import read_robot
 from manipcli.task.task import Task
+from manipcli.task.task_names import task_names
 from manipcli.task.vocabulary import controllers_spec, task_spec
 
 
@@ -93,10 +94,24 @@ def words(kind: str) -> tuple[str, ...]:
     return known[kind]
 
 
-def schema(kind: load.FileKind) -> Mapping[str, Plain]:
-    """The JSON Schema of a kind of file."""
+def schema(
+    kind: load.FileKind, *, task: Path | None = None, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> Mapping[str, Plain]:
+    """The JSON Schema of a kind of file.
+
+    Args:
+        kind: of the file.
+        task: with the names of this task; for the kind `task`.
+        package_path, allow_outside: where the files of its robot may be.
+
+    Raises:
+        InvalidInput: the task cannot be read.
+    """
+    names = None
+    if task is not None:
+        names = task_names(task, package_path=package_path, allow_outside=allow_outside)
     texts: dict[load.FileKind, Callable[[], str]] = {
-        "task": lambda: task_schema(task_spec()),
+        "task": lambda: task_schema(task_spec(), names),
         "robot": robot_schema,
         "controllers": lambda: controllers_schema(controllers_spec()),
     }

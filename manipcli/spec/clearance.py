@@ -7,9 +7,10 @@ from typing import Annotated
 from pydantic import Field
 
 from manipcli.spec.base import Model
+from manipcli.spec.names import PartName
 from manipcli.spec.quantity import Length
 
-PartPair = tuple[str, str]
+PartPair = tuple[PartName, PartName]
 """Two parts: a body, `robot/LINK`, or `robot` for each of its links."""
 
 

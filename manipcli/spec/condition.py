@@ -18,6 +18,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field, model_validator
 
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import StepName
 from manipcli.spec.quantity import Time
 
 ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
@@ -81,10 +82,10 @@ class ExpectationSpec(ConditionSpec):
     id: str | None = Field(
         None, description="Name in reports. Default: the name of the condition, numbered from the second one on."
     )
-    at: str | None = Field(
+    at: StepName | None = Field(
         None, description="When: `end` (the last 0.5 s of the run), or the id of a step (the end of that step)."
     )
-    during: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+    during: StepName | Annotated[tuple[StepName, ...], Field(min_length=1)] | None = Field(
         None, description="When: throughout a step, by its id, or throughout several steps."
     )
     within: Annotated[Time, Field(gt=0)] | None = Field(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import get_args
+from typing import Annotated, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -80,13 +80,18 @@ def of_type(kind: str, node: Node, kinds: Sequence[object], *, item: bool) -> st
         return f"YAML 1.2 has only true and false: write {_WORDS[value.casefold()]}"
     if kind in ("float_type", "int_type") and isinstance(value, str):
         return _quoted(value)
-    if kind == "tuple_type" and isinstance(value, str) and any(get_args(allowed) == (str, ...) for allowed in kinds):
+    if kind == "tuple_type" and isinstance(value, str) and any(_texts(allowed) == (str, ...) for allowed in kinds):
         return f"write [{value}]"
-    if kind == "tuple_type" and isinstance(value, str) and any(get_args(allowed) == (str, str) for allowed in kinds):
+    if kind == "tuple_type" and isinstance(value, str) and any(_texts(allowed) == (str, str) for allowed in kinds):
         return "write each pair as a list: [[A, B]]" if item else "write a pair as a list: [A, B]"
     if kind == "string_type" and isinstance(value, int | float):
         return "put it in quotes to make it a string"
     return None
+
+
+def _texts(kind: object) -> tuple[object, ...]:
+    """The types of the items of a list, without their metadata."""
+    return tuple(get_args(item)[0] if get_origin(item) is Annotated else item for item in get_args(kind))
 
 
 def _quoted(text: str) -> str | None:

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, model_validator
 
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import BodyName, FrameName
 from manipcli.spec.quantity import Acceleration, Angle, Length, Speed
 from manipcli.spec.robot import Vector3
 
@@ -24,7 +25,7 @@ class InsideSpec(Model):
     """A volume that the tool, or the held object, stays in."""
 
     box: VolumeSpec = Field(description="A box.")
-    frame: str | None = Field(
+    frame: FrameName | None = Field(
         None,
         description="`base`, a body, a part of one or a named frame, as it is before the step. Default: `world`.",
     )
@@ -38,7 +39,7 @@ class KeepSpec(Model):
         description="Largest angle between the held object's z axis and the vertical [rad]; except while `pour` tilts. "
         "Default: 20 deg where the object has contents and the motion ends upright, else unlimited.",
     )
-    above: str | None = Field(
+    above: BodyName | None = Field(
         None,
         description="A body that the held object, or the tool where nothing is held, stays above; except where a step "
         "approaches, lowers and withdraws.",

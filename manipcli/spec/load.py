@@ -128,6 +128,15 @@ def load_task_text(
     return validate(source, model, findings=findings)
 
 
+def task_source(path: Path, model: type[TaskSpec]) -> tuple[Source, list[Diagnostic]]:
+    """The tree of a task file with flat steps, before it is validated, and its findings so far.
+
+    Raises:
+        InvalidInput: the file cannot be read, or is not YAML.
+    """
+    return _task_source(read_bytes(path), str(path), model, (), None)
+
+
 def salvage_task(
     path: Path,
     *,

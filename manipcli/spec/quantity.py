@@ -17,6 +17,8 @@ from manipcli.core.units import NUMBER_PATTERN, Dimension, UnitError, fitting_un
 from manipcli.spec.base import problem
 from manipcli.spec.expression import quantity_of
 
+SIGNED = r"^[-+(\s]*"
+"""Begins the pattern of a quantity: signs and brackets."""
 _LETTER, _OTHER = r"[A-Za-z°µμ%]", r"[^A-Za-z°µμ%\s]"
 
 
@@ -48,7 +50,7 @@ class Unit:
             alone += "|"
         several = rf"{_LETTER}+(?:{_OTHER}|\s+\S)"
         after = rf"[-+*/)]|{several}" + (rf"|(?:{alone})\s*$" if alone else "")
-        return rf"^[-+(\s]*{NUMBER_PATTERN}(?![\d.]|[eE][-+]?\d)\s*(?:{after})|\$"
+        return rf"{SIGNED}{NUMBER_PATTERN}(?![\d.]|[eE][-+]?\d)\s*(?:{after})|\$"
 
     def read(self, value: object) -> object:
         """The SI value of a string; a number passes on to pydantic unchanged."""

@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from manipcli.spec.base import Model
+from manipcli.spec.names import BodyName, FrameName
 from manipcli.spec.quantity import Length, Mass, Turn
 from manipcli.spec.robot import PoseSpec
 
@@ -98,12 +99,12 @@ class BodySpec(Model):
     mesh: MeshSpec | None = Field(None, description="Shape: a mesh file.")
     urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
     pose: PoseSpec | None = Field(None, description="Start pose of its frame, in `frame`.")
-    frame: str | None = Field(
+    frame: FrameName | None = Field(
         None,
         description="What `pose`, or `at` and `yaw` with `rests_on`, refer to: `world`, a body, a part of one "
         "(`desk/top`) or a named frame, as it is at the start. Default: `world`.",
     )
-    rests_on: str | None = Field(
+    rests_on: BodyName | None = Field(
         None, description="The body it rests on, which must not be tilted; `at` gives the position."
     )
     at: tuple[Length, Length] | None = Field(
@@ -116,7 +117,7 @@ class BodySpec(Model):
         description="Rotation about the vertical [rad], from the x axis of `frame`; with `inside`, of the container. "
         "Default 0.",
     )
-    inside: str | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
+    inside: BodyName | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
     fixed: bool = Field(
         False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
     )
@@ -148,5 +149,5 @@ class BodySpec(Model):
 class FrameSpec(Model):
     """A named frame, fixed in `parent`: `world` or a body of the scene."""
 
-    parent: str = Field("world", description="`world` or a body. Default `world`.")
+    parent: FrameName = Field("world", description="`world` or a body. Default `world`.")
     pose: PoseSpec = Field(PoseSpec(), description="Pose of the frame in its parent. Default: identity.")

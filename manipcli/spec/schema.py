@@ -7,7 +7,9 @@ import json
 from pydantic import BaseModel
 
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.quantity import SIGNED
 from manipcli.spec.robot import RobotSpec
+from manipcli.spec.schema_names import TaskNames, list_names
 from manipcli.spec.source.tree import Plain
 from manipcli.spec.task import TaskSpec
 
@@ -16,10 +18,14 @@ _LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", 
 _REFERENCE = r"\$[A-Za-z_]"
 
 
-def task_schema(model: type[TaskSpec]) -> str:
-    """Schema of a task file (`unions.task_model`): verbs are `oneOf`; any number may be an expression with `$name`."""
+def task_schema(model: type[TaskSpec], names: TaskNames | None = None) -> str:
+    """Schema of a task file (`unions.task_model`): verbs are `oneOf`; any number may be an expression with `$name`.
+
+    With the `names` of one task, it knows these, and its parameters.
+    """
     schema = _schema(model, "manipcli task")
     _allow_expressions(schema)
+    list_names(schema, names)
     return _dump(schema)
 
 
@@ -56,9 +62,19 @@ def _tidy(node: Plain, *, named: bool) -> None:
         for own, word in _LIMITS.items():
             if own in node:
                 node[word] = node.pop(own)
+        _sign(node)
     for key, value in node.items():
         if key not in ("default", "enum", "const") or named:
             _tidy(value, named=not named and key in ("properties", "$defs"))
+
+
+def _sign(node: dict[str, Plain]) -> None:
+    """Refuses a minus before a quantity in text that must not be negative, unless arithmetic follows."""
+    pattern = node.get("pattern")
+    least = node.get("minimum", node.get("exclusiveMinimum"))
+    if isinstance(pattern, str) and pattern.startswith(SIGNED) and isinstance(least, int | float) and least >= 0:
+        rest = pattern.removeprefix(SIGNED)
+        node["pattern"] = rf"{SIGNED}[^-+*/]*(?:\s[-+*/]\s|\))|^[+(\s]*{rest}"
 
 
 def _allow_expressions(node: Plain) -> None:

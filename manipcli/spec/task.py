@@ -20,6 +20,7 @@ from manipcli.spec.block import BlockSpec
 from manipcli.spec.clearance import ClearanceSpec
 from manipcli.spec.condition import ExpectationSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
+from manipcli.spec.names import PoseName
 from manipcli.spec.plan import PlanSpec
 from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.reactions import ReplanSpec
@@ -66,7 +67,7 @@ class TaskSpec(Model):
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")
     frames: dict[str, FrameSpec] = Field({}, description="Named frames, for poses to refer to.")
-    start: str | None = Field(
+    start: PoseName | None = Field(
         None,
         description="Named pose in which the robot starts. Default: `home` if the robot has it; else every joint at 0, "
         "or at the limit nearest to 0.",

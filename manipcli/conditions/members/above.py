@@ -15,14 +15,15 @@ from manipcli.core.geometry import rotate_inverse
 from manipcli.core.units import readable
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
+from manipcli.spec.names import BodyName
 from manipcli.spec.quantity import Length
 
 
 class AboveSpec(Model):
     """The object is above `of` by at least `by`, and its centre is over the bounding box of `of`."""
 
-    object: str = Field(description="A body of the scene.")
-    of: str = Field(description="The body below it.")
+    object: BodyName = Field(description="A body of the scene.")
+    of: BodyName = Field(description="The body below it.")
     by: Annotated[Length, Field(ge=0)] = Field(
         default=0.0,
         description="Least gap between the two, along the world's z [m]. Default 0. For an object in contact use "

@@ -17,6 +17,7 @@ from manipcli.core.units import readable
 from manipcli.description.elements import Joint
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
+from manipcli.spec.names import GroupName, PoseName
 from manipcli.spec.quantity import AngleTolerance, Length
 
 SLIDE: Final = 0.005
@@ -27,8 +28,10 @@ class AtPoseSpec(Model):
     """Every joint of the pose (or of `group`) is at most `within` from its value in the pose, a prismatic joint at most
     `slide`."""
 
-    pose: str = Field(description="A named pose of the robot.")
-    group: str | None = Field(default=None, description="Only joints of this group. Default: all joints of the pose.")
+    pose: PoseName = Field(description="A named pose of the robot.")
+    group: GroupName | None = Field(
+        default=None, description="Only joints of this group. Default: all joints of the pose."
+    )
     within: AngleTolerance = Field(default=0.02, description="Largest difference [rad], to pi. Default 0.02.")
     slide: Annotated[Length, Field(gt=0)] | None = Field(
         default=None,

@@ -14,13 +14,14 @@ from manipcli.core.geometry import cross, rotate
 from manipcli.core.units import readable
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
+from manipcli.spec.names import BodyName
 from manipcli.spec.quantity import Speed
 
 
 class AtRestSpec(Model):
     """The object's centre moves slower than `below`."""
 
-    object: str = Field(description="A body of the scene.")
+    object: BodyName = Field(description="A body of the scene.")
     below: Annotated[Speed, Field(gt=0)] = Field(default=0.001, description="Speed [m/s]. Default 1 mm/s.")
 
 

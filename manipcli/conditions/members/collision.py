@@ -16,9 +16,10 @@ from manipcli.conditions.touch import between, impossible_pair
 from manipcli.core.units import readable
 from manipcli.model.state import Contact
 from manipcli.spec.base import Model, or_short, problem
+from manipcli.spec.names import MARK, PartName
 from manipcli.spec.quantity import Force
 
-Pair = tuple[str, str]
+Pair = tuple[PartName, PartName]
 
 
 class PairsSpec(Model):
@@ -42,7 +43,7 @@ class PairsSpec(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
-        names = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+        names = {"type": "array", "items": {"type": "string", MARK: "part"}, "minItems": 2, "maxItems": 2}
         return or_short(schema, handler, names)
 
 

@@ -16,14 +16,19 @@ from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.state import Contact
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import PartName
 from manipcli.spec.quantity import Force, Time
 
 
 class ContactForceSpec(Model):
     """The sum of the normal forces between a pair, or on one part, is `below` and/or `above` a limit."""
 
-    pair: tuple[str, str] | None = Field(default=None, description="Two parts, each a body, `robot` or `robot/LINK`.")
-    of: str | None = Field(default=None, description="Instead of `pair`: one part, a body, `robot` or `robot/LINK`.")
+    pair: tuple[PartName, PartName] | None = Field(
+        default=None, description="Two parts, each a body, `robot` or `robot/LINK`."
+    )
+    of: PartName | None = Field(
+        default=None, description="Instead of `pair`: one part, a body, `robot` or `robot/LINK`."
+    )
     below: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Largest force [N].")
     above: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Least force [N].")
     mean_over: Annotated[Time, Field(ge=1e-4, le=60)] | None = Field(

@@ -13,6 +13,7 @@ from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.spec.base import Model
+from manipcli.spec.names import GroupName
 from manipcli.spec.quantity import Energy
 
 
@@ -20,7 +21,7 @@ class EnergySpec(Model):
     """The work of the joints is less than `below`, from the start of the run or of the step of `at` or `during`."""
 
     below: Annotated[Energy, Field(gt=0)] = Field(description="Largest work [J].")
-    group: str | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
+    group: GroupName | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
 
 
 def monitor(spec: EnergySpec, world: World) -> Monitor:

@@ -21,13 +21,14 @@ from manipcli.conditions.state_window import StateWindow
 from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
 from manipcli.spec.base import Model
+from manipcli.spec.names import MovableName
 from manipcli.spec.quantity import Force
 
 
 class GraspedSpec(Model):
     """At least two links of the robot press on the object, each with at least `above`."""
 
-    object: str = Field(description="A movable body of the scene.")
+    object: MovableName = Field(description="A movable body of the scene.")
     above: Annotated[Force, Field(gt=0)] = Field(
         default=GRIP_FORCE, description="Least force of each link [N]. Default 0.1 N."
     )

@@ -18,20 +18,21 @@ from manipcli.model.state import WorldState, body_pose
 from manipcli.scene.scene import Interior, Scene
 from manipcli.shapes.primitives import Box, Cylinder
 from manipcli.spec.base import Model
+from manipcli.spec.names import BodyName, ContainerName
 
 
 class InsideSpec(Model):
     """The object's centre is inside the hollow of the container `of` (a cup, a tray), below its rim."""
 
-    object: str = Field(description="A body of the scene; its centre counts.")
-    of: str = Field(description="A body with a hollow: a cup or a tray.")
+    object: BodyName = Field(description="A body of the scene; its centre counts.")
+    of: ContainerName = Field(description="A body with a hollow: a cup or a tray.")
 
 
 class OutsideSpec(Model):
     """The object's centre is not inside the hollow of the container `of` (a cup, a tray)."""
 
-    object: str = Field(description="A body of the scene; its centre counts.")
-    of: str = Field(description="A body with a hollow: a cup or a tray.")
+    object: BodyName = Field(description="A body of the scene; its centre counts.")
+    of: ContainerName = Field(description="A body with a hollow: a cup or a tray.")
 
 
 Spec = InsideSpec | OutsideSpec

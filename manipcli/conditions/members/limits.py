@@ -14,6 +14,7 @@ from manipcli.conditions.state_window import StateWindow
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
+from manipcli.spec.names import GroupName
 from manipcli.spec.quantity import Share
 
 SLACK: Final = 1e-4
@@ -34,7 +35,7 @@ _UNITS = {
 class LimitsSpec(Model):
     """Measured positions, velocities and efforts stay inside the limits of the joints."""
 
-    group: str | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
+    group: GroupName | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
     of: tuple[Quantity, ...] = Field(
         default=ALL, min_length=1, description="Which limits. Default [position, velocity, effort]."
     )

@@ -15,6 +15,7 @@ from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotation_between
 from manipcli.core.units import readable
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import MovableName
 from manipcli.spec.quantity import AngleTolerance, Length
 
 
@@ -23,7 +24,7 @@ class MovedSpec(Model):
 
     renamed: ClassVar = {"turn": "rotation"}
 
-    object: str = Field(description="A movable body of the scene.")
+    object: MovableName = Field(description="A movable body of the scene.")
     by: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="Least distance [m].")
     rotation: AngleTolerance | None = Field(default=None, description="Least angle [rad], to pi.")
 
@@ -39,7 +40,7 @@ class UnmovedSpec(Model):
 
     renamed: ClassVar = {"turn": "rotation"}
 
-    object: str = Field(description="A movable body of the scene.")
+    object: MovableName = Field(description="A movable body of the scene.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
     rotation: AngleTolerance | None = Field(default=None, description="Largest angle [rad], to pi. Default: any.")
 

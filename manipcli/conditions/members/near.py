@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +18,7 @@ from manipcli.core.units import readable
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
+from manipcli.spec.names import FrameName
 from manipcli.spec.quantity import Length
 from manipcli.spec.robot import Vector3
 
@@ -27,12 +28,12 @@ START = "start"
 class NearSpec(Model):
     """The origin of the object's frame is at most `within` from a target."""
 
-    object: str = Field(description="A body of the scene, a part of one (`cup/rim`), or `tool`.")
-    to: str | Vector3 = Field(
+    object: FrameName = Field(description="A body of the scene, a part of one (`cup/rim`), or `tool`.")
+    to: FrameName | Literal["start"] | Vector3 = Field(
         description="`start` (the object's position at time 0), a frame (its origin, which may move): a body, a part "
         "of one, a named frame, `base`, `tool` or `robot/LINK`; or a point [x, y, z] in `frame`."
     )
-    frame: str | None = Field(None, description="Frame of a point `to: [x, y, z]`. Default: `world`.")
+    frame: FrameName | None = Field(None, description="Frame of a point `to: [x, y, z]`. Default: `world`.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
 
 

@@ -13,14 +13,15 @@ from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between
 from manipcli.core.units import readable
 from manipcli.spec.base import Model
+from manipcli.spec.names import BodyName, MovableName
 from manipcli.spec.quantity import Share
 
 
 class RestsOnSpec(Model):
     """The object presses on `of` with at least `share` of its own weight."""
 
-    object: str = Field(description="A movable body of the scene.")
-    of: str = Field(description="The body that carries it.")
+    object: MovableName = Field(description="A movable body of the scene.")
+    of: BodyName = Field(description="The body that carries it.")
     share: Annotated[Share, Field(gt=0)] = Field(default=0.5, description="Least share of its weight. Default 50 %.")
 
 

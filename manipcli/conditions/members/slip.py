@@ -29,6 +29,7 @@ from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pinch_force
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
+from manipcli.spec.names import LinkName, MovableName
 from manipcli.spec.quantity import AngleTolerance, Force, Length
 
 LET_GO = 0.1
@@ -40,13 +41,13 @@ class SlipSpec(Model):
 
     renamed: ClassVar = {"turn": "rotation"}
 
-    object: str = Field(description="A movable body of the scene.")
+    object: MovableName = Field(description="A movable body of the scene.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest motion of its centre [m].")
     rotation: AngleTolerance | None = Field(default=None, description="Largest rotation [rad], to pi. Default: any.")
     grip: Annotated[Force, Field(gt=0)] = Field(
         default=GRIP_FORCE, description="Held: two links press on it with at least this force each [N]. Default 0.1 N."
     )
-    link: str | None = Field(default=None, description="Link of the hand. Default: that of the tool.")
+    link: LinkName | None = Field(default=None, description="Link of the hand. Default: that of the tool.")
 
 
 class _Hold:

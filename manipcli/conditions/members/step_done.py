@@ -10,12 +10,13 @@ from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.text import did_you_mean
 from manipcli.spec.base import Model
+from manipcli.spec.names import StepName
 
 
 class StepDoneSpec(Model):
     """The step is done."""
 
-    step: str = Field(description="Id of a step of the task.")
+    step: StepName = Field(description="Id of a step of the task.")
 
 
 def monitor(spec: StepDoneSpec, world: World) -> Monitor:

@@ -15,6 +15,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
+from manipcli.spec.names import LinkName
 from manipcli.spec.quantity import Speed
 
 
@@ -22,7 +23,7 @@ class ToolSpeedSpec(Model):
     """The origin of the tool frame (or of `link`) moves slower than `below`."""
 
     below: Annotated[Speed, Field(gt=0)] = Field(description="Largest speed in the world [m/s].")
-    link: str | None = Field(default=None, description="A link instead of the tool frame; its origin counts.")
+    link: LinkName | None = Field(default=None, description="A link instead of the tool frame; its origin counts.")
 
 
 def monitor(spec: ToolSpeedSpec, world: World) -> Monitor:

@@ -11,13 +11,14 @@ from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, wrapped
 from manipcli.core.units import readable
 from manipcli.spec.base import Model
+from manipcli.spec.names import GroupName
 from manipcli.spec.quantity import JointTolerance
 
 
 class TrackingSpec(Model):
     """Every joint of the group is at most `within` from its controller's reference."""
 
-    group: str = Field(description="A group of the robot; each of its joints must have a controller.")
+    group: GroupName = Field(description="A group of the robot; each of its joints must have a controller.")
     within: JointTolerance = Field(description="Largest difference of a joint [rad or m], to pi.")
 
 

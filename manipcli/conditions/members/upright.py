@@ -14,13 +14,14 @@ from manipcli.core.geometry import rotate
 from manipcli.core.text import distinguished
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
+from manipcli.spec.names import BodyName
 from manipcli.spec.quantity import AngleTolerance
 
 
 class UprightSpec(Model):
     """The angle between the object's z axis and the world's is at most `within`."""
 
-    object: str = Field(description="A body of the scene.")
+    object: BodyName = Field(description="A body of the scene.")
     within: AngleTolerance = Field(description="Largest tilt [rad], to pi.")
 
 

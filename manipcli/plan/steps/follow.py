@@ -31,6 +31,7 @@ from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, Trajectory
 from manipcli.plan.unknown_names import unknown_joint
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import JointName
 from manipcli.spec.quantity import Time
 from manipcli.spec.trajectory_message import DurationSpec, PointSpec, ToleranceSpec, TrajectorySpec, check_sizes
 
@@ -49,7 +50,7 @@ class FollowSpec(Model):
     """
 
     header: dict[str, Any] = Field({}, description="Ignored, so that a message can be pasted.")
-    joint_names: tuple[str, ...] = Field((), description="The joints that move.")
+    joint_names: tuple[JointName, ...] = Field((), description="The joints that move.")
     points: tuple[PointSpec, ...] = Field((), description="In the order of their times; the last at rest.")
     retime: bool = Field(
         False,

@@ -19,6 +19,7 @@ from manipcli.plan.step import StepMember, single
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
+from manipcli.spec.names import MovableName, PoseName
 from manipcli.spec.quantity import Force
 
 DEFAULT_FORCE = 8.0
@@ -32,8 +33,8 @@ class GraspSpec(Model):
     `place` opens it.
     """
 
-    object: str | None = Field(None, description="The object to grasp, carried from then on. Default: unknown.")
-    posture: str = Field("closed", description="The named pose that the hand closes towards.")
+    object: MovableName | None = Field(None, description="The object to grasp, carried from then on. Default: unknown.")
+    posture: PoseName = Field("closed", description="The named pose that the hand closes towards.")
     force: Force = Field(
         DEFAULT_FORCE,
         gt=0,

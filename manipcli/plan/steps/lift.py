@@ -25,6 +25,7 @@ from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
+from manipcli.spec.names import MovableName
 
 _LESS = "lift it less, `by: ...`; or use another grasp: `approach: {yaw: ...}` of its `pick`"
 
@@ -39,7 +40,7 @@ class LiftSpec(Model):
 
     renamed: ClassVar = RENAMED
 
-    object: str = Field(description="The held object to lift.")
+    object: MovableName = Field(description="The held object to lift.")
     by: Annotated[Range, Field(description="Height [m].")] = (0.08, 0.2)
     velocity_scaling: VelocityScaling = 0.5
 

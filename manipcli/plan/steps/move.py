@@ -40,6 +40,7 @@ from manipcli.plan.tool_path import arc, blended
 from manipcli.plan.unknown_names import unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import BodyName, FrameName, JointName, PoseName
 from manipcli.spec.quantity import JointValue, Length, Share
 from manipcli.spec.robot import PoseSpec, Vector3
 
@@ -101,7 +102,9 @@ class MoveSpec(Model):
 
     renamed: ClassVar = RENAMED
 
-    to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
+    to: PoseName | dict[JointName, JointValue] | None = Field(
+        None, description="A named pose, or joint positions by name."
+    )
     pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")
     point: Vector3 | None = Field(
         None, description="Where the tool's origin goes, in `frame` [m]; its orientation is left open."
@@ -112,7 +115,7 @@ class MoveSpec(Model):
     tolerance: ToleranceSpec | None = Field(
         None, description="How far from the `pose` or `point` the tool may be. Default: 0.1 mm and 1 mrad."
     )
-    frame: str = Field(
+    frame: FrameName = Field(
         "world",
         description="`world`, `base`, `tool`, `robot/LINK`, a body, a part of one (`cup/rim`), or a named frame.",
     )
@@ -123,7 +126,7 @@ class MoveSpec(Model):
         "obstacles (not with `touch` or `guarded`). Default `free`. A mapping: a curved path of the tool.",
     )
     velocity_scaling: VelocityScaling = 1.0
-    touch: tuple[str, ...] = Field(
+    touch: tuple[BodyName, ...] = Field(
         (),
         description="Bodies that the hand, and what it holds, may touch; the step's `allow` names other pairs. "
         "Default: none.",

@@ -41,6 +41,7 @@ from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import SEPARATOR, Scene
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import FrameName, MovableName, PoseName
 from manipcli.spec.quantity import Angle, Length, Turn
 
 SLOPES_DEG = (0.0, 30.0, 60.0)
@@ -85,7 +86,7 @@ class ApproachSpec(Model):
         description="Direction of the approach about the vertical [rad]; from the top: the yaw of the hand. Default: "
         "away from the robot's base; from the top: the yaw of the object, plus quarter turns.",
     )
-    frame: str | None = Field(
+    frame: FrameName | None = Field(
         None,
         description="Frame from whose x axis `yaw` is measured: `base`, a body, a part of one or a named frame. "
         "Default: `world`.",
@@ -138,13 +139,13 @@ class PickSpec(Model):
 
     renamed: ClassVar = RENAMED
 
-    object: str = Field(description="The object to pick.")
+    object: MovableName = Field(description="The object to pick.")
     part: str | None = Field(
         None, description="The part of the object that the hand closes on (`handle`). Default: the whole object."
     )
     approach: ApproachSpec = Field(ApproachSpec(), description="From where the hand comes.")
     grasp: PickGraspSpec = Field(PickGraspSpec(), description="How the hand closes.")
-    open: str = Field("open", description="The pose of the hand while approaching.")
+    open: PoseName = Field("open", description="The pose of the hand while approaching.")
     velocity_scaling: VelocityScaling = Field(
         1.0,
         description="Share of the velocity, acceleration and jerk limits while reaching; the approach uses half.",

@@ -31,6 +31,7 @@ from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.drop_test import FORMED
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model, problem
+from manipcli.spec.names import BodyName, ContainerName, FrameName, MovableName, PoseName
 from manipcli.spec.quantity import Length, Turn
 from manipcli.spec.robot import Vector3
 
@@ -50,13 +51,15 @@ class RegionSpec(Model):
     """A region for an object's frame."""
 
     box: RectangleSpec = Field(description="A rectangle.")
-    frame: str | None = Field(None, description="`world`, `base`, a body, a part of one or a frame. Default: `world`.")
+    frame: FrameName | None = Field(
+        None, description="`world`, `base`, a body, a part of one or a frame. Default: `world`."
+    )
 
 
 class RelationSpec(Model):
     """A place relative to something: at a point in its frame, or on one side of it."""
 
-    of: str = Field(description="A body, a part of one (`tray/rim`), a named frame, `world` or `base`.")
+    of: FrameName = Field(description="A body, a part of one (`tray/rim`), a named frame, `world` or `base`.")
     xyz: Vector3 | None = Field(
         None, description="Where the object's frame, or its `part`, goes, in the frame of `of` [m]."
     )
@@ -100,7 +103,7 @@ class PlaceSpec(Model):
 
     renamed: ClassVar = {**RENAMED, "on": "onto"}
 
-    object: str = Field(description="The held object to set down.")
+    object: MovableName = Field(description="The held object to set down.")
     part: str | None = Field(
         None, description="With `at: {of: ..., xyz: ...}`: the part of the object that goes there. Default: its frame."
     )
@@ -110,12 +113,14 @@ class PlaceSpec(Model):
         "something, there in the air or, with `onto` or `into`, under that point. Default: the middle of `onto` or "
         "`into`; without these, and without `region`, `start`.",
     )
-    onto: str | None = Field(
+    onto: BodyName | None = Field(
         None,
         description="The supporting body: on its top, or inside a tray; in or on a URDF or a mesh, at the first "
         "contact from above.",
     )
-    into: str | None = Field(None, description="The container, instead of `onto`: a cup, a tray, a mesh or a URDF.")
+    into: ContainerName | None = Field(
+        None, description="The container, instead of `onto`: a cup, a tray, a mesh or a URDF."
+    )
     region: RegionSpec | None = Field(
         None,
         description="Where on `onto` or in `into` it may be, instead of `at`; the nearest to its centre is tried "
@@ -129,7 +134,7 @@ class PlaceSpec(Model):
     )
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="Straight withdrawal of the hand [m].")] = (0.12, 0.18)
-    posture: str = Field("open", description="The named pose to which the hand opens.")
+    posture: PoseName = Field("open", description="The named pose to which the hand opens.")
     velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying; lowering uses half."
     )

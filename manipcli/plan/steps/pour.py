@@ -42,6 +42,7 @@ from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.drop_test import FORMED
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
+from manipcli.spec.names import ContainerName, MovableName
 from manipcli.spec.quantity import Angle, Length, Pause
 
 YAWS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
@@ -58,8 +59,8 @@ class PourSpec(Model):
 
     renamed: ClassVar = RENAMED
 
-    object: str = Field(description="The held container, which is tilted.")
-    into: str = Field(description="The receiving container.")
+    object: MovableName = Field(description="The held container, which is tilted.")
+    into: ContainerName = Field(description="The receiving container.")
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
     dwell: Annotated[Pause, Field(ge=0, description="Time to stay tilted [s], at most 1 h; extended by `until`.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)

@@ -17,12 +17,13 @@ from manipcli.plan.step import StepMember, single
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
+from manipcli.spec.names import PoseName
 
 
 class ReleaseSpec(Model):
     """Open the hand to a named pose and let go; the step fails if something stops the hand, or if it still holds."""
 
-    posture: str = Field("open", description="The named pose that the hand opens to.")
+    posture: PoseName = Field("open", description="The named pose that the hand opens to.")
 
 
 def plan(spec: ReleaseSpec, planner: Planner, state: PlanningState) -> StepPlan:

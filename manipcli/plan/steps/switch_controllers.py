@@ -22,6 +22,7 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember, single
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, or_short
+from manipcli.spec.names import ControllerName
 
 Names = str | tuple[str, ...]
 
@@ -43,8 +44,8 @@ class SwitchControllersSpec(Model):
     to: Annotated[tuple[str, ...], BeforeValidator(_names, json_schema_input_type=Names)] = Field(
         (), description="Controllers that are active afterwards; others on their joints are deactivated."
     )
-    activate: tuple[str, ...] = Field((), description="Controllers to activate.")
-    deactivate: tuple[str, ...] = Field((), description="Controllers to deactivate.")
+    activate: tuple[ControllerName, ...] = Field((), description="Controllers to activate.")
+    deactivate: tuple[ControllerName, ...] = Field((), description="Controllers to deactivate.")
     strictness: Strictness = Field(
         "strict",
         description="`strict`: all or nothing. `best_effort`: all that can be switched. Default `strict`.",

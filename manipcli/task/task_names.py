@@ -1,0 +1,105 @@
+"""The names that a task may use, also of a task with errors: an editor asks while it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from manipcli.core.errors import InvalidInput
+from manipcli.scene.scene import FACES, RIM, SEPARATOR
+from manipcli.scene.scene_names import RESERVED
+from manipcli.spec.load import load_controllers, task_source
+from manipcli.spec.located import Source
+from manipcli.spec.names import NameKind
+from manipcli.spec.schema_names import TaskNames
+from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
+from manipcli.spec.structure.ids import step_ids
+from manipcli.task.robot_file import read_robot
+from manipcli.task.vocabulary import controllers_spec, task_spec
+
+HOLLOW = ("cup", "tray", "mesh", "urdf")
+"""Shapes that may have a hollow."""
+
+
+def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False) -> TaskNames:
+    """The names of a task, its robot and its controllers; kinds of a file that cannot be read are missing.
+
+    Raises:
+        InvalidInput: the task file cannot be read, or is not YAML.
+    """
+    source, _ = task_source(path, task_spec())
+    names = {**_of_scene(source), "step": _steps(source)}
+    robot_file = _named(source, path, "robot")
+    args = None
+    if robot_file is not None:
+        try:
+            file, robot, _ = read_robot(robot_file, package_path=package_path, allow_outside=allow_outside)
+        except InvalidInput:
+            pass
+        else:
+            args = file.spec.args
+            links = [f"robot{SEPARATOR}{link.name}" for link in robot.links]
+            names["joint"] = {joint.name for joint in robot.joints if joint.independent}
+            names["link"] = {link.name for link in robot.links}
+            names["group"] = {group.name for group in robot.groups}
+            names["pose"] = {pose.name for pose in robot.poses}
+            names["part"] = {*names["body"], "robot", *links}
+            names["frame"] |= {*links}
+    controllers_file = _named(source, path, "controllers")
+    if controllers_file is not None:
+        try:
+            controllers = load_controllers(controllers_file, model=controllers_spec(), args=args or {})
+        except InvalidInput:
+            pass
+        else:
+            names["controller"] = {*controllers.spec.controllers}
+    scopes = [step.scope for step in source.structure.steps]
+    own = child(source.root, "params")
+    params = {
+        *(own.entries if isinstance(own, MappingNode) else ()),
+        *(name for scope in scopes for name in scope.nodes),
+    }
+    return TaskNames(names, params)
+
+
+def _named(source: Source, path: Path, key: str) -> Path | None:
+    """The file that the task names under `key`."""
+    node = child(source.root, key)
+    return path.parent / node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else None
+
+
+def _of_scene(source: Source) -> dict[NameKind, set[str]]:
+    scene, frames = child(source.root, "scene"), child(source.root, "frames")
+    bodies = scene.entries if isinstance(scene, MappingNode) else {}
+    floor = child(source.root, "floor")
+    ground = set() if isinstance(floor, ScalarNode) and floor.value is False else {"floor"}
+    frame = {"world", "base", "tool", *bodies, *ground}
+    frame |= {*frames.entries} if isinstance(frames, MappingNode) else set()
+    for name, entry in bodies.items():
+        parts = child(entry.node, "parts")
+        own = parts.entries if isinstance(parts, MappingNode) else {}
+        frame |= {f"{name}{SEPARATOR}{part}" for part in (*own, *FACES, RIM)}
+    return {
+        "body": {*bodies, *ground},
+        "movable": {name for name, entry in bodies.items() if not _is_true(child(entry.node, "fixed"))},
+        "container": {name for name, entry in bodies.items() if any(child(entry.node, key) for key in HOLLOW)},
+        "part": {*bodies, *ground, "robot"},
+        "frame": frame - {*RESERVED} | (frame & {"world", "base", "tool", "floor"}),
+    }
+
+
+def _is_true(node: Node | None) -> bool:
+    return isinstance(node, ScalarNode) and node.value is True
+
+
+def _steps(source: Source) -> set[str]:
+    """The ids of all steps and blocks, and `end`."""
+    found = {"end"}
+    steps, blocks = child(source.root, "steps"), child(source.root, "blocks")
+    if isinstance(steps, SequenceNode):
+        found |= {*step_ids(steps)}
+    for block in blocks.items if isinstance(blocks, SequenceNode) else ():
+        own = child(block, "id")
+        if isinstance(own, ScalarNode) and isinstance(own.value, str):
+            found.add(own.value)
+    return found
