@@ -13,6 +13,7 @@ from typing import Literal
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import any_of, escape, listed, nearest_file
 from manipcli.spec.base import Model
+from manipcli.spec.condition import ID_HINT
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.dropped import faults
 from manipcli.spec.explain import distinct
@@ -203,6 +204,8 @@ def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
             own = child(item, "id")
             if not isinstance(own, ScalarNode) or not isinstance(own.value, str):
                 continue
+            if key == "steps" and "/" in own.value:
+                yield source.finding(208, (key, k, "id"), f"'{escape(own.value)}' is not a valid id", hint=ID_HINT)
             if own.value in first:
                 message = f"duplicate id '{escape(own.value)}': {first[own.value]} has it already"
                 yield source.finding(210, (key, k, "id"), message, hint=f"choose another: {why}")

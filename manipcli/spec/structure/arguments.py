@@ -26,7 +26,7 @@ def arguments(
         reports.at(
             267, (*at, "with"), given, f"expected names with values, not {shown(given)}", "write `{NAME: VALUE}`"
         )
-        given = MappingNode({}, item.place)
+        return outer.inner({}, lost=(param.name for param in params), isolated=True)
     known = [param.name for param in params]
     for name in given.entries:
         if name not in known:
@@ -36,16 +36,24 @@ def arguments(
     used = frozenset[str]() if steps is None else names_used(steps)
     used |= names_used(task.get("params") or given)
     for param in params:
-        if param.name not in used:
+        if param.type and param.name not in used:
             node, hint = ScalarNode(None, param.place), "write `$name` where its value belongs, or remove it"
             message = f"the steps do not use `${param.name}`"
             reports.at(272, ("params", param.name), node, message, hint.replace("name", param.name), "warning")
-    missing = [param for param in params if param.name not in given.entries and param.default is None]
+    missing = [param for param in params if param.type and param.name not in given.entries and not param.default]
     if missing:
         named = listed([f"`{param.name}` ({param.type})" for param in missing])
         hint = f"add `with: {{{missing[0].name}: ...}}`; it is declared at {missing[0].place}"
         reports.at(267, (*at, "with"), item.entries["do"].node, f"no value for {named}", hint)
-    return _values(params, given, {param.name for param in missing}, at, outer, reports, bodies)
+    return _values(
+        params,
+        given,
+        {param.name for param in params if param in missing or not param.type},
+        at,
+        outer,
+        reports,
+        bodies,
+    )
 
 
 def _values(

@@ -211,13 +211,23 @@ class Expansion:
 
     def choice(self, item: MappingNode, own: str, at: Loc, context: _Context) -> None:
         scope = context.scope
-        condition = mapped(item.entries["if"].node, scope.computed, (*at, "if"))
+        written = item.entries["if"].node
+        inside = next((key for key in words.BESIDE["if"] if child(written, key) is not None), None)
+        if inside is not None and isinstance(written, MappingNode):
+            hint = f"indent `{inside}` as `if`"
+            self.reports.at_key(261, (*at, "if"), written, inside, f"`{inside}` belongs next to `if`", hint)
+            return
+        condition = mapped(written, scope.computed, (*at, "if"))
         try:
             holds = decided(condition)
         except Undecidable as error:
             if error.node.place not in scope.refused:
                 self.reports.at(270, (*at, "if"), error.node, error.message, error.hint)
             holds = True
+        if isinstance(holds, ScalarNode) and holds.written is not None:
+            message = f"expected a condition, or true or false, not {shown(holds)}"
+            self.reports.at(270, (*at, "if"), holds, message, f"compare it: `if: {{equal: [{holds.written}, ...]}}`")
+            return
         missing = "then" not in item.entries
         if missing and holds is not False:
             self.reports.at_key(262, at, item, "if", "`then` is missing", f"write `{words.FORMS['if']}`, or use `not`")

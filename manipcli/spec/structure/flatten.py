@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from manipcli.core.errors import Diagnostic
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.spec.expression import Scope
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, counted, mapped
 from manipcli.spec.structure.draft import FlatStep
@@ -38,6 +38,9 @@ def flattened(root: Node, scope: Scope, expansion: Expansion, change: Change) ->
     entry = root.entries.get("steps")
     if entry is None:
         return root, Structure(scope=scope)
+    if isinstance(entry.node, SequenceNode) and not entry.node.items and not _is_complete(scope, expansion):
+        place = entry.node.place
+        return root.with_node("steps", _placeholder(place)), Structure(scope=scope, complete=False)
     if not is_structured(entry.node):
         change(())
         return root.with_node("steps", mapped(entry.node, scope.computed, ("steps",))), Structure(scope=scope)
@@ -46,15 +49,24 @@ def flattened(root: Node, scope: Scope, expansion: Expansion, change: Change) ->
     nodes = _computed(steps, expansion)
     dropped = _computed(expanded.dropped, expansion)
     place = entry.node.place
-    complete = not any(finding.severity == "error" for finding in expansion.reports.findings)
-    if not nodes and not complete:
-        nodes = [MappingNode({"wait": Entry(place, ScalarNode(0.0, place))}, place)]
+    complete = _is_complete(scope, expansion)
     blocks = tuple(block.node() for block in expanded.blocks)
-    root = root.with_node("steps", SequenceNode(tuple(nodes), place))
+    flat = SequenceNode(tuple(nodes), place) if nodes or complete else _placeholder(place)
+    root = root.with_node("steps", flat)
     root = root.with_entry("blocks", Entry(entry.key_place, SequenceNode(blocks, place)))
     left = SequenceNode(tuple(dropped), place)
     structure = Structure(steps, expanded.blocks, scope, expanded.dropped, left, complete)
     return in_steps(root, structure), structure
+
+
+def _is_complete(scope: Scope, expansion: Expansion) -> bool:
+    """Whether nothing was left out because of an error."""
+    return not any(finding.severity == "error" for finding in (*scope.findings, *expansion.reports.findings))
+
+
+def _placeholder(place: Place) -> SequenceNode:
+    """A valid list of steps instead of one whose items are all faulty."""
+    return SequenceNode((MappingNode({"wait": Entry(place, ScalarNode(0.0, place))}, place),), place)
 
 
 def _computed(steps: Sequence[FlatStep], expansion: Expansion) -> list[Node]:

@@ -43,7 +43,7 @@ class Param:
 
 
 def declared(block: Node | None, report: Callable[[str, Wrong], None]) -> list[Param]:
-    """The parameters that a sub-task declares; faulty ones are reported with their name and get the type `any`."""
+    """The parameters that a sub-task declares; faulty ones are reported with their name and have no type."""
     if block is None:
         return []
     if not isinstance(block, MappingNode):
@@ -56,7 +56,7 @@ def declared(block: Node | None, report: Callable[[str, Wrong], None]) -> list[P
             kind = _type_of(name, entry.node, entry.key_place)
         except Wrong as wrong:
             report(name, wrong)
-            kind = "any"
+            kind = ""
         found.append(Param(name, kind, entry.key_place, child(entry.node, "default")))
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from manipcli.core.errors import Diagnostic, Loc, Place, Severity
+from manipcli.spec.explain import with_origin
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, dotted
 
 
@@ -25,7 +26,8 @@ class Reports:
         self, number: int, at: Loc, node: Node, message: str, hint: str | None = None, severity: Severity = "error"
     ) -> None:
         """Adds a finding at a node; `at` is its path in its file."""
-        self.add(Diagnostic(f"TASK{number}", f"{dotted(at)}: {message}", node.place, hint, severity))
+        text = f"{dotted(at)}: {message}"
+        self.add(Diagnostic(f"TASK{number}", text, node.place, with_origin(hint, node), severity))
 
     def at_key(
         self,

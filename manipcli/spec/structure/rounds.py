@@ -123,6 +123,6 @@ def _in_repeat(key: str, verbs: Collection[str]) -> tuple[str, str | None]:
     if key in words.COMMON:
         return f"`{key}` belongs next to `repeat`, not inside it", f"indent `{key}` as `repeat`"
     if key in verbs or key in words.WORDS:
-        return f"`{key}` is a step: it belongs into the list `steps`", f"write `steps: [{{{key}: ...}}]`"
+        return f"`{key}` is a step: it belongs in the list `steps`", f"write `steps: [{{{key}: ...}}]`"
     hint = did_you_mean(key, words.INSIDE, kind="keys of `repeat`")
     return f"unknown key '{escape(key)}' in `repeat`", hint
