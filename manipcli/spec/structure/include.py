@@ -24,7 +24,7 @@ def included(root: Node, files: Files, task: TaskFile) -> Node:
     try:
         return Inclusion(files, task).whole(root)
     except TooMuch:
-        return root.without(*NAMED, "steps")
+        return root.without(*NAMED).with_node("steps", SequenceNode((), root.place))
 
 
 def _names(block: MappingNode) -> tuple[Node, ...] | None:
