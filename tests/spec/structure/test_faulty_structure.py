@@ -45,7 +45,7 @@ FAULTY = (
     ),
     (
         260,
-        "6:31",
+        "6:35",
         "not both 'sequence' and 'repeat'",
         "[{sequence: [{wait: 1 s}], repeat: {times: 2, steps: [{wait: 1 s}]}}]",
     ),

@@ -90,7 +90,7 @@ def test_an_error_in_a_sub_task_names_every_use_around_it_once(tmp_path: Path) -
     (found,) = refused(tmp_path, "steps: [{do: outer.yaml}]\n", outer=outer, inner="steps: [{wait: 5 kg}]\n")
     assert (found.code, str(found.place)) == ("TASK207", f"{tmp_path / 'inner.yaml'}:1:16")
     assert found.message.startswith("steps[0].wait: ")
-    uses = f"used at {tmp_path / 't.yaml'}:4:14, then at {tmp_path / 'outer.yaml'}:2:36"
+    uses = f"used at {tmp_path / 't.yaml'}:4:14, then at {tmp_path / 'outer.yaml'}:2:37"
     assert uses in (found.hint or "")
 
 
