@@ -118,6 +118,13 @@ def test_a_block_under_during_is_all_its_steps() -> None:
     assert task.spec.expect[0].steps == ("both/wait_1", "both/wait_2")
 
 
+def test_a_block_under_at_is_its_last_step() -> None:
+    text = "steps: [{sequence: [{wait: 1 s}, %s], id: both}]\nexpect: [{at_rest: {object: a}, at: both}]\n"
+    assert loaded(text % "{wait: 1 s}").spec.expect[0].at == "both/wait_2"
+    branch = "{if: {at_rest: {object: a}}, then: [{wait: 1 s}]}"
+    assert loaded(text % branch).spec.expect[0].at == "both"  # refused with all names of steps
+
+
 NAMES = ("a", "b", "wait_1", "wait_2", "sequence_1", "repeat_1", "repeat_2", "if_1", "stack")
 STEP: st.SearchStrategy[Plain] = st.fixed_dictionaries({"wait": st.just(0)})
 
