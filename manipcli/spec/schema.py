@@ -11,11 +11,13 @@ from manipcli.spec.quantity import SIGNED
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.schema_names import TaskNames, list_names
 from manipcli.spec.source.tree import Plain
+from manipcli.spec.structure.json_schema import add_structure
 from manipcli.spec.task import TaskSpec
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _REFERENCE = r"\$[A-Za-z_]"
+_LIST = r"^\s*\$[A-Za-z_]\w*\s*$"
 
 
 def task_schema(model: type[TaskSpec], names: TaskNames | None = None) -> str:
@@ -25,6 +27,7 @@ def task_schema(model: type[TaskSpec], names: TaskNames | None = None) -> str:
     """
     schema = _schema(model, "manipcli task")
     _allow_expressions(schema)
+    add_structure(schema)
     list_names(schema, names)
     return _dump(schema)
 
@@ -86,6 +89,8 @@ def _allow_expressions(node: Plain) -> None:
     kind = node.get("type")
     if kind in ("number", "integer", "boolean"):
         node["type"], node["pattern"] = [kind, "string"], _REFERENCE
+    if kind == "array":
+        node["type"], node["pattern"] = [kind, "string"], _LIST
     if isinstance(node.get("enum"), list) and kind == "string":
         node["anyOf"] = [{"enum": node.pop("enum")}, {"pattern": _REFERENCE}]
     for key, value in node.items():
