@@ -9,8 +9,9 @@ from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 ARM = [f"panda_joint{k}" for k in range(1, 8)]
-SCENE = "scene:\n  block: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, pose: {xyz: [0.5, 0, 0.02]}}\n"
-SCENE += "  tray: {tray: {size: [20 cm, 20 cm, 4 cm]}, rests_on: floor, at: [0.5, 0.4], fixed: true}\n"
+BLOCK = "block: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, pose: {xyz: [0.5, 0, 0.02]}}"
+TRAY = "tray: {tray: {size: [20 cm, 20 cm, 4 cm]}, rests_on: floor, at: [0.5, 0.4], fixed: true}"
+SCENE = f"scene:\n  {{{BLOCK}, {TRAY}}}\n"
 
 
 def controllers(*groups: tuple[str, list[str]]) -> str:
