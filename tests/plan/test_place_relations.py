@@ -159,6 +159,7 @@ def test_a_place_in_a_body_or_in_the_air_is_refused(arm: Any) -> None:
         ({"at": {"of": "birck", "xyz": [0, 0, 0]}}, ("at", "of"), "unknown frame 'birck'", "'brick'"),
         ({"at": {"of": "pot/nob", "xyz": [0, 0, 0]}}, ("at", "of"), "'pot' has no part 'nob'", "'knob'"),
         ({"at": {"of": "pto/knob", "xyz": [0, 0, 0]}}, ("at", "of"), "unknown frame 'pto/knob'", "'pot/knob'"),
+        ({"at": {"of": "pot.rim", "xyz": [0, 0, 0]}}, ("at", "of"), "unknown frame 'pot.rim'", "'pot/rim'"),
         ({"at": {"of": "tool", "xyz": [0, 0, 0]}}, ("at", "of"), "'tool' moves with the robot", "`base`"),
         ({"at": {"of": "robot/palm", "xyz": [0, 0, 0]}}, ("at", "of"), "'palm' is not a link", ""),
         ({"at": {"of": "block/top", "xyz": [0, 0, 0]}}, ("at", "of"), "relative to itself", ""),

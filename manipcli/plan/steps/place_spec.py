@@ -256,9 +256,8 @@ def _relation(spec: PlaceSpec, at: RelationSpec, robot: RobotModel, scene: Scene
     elif at.side is not None and not wrong:
         other = scene.body(at.of)
         if other.fixed and other.X_WO.R[2, 2] < UPRIGHT:
-            yield Problem(
-                ("at", "of"), f"'{at.of}' is tilted, so its sides are not level", "use `xyz` instead of `side`"
-            )
+            message = f"'{at.of}' is tilted, so its sides are not level"
+            yield Problem(("at", "of"), message, "use `xyz` instead of `side`")
     if at.xyz is not None and spec.support is not None and at.xyz[2] != 0.0:
         message = f"the height {readable(at.xyz[2], 'm')} has no effect: `{spec.support_key}` sets the height"
         yield Problem(("at", "xyz", 2), message, f"write 0, or remove `{spec.support_key}`")
