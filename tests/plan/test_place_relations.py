@@ -33,12 +33,19 @@ SCENE = """
 FRAMES = "frames: {spot: {parent: table, pose: {xyz: [0, -0.3, 0.1], rpy: [0, 0, 45 deg]}}}"
 
 
-@pytest.fixture
-def arm(bench: Make) -> Any:
+@pytest.fixture(scope="module")
+def held(bench: Make) -> Any:
     """A Panda that holds the block, 12 cm above the table."""
     panda = bench("panda", SCENE, FRAMES)
     panda.do("pick", {"object": "block", "approach": {"from": "top"}})
     panda.do("lift", {"object": "block"})
+    return panda, panda.now
+
+
+@pytest.fixture
+def arm(held: Any) -> Any:
+    """The same before each test."""
+    panda, panda.now = held
     return panda
 
 
