@@ -158,7 +158,9 @@ class PlaceSpec(Model):
     @property
     def at_start(self) -> bool:
         """Whether it is placed where it was at the start."""
-        return self.at == "start" or (self.at is None and self.region is None and self.support is None)
+        if self.region is not None:
+            return False
+        return self.at == "start" or (self.at is None and self.support is None)
 
 
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
@@ -186,12 +188,13 @@ def _given_once(spec: PlaceSpec) -> Iterator[Problem]:
     """A place that is given twice, or a support that is missing or of no use."""
     if spec.onto is not None and spec.into is not None:
         yield Problem(("into",), "`onto` and `into` both set the support", "remove one of them")
-    if spec.at is not None and spec.region is not None:
+    # Logs of earlier versions have `at: start`, then a default, with a region.
+    if spec.region is not None and spec.at not in (None, "start"):
         yield Problem(("region",), "`region` and `at` both set the place", "remove one of them")
     elif spec.support is None and (spec.region is not None or isinstance(spec.at, tuple)):
         word, example = ("region", "region") if spec.region is not None else ("at", "at: [x, y]")
         yield Problem((word,), f"`{example}` needs a supporting body", "add `onto: BODY`")
-    if spec.at == "start" and spec.support is not None:
+    if spec.at == "start" and spec.support is not None and spec.region is None:
         word = spec.support_key
         hint = f"remove `at: start` for the middle of '{spec.support}', or remove `{word}`"
         yield Problem((word,), f"`at: start` and `{word}` both set the place", hint)
