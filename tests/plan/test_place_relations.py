@@ -187,21 +187,6 @@ def test_what_depends_only_on_the_file_is_found_without_a_plan(
     assert message in text and hint in (advice or "")
 
 
-def test_a_wide_object_does_not_fit_into_a_narrow_hollow(bench: Make) -> None:
-    panda = bench("panda", SCENE, FRAMES)
-    assert panda.problems("place", {"object": "brick", "into": "pot"}) == []  # 6 cm upright into 7.2 cm
-    ((loc, text, _),) = panda.problems("place", {"object": "pot", "into": "mug"})
-    assert loc == ("into",)
-    assert text == "'pot' does not fit into 'mug': it is 81.4 mm wide, the hollow 52 mm"
-
-
-def test_a_pour_needs_a_hollow(bench: Make) -> None:
-    panda = bench("panda", SCENE, FRAMES)
-    ((loc, text, hint),) = panda.problems("pour", {"object": "pot", "into": "brick"})
-    assert (loc, text) == (("into",), "'brick' is a box and has no hollow")
-    assert hint == "containers here: tray, mug"
-
-
 def test_the_frame_of_a_part_goes_along_with_its_body(bench: Make) -> None:
     panda = bench("panda", SCENE, FRAMES)
     names = [body.name for body in panda.scene.movable]

@@ -9,9 +9,7 @@ from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 ARM = [f"panda_joint{k}" for k in range(1, 8)]
-BLOCK = "block: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, pose: {xyz: [0.5, 0, 0.02]}}"
-TRAY = "tray: {tray: {size: [20 cm, 20 cm, 4 cm]}, rests_on: floor, at: [0.5, 0.4], fixed: true}"
-SCENE = f"scene:\n  {{{BLOCK}, {TRAY}}}\n"
+SCENE = "scene:\n  block: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, pose: {xyz: [0.5, 0, 0.02]}}\n"
 
 
 def controllers(*groups: tuple[str, list[str]]) -> str:
@@ -46,7 +44,7 @@ ACROSS = [
     "  - follow: {joint_names: [panda_joint1, panda_joint7], points: [{positions: [0, 0], time_from_start: 3}]}\n",
     "  - pick: {object: block}\n",
     "  - lift: {object: block}\n",
-    "  - pour: {object: block, into: tray}\n",
+    "  - pour: {object: block, into: floor}\n",
     "  - place: {object: block}\n",
 ]
 GRASPING = [

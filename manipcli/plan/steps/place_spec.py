@@ -118,8 +118,8 @@ class PlaceSpec(Model):
     into: str | None = Field(None, description="The container, instead of `onto`: a cup, a tray, a mesh or a URDF.")
     region: RegionSpec | None = Field(
         None,
-        description="Where on `onto` or in `into` it may be, instead of `at`; the nearest to its centre is tried "
-        "first.",
+        description="Where on `onto` or in `into` it may be, instead of `at`: at least 10 mm from all other bodies; the "
+        "nearest place to its centre is tried first.",
     )
     yaw: Turn | None = Field(
         None,
@@ -234,15 +234,11 @@ def _support(spec: PlaceSpec, scene: Scene) -> Iterator[Problem]:
 
 
 def _size(body: Body, under: Body, word: str) -> Iterator[Problem]:
-    """An object that is wider than a hollow, or too wide for a narrow top."""
-    if under.kind in FORMED or not under.kind:
+    """A top that is too narrow for the object."""
+    if under.kind in FORMED or not under.kind or under.interior is not None:
         return
-    _, space = floor_of(under)
-    wide, narrow = float(np.min(body.size[:2])), float(np.min(space))
-    if under.interior is not None and wide > narrow:
-        sizes = f"{readable(wide, 'm')} wide, the hollow {readable(narrow, 'm')}"
-        yield Problem((word,), f"'{body.name}' does not fit into '{under.name}': it is {sizes}")
-    elif under.interior is None and narrow < min(STEADY, wide / 2):
+    wide, narrow = float(np.min(body.size[:2])), float(np.min(floor_of(under)[1]))
+    if narrow < min(STEADY, wide / 2):
         least = readable(STEADY, "m")
         message = f"the top of '{under.name}' is too narrow for '{body.name}': {readable(narrow, 'm')} wide"
         yield Problem((word,), message, f"place it on a top that is at least {least} wide")
