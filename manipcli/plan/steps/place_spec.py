@@ -118,8 +118,8 @@ class PlaceSpec(Model):
     into: str | None = Field(None, description="The container, instead of `onto`: a cup, a tray, a mesh or a URDF.")
     region: RegionSpec | None = Field(
         None,
-        description="Where on `onto` or in `into` it may be, instead of `at`: at least 10 mm from all other bodies; the "
-        "nearest place to its centre is tried first.",
+        description="Where on `onto` or in `into` it may be, instead of `at`: at least 10 mm from all other bodies; "
+        "the nearest place to its centre is tried first.",
     )
     yaw: Turn | None = Field(
         None,
