@@ -69,7 +69,8 @@ def unknown_frame(robot: RobotModel, scene: Scene, name: str, loc: Loc) -> tuple
         return (Problem(loc, f"'{part}' is not a link of robot '{robot.name}'", did_you_mean(part, links)),)
     if owner in bodies:
         return unknown_part(scene, owner, part, loc)
-    parts = [f"{body}{SEPARATOR}{part}" for body in bodies for part in scene.parts(body)] if separator else []
+    dotted = separator or "." in name  # `cup.rim` is `cup/rim`
+    parts = [f"{body}{SEPARATOR}{part}" for body in bodies for part in scene.parts(body)] if dotted else []
     known = [*WORDS, *bodies, *(frame.name for frame in scene.frames), *parts]
     return (Problem(loc, f"unknown frame '{name}'", did_you_mean(name, known)),)
 
@@ -85,6 +86,6 @@ def unknown_part(scene: Scene, body: str, part: str, loc: Loc) -> tuple[Problem,
 def fixed_frame(robot: RobotModel, scene: Scene, name: str, loc: Loc) -> tuple[Problem, ...]:
     """A problem if the frame is unknown, or moves with the robot."""
     if name == "tool" or (name.startswith(f"{ROBOT}{SEPARATOR}") and not unknown_frame(robot, scene, name, loc)):
-        message = f"'{name}' moves with the robot; a place cannot refer to it"
+        message = f"'{name}' moves with the robot; expected a frame that does not"
         return (Problem(loc, message, "use `base`, a body, a part of one or a named frame"),)
     return unknown_frame(robot, scene, name, loc)

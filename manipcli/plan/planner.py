@@ -183,10 +183,8 @@ class Planner:
 
     def frame(self, name: str, state: PlanningState) -> Transform:
         """X_WF of `world`, `base`, `tool`, `robot/LINK`, a body, a part of one, or a named frame."""
-        if name == "world":
-            return Transform.identity()
-        if name == "base":
-            return self.robot.X_WB
+        if name in ("world", "base"):
+            return self.robot.X_WB if name == "base" else Transform.identity()
         if name == "tool":
             return self.tool_pose(state)
         frame = self.scene.frame(name)

@@ -236,6 +236,37 @@ def test_near_a_frame_follows_the_body_that_it_hangs_on() -> None:
     assert margin("near", now, object="ball", to="rim", within=0.05) == pytest.approx(0.03, abs=1e-12)
 
 
+def test_near_compares_a_part_with_a_point_in_a_frame() -> None:
+    """Both turn with their bodies; by products of poses."""
+    X_WC = Transform.of(xyz=(0.3, 0.2, 0.5), rpy=(0.4, -0.2, 1.0))
+    X_WS = Transform.of(xyz=(0.1, -0.4, 0.7), rpy=(1.0, 0.3, -2.0))
+    now = state(poses={"cup": X_WC, "stick": X_WS})
+    apart = float(np.linalg.norm(X_WC.apply([0, 0, 0.11]) - X_WS.apply([0.1, 0.2, 0.3])))
+    written = {"object": "cup/rim", "to": [0.1, 0.2, 0.3], "frame": "stick"}
+    assert margin("near", now, **written, within=2.0) == pytest.approx(2.0 - apart, abs=1e-12)
+    assert margin("near", now, object="cup/top", to="stick/bottom", within=2.0) == pytest.approx(
+        2.0 - float(np.linalg.norm(X_WC.apply([0, 0, 0.11]) - X_WS.p)), abs=1e-12
+    )
+
+
+def test_near_knows_links_and_refuses_what_is_fixed_to_nothing() -> None:
+    now = state(position=(0.5, 0.0, 0.0))
+    assert margin("near", now, object="robot/two", to="base", within=0.1) == pytest.approx(0.1, abs=1e-12)
+
+    def problems(**written: Any) -> list[tuple[object, ...]]:
+        condition: Condition[Any] = CONDITIONS["near"]
+        spec = condition.spec.model_validate({"within": 0.1, **written})
+        return [(p.loc, p.message) for p in condition.check(spec, CheckContext(ROBOT, SCENE))]
+
+    assert problems(object="tool", to="cup") == [(("object",), "robot 'arm' has no tool frame")]
+    assert problems(object="cup/rin", to="start") == [(("object",), "'cup' has no part 'rin'")]
+    assert problems(object="cup", to="robot/tow") == [(("to",), "'tow' is not a link of robot 'arm'")]
+    assert problems(object="cup", to="start", frame="stick") == [
+        (("frame",), "`frame` applies to a point `to: [x, y, z]`, not to a name")
+    ]
+    assert problems(object="cup", to=[0, 0, 0], frame="stik") == [(("frame",), "unknown frame 'stik'")]
+
+
 def test_outside_is_the_opposite_of_inside() -> None:
     for p in ((0.5, 0.5, 0.024), (0.67, 0.63, 0.03)):
         inside = margin("inside", ball_at(*p), object="ball", of="tray")

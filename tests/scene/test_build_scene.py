@@ -184,6 +184,75 @@ def test_frames_hang_on_world_and_bodies() -> None:
     np.testing.assert_allclose(scene.frames[0].X_PF.p, [0, 0, 0.3])
 
 
+def test_a_pose_in_a_frame_is_the_product_of_the_poses() -> None:
+    """Of a body, a named frame, a part, and a part that every body has; by matrices."""
+    turned = DESK | {
+        "pose": {"xyz": [0.8, 0.1, 0.2], "rpy": [0, 0, 0.7]},
+        "parts": {"edge": {"pose": {"xyz": [0, 0.4, 0.2]}}},
+    }
+    frames = {"drop": {"parent": "desk", "pose": {"xyz": [0.1, 0, 0.5], "rpy": [0.3, 0, 0]}}}
+    own = {"xyz": [0.02, 0.03, 0.9], "rpy": [0.1, 0.2, 0.3]}
+    X_WD, X_FO = Transform.of(xyz=(0.8, 0.1, 0.2), rpy=(0, 0, 0.7)).matrix, Transform.of(**own).matrix
+    for frame, X_DF in (
+        ("desk", Transform.identity()),
+        ("drop", Transform.of(xyz=(0.1, 0, 0.5), rpy=(0.3, 0, 0))),
+        ("desk/edge", Transform.of(xyz=(0, 0.4, 0.2))),
+        ("desk/top", Transform.of(xyz=(0, 0, 0.2))),
+    ):
+        scene = built({"x": CUBE | {"pose": own, "frame": frame}, "desk": turned}, frames=frames)
+        np.testing.assert_allclose(scene.body("x").X_WO.matrix, X_WD @ X_DF.matrix @ X_FO, atol=1e-12)
+
+
+def test_what_rests_at_a_point_of_a_frame_turns_with_it() -> None:
+    turned = DESK | {"pose": {"xyz": [0.8, 0.1, 0.2], "rpy": [0, 0, 0.7]}}
+    scene = built({"desk": turned, "x": CUBE | {"rests_on": "desk", "frame": "desk", "at": [0.1, -0.2], "yaw": 0.2}})
+    X_WO = scene.body("x").X_WO
+    np.testing.assert_allclose(X_WO.p[:2], Transform.of(xyz=(0.8, 0.1, 0), rpy=(0, 0, 0.7)).apply([0.1, -0.2, 0])[:2])
+    assert X_WO.rpy[2] == pytest.approx(0.9)
+
+
+def test_parts_are_frames_of_their_body_and_every_body_has_some() -> None:
+    cup = CUP | {
+        "rests_on": "floor",
+        "at": [0, 0],
+        "parts": {"handle": {"pose": {"xyz": [0.04, 0, 0.05]}, "size": [1, 2, 3]}},
+    }
+    scene = built({"cup": cup, "desk": DESK})
+    handle = scene.frame("cup/handle")
+    assert handle is not None and handle.parent == "cup" and handle.size is not None
+    np.testing.assert_array_equal(handle.X_PF.p, [0.04, 0, 0.05])
+    np.testing.assert_array_equal(handle.size, [1, 2, 3])
+    assert scene.parts("cup") == ("handle", "top", "bottom", "rim")
+    assert scene.parts("desk") == ("top", "bottom")
+    assert scene.frame("desk/rim") is None and scene.frame("dusk/top") is None
+    assert [frame.name for frame in scene.frames] == ["cup/handle"]  # what a log has: the written ones
+
+
+@pytest.mark.parametrize(
+    ("bodies", "code", "words", "hint"),
+    [
+        ({"x": {"frame": "dask"}}, "TASK291", "'dask' is not in the scene", "'desk'"),
+        ({"x": {"frame": "desk/tpo"}}, "TASK291", "'desk' has no part 'tpo'", "'top'"),
+        ({"x": {"frame": "desk/rim"}}, "TASK291", "'desk' has no part 'rim'", "parts of 'desk': top, bottom"),
+        ({"x": {"frame": "tool"}}, "TASK291", "'tool' is a frame of the robot", "`world`"),
+        ({"x": {"parts": {"a/b": {}}}}, "TASK290", "invalid name of a part: 'a/b'", "without '/'"),
+        ({"x": {"frame": "x"}}, "TASK225", "x -> x", ""),
+        ({"x": {"frame": "y/top"}, "y": {"frame": "x"}}, "TASK225", "circular placement", ""),
+    ],
+)
+def test_each_fault_of_a_frame_or_a_part_is_found(bodies: dict[str, Any], code: str, words: str, hint: str) -> None:
+    found = findings({"desk": DESK, **{name: CUBE | {"pose": {}} | body for name, body in bodies.items()}})
+    assert found[0].code == code and words in found[0].message and hint in (found[0].hint or "")
+
+
+def test_a_tilted_frame_gives_no_place_to_rest() -> None:
+    tilted = {"slope": {"parent": "desk", "pose": {"rpy": [0.1, 0, 0]}}}
+    found = findings({"desk": DESK, "x": CUBE | {"rests_on": "desk", "frame": "slope", "at": [0, 0]}}, frames=tilted)
+    assert [(each.code, each.message) for each in found] == [
+        ("TASK292", "'slope' is tilted: its `at: [x, y]` is not level")
+    ]
+
+
 def test_a_finding_carries_its_place() -> None:
     where = {("scene", "ball", "inside"): Place("pour.yaml", 7, 40)}
     spec = task({"desk": DESK, "cup": CUP | {"rests_on": "desk", "at": [0.75, 0]}, "ball": BALL | {"inside": "cop"}})

@@ -28,6 +28,13 @@ BODIES: dict[str, Any] = {
     },
     "ball": {"sphere": {"radius": 0.014}, "mass": 0.01, "inside": "cup", "rolling_friction": 1e-4},
     "tray": {"tray": {"size": [0.2, 0.2, 0.05]}, "rests_on": "floor", "at": [0, 1], "fixed": True},
+    "lid": {
+        "box": {"size": [0.1, 0.1, 0.01]},
+        "mass": 0.1,
+        "rests_on": "desk",
+        "at": [0.7, 0.2],
+        "parts": {"knob": {"pose": {"xyz": [0, 0, 0.02]}, "size": [0.02, 0.02, 0.02]}, "edge": {}},
+    },
     "can": {"cylinder": {"radius": 0.03, "height": 0.1}, "mass": 0.1, "pose": {"rpy": [1, 2, 3], "xyz": [0, 0, 1]}},
 }
 

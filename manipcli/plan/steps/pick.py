@@ -1,7 +1,7 @@
 """`pick`: reach an object, approach it straight, and close the hand on it.
 
 - pick: {object: cup, approach: {from: side, distance: [8 cm, 14 cm]}, grasp: {posture: wrap, force: 8 N}}
-- pick: {object: drawer, part: handle, approach: {from: side, yaw: 180 deg, frame: drawer/handle}}
+- pick: {object: pan, part: handle, approach: {from: top, yaw: 0, frame: pan/handle}}
 """
 
 from __future__ import annotations

@@ -123,8 +123,8 @@ class PlaceSpec(Model):
     )
     region: RegionSpec | None = Field(
         None,
-        description="Where on `onto` or in `into` it may be, instead of `at`; the nearest to its centre is tried "
-        "first.",
+        description="Where on `onto` or in `into` it may be, instead of `at`: at least 10 mm from all other bodies; "
+        "the nearest place to its centre is tried first.",
     )
     yaw: Turn | None = Field(
         None,
@@ -163,7 +163,9 @@ class PlaceSpec(Model):
     @property
     def at_start(self) -> bool:
         """Whether it is placed where it was at the start."""
-        return self.at == "start" or (self.at is None and self.region is None and self.support is None)
+        if self.region is not None:
+            return False
+        return self.at == "start" or (self.at is None and self.support is None)
 
 
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
@@ -191,12 +193,13 @@ def _given_once(spec: PlaceSpec) -> Iterator[Problem]:
     """A place that is given twice, or a support that is missing or of no use."""
     if spec.onto is not None and spec.into is not None:
         yield Problem(("into",), "`onto` and `into` both set the support", "remove one of them")
-    if spec.at is not None and spec.region is not None:
+    # Logs of earlier versions have `at: start`, then a default, with a region.
+    if spec.region is not None and spec.at not in (None, "start"):
         yield Problem(("region",), "`region` and `at` both set the place", "remove one of them")
     elif spec.support is None and (spec.region is not None or isinstance(spec.at, tuple)):
         word, example = ("region", "region") if spec.region is not None else ("at", "at: [x, y]")
         yield Problem((word,), f"`{example}` needs a supporting body", "add `onto: BODY`")
-    if spec.at == "start" and spec.support is not None:
+    if spec.at == "start" and spec.support is not None and spec.region is None:
         word = spec.support_key
         hint = f"remove `at: start` for the middle of '{spec.support}', or remove `{word}`"
         yield Problem((word,), f"`at: start` and `{word}` both set the place", hint)
@@ -236,15 +239,11 @@ def _support(spec: PlaceSpec, scene: Scene) -> Iterator[Problem]:
 
 
 def _size(body: Body, under: Body, word: str) -> Iterator[Problem]:
-    """An object that is wider than a hollow, or too wide for a narrow top."""
-    if under.kind in FORMED or not under.kind:
+    """A top that is too narrow for the object."""
+    if under.kind in FORMED or not under.kind or under.interior is not None:
         return
-    _, space = floor_of(under)
-    wide, narrow = float(np.min(body.size[:2])), float(np.min(space))
-    if under.interior is not None and wide > narrow:
-        sizes = f"{readable(wide, 'm')} wide, the hollow {readable(narrow, 'm')}"
-        yield Problem((word,), f"'{body.name}' does not fit into '{under.name}': it is {sizes}")
-    elif under.interior is None and narrow < min(STEADY, wide / 2):
+    wide, narrow = float(np.min(body.size[:2])), float(np.min(floor_of(under)[1]))
+    if narrow < min(STEADY, wide / 2):
         least = readable(STEADY, "m")
         message = f"the top of '{under.name}' is too narrow for '{body.name}': {readable(narrow, 'm')} wide"
         yield Problem((word,), message, f"place it on a top that is at least {least} wide")
@@ -258,6 +257,11 @@ def _relation(spec: PlaceSpec, at: RelationSpec, robot: RobotModel, scene: Scene
     if at.side is not None and not wrong and (at.of not in bodies or at.of == "floor"):
         message = f"`side` needs a body; '{at.of}' is {'the floor' if at.of == 'floor' else 'a frame'}"
         yield Problem(("at", "of"), message, "write its point: `xyz: [x, y, z]`")
+    elif at.side is not None and not wrong:
+        other = scene.body(at.of)
+        if other.fixed and other.X_WO.R[2, 2] < UPRIGHT:
+            message = f"'{at.of}' is tilted, so its sides are not level"
+            yield Problem(("at", "of"), message, "use `xyz` instead of `side`")
     if at.xyz is not None and spec.support is not None and at.xyz[2] != 0.0:
         message = f"the height {readable(at.xyz[2], 'm')} has no effect: `{spec.support_key}` sets the height"
         yield Problem(("at", "xyz", 2), message, f"write 0, or remove `{spec.support_key}`")

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.conditions.frames import carrier
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
@@ -32,9 +33,11 @@ def goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     Raises:
         NotPlannable: nothing stands there.
     """
-    if spec.support is not None and spec.support in planner.contents(state, spec.object):
-        message = f"'{spec.support}' is in '{spec.object}' and moves with it"
-        raise NotPlannable(message, loc=(spec.support_key,))
+    inside = planner.contents(state, spec.object)
+    if spec.support in inside:
+        raise NotPlannable(f"'{spec.support}' is in '{spec.object}' and moves with it", loc=(spec.support_key,))
+    if isinstance(spec.at, RelationSpec) and carrier(planner.scene, spec.at.of) in inside:
+        raise NotPlannable(f"'{spec.at.of}' is in '{spec.object}' and moves with it", loc=("at", "of"))
     if spec.at_start:
         return planner.scene.body(spec.object).X_WO
     X_WG = _goal(spec, planner, state)

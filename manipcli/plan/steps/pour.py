@@ -39,7 +39,6 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
-from manipcli.scene.drop_test import FORMED
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.names import ContainerName, MovableName
@@ -162,11 +161,6 @@ def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     found = unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
     if found:
         return found
-    into = scene.body(spec.into)
-    if into.kind and into.interior is None and into.kind not in FORMED:
-        hollow = [body.name for body in scene.bodies if body.interior is not None and body.name != spec.object]
-        hint = f"containers here: {', '.join(hollow)}" if hollow else "use a cup or a tray as container"
-        return (Problem(loc=("into",), message=f"'{spec.into}' is a {into.kind} and has no hollow", hint=hint),)
     reach = float(max(scene.body(spec.into).size[:2]) / 2)
     if abs(spec.offset) < reach:
         return ()
