@@ -10,12 +10,15 @@ from typing import Final
 from manipcli.core.errors import NotPlannable
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
+from manipcli.core.work import WorkSpent
 from manipcli.plan.candidates import NUMBER, Dropped
 
 UNNAMED: Final = "-"
 """The stage of a refusal that names no motion: before any, or of a step that is a single one."""
 NAMED: Final = 5
 """Names of candidates that a group lists."""
+DEEPER_REMEDY: Final = "`manipcli plan TASK --why` searches how far the base would have to move"
+"""The hint in place of a remedy that is not found within the budget."""
 _LABEL: Final = re.compile(r"([a-z_]+(?: back)?): ")
 _DURING: Final = re.compile(r" s of '([a-z_ ]+)'")
 
@@ -46,14 +49,17 @@ def by_stage(refused: Refused) -> tuple[RefusedCandidates, ...]:
 def explained(refusal: NotPlannable, refused: Refused) -> NotPlannable:
     """The refusal of a task with its refused candidates, and with the change that would free most of them.
 
-    A pose out of reach is told how far the base would have to move; that is searched here, once.
+    A pose out of reach gets how far the base would have to move; that is searched here, once, and left out where the
+    budget of the diagnosis does not suffice.
     """
     hints = [] if refusal.hint is None else [refusal.hint]
     if len(refused) > 1 and (change := change_for_most(refused)):
         hints.append(change)
-    remedy = None if refusal.remedy is None else refusal.remedy()
-    if remedy is not None:
-        hints.append(remedy)
+    try:
+        if refusal.remedy is not None:
+            hints.append(refusal.remedy())
+    except WorkSpent:
+        hints.append(DEEPER_REMEDY)
     found = refusal.but(hint="; ".join(hints) or None, candidates=by_stage(refused), motions=())
     found.remedy = None  # done, and it holds the solver
     return found

@@ -10,11 +10,12 @@ import numpy as np
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.core.work import WorkSpent
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
-from manipcli.plan.candidates import Candidates, Dropped, first
+from manipcli.plan.candidates import SPENT, Candidates, Dropped, first
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.clearance import least_clearance
 from manipcli.plan.cost import step_cost
@@ -26,11 +27,14 @@ from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
+from manipcli.plan.search_budget import STEP, SearchBudget
+from manipcli.plan.search_progress import SearchProgress
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import explained
 from manipcli.spec.keep import KeepSpec
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.task import Task
 
@@ -137,12 +141,13 @@ def unplanned(task: Task) -> Plan:
     return Plan(steps=(), start=_start(task), planner=_planner(task))
 
 
-def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None) -> Plan:
+def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None, deeper: bool = False) -> Plan:
     """Plans every step. What a sample changes in the simulation only (`Task.truth`) has no effect.
 
     Args:
         task: the task.
-        on_progress: callback with a message before each step is planned.
+        on_progress: callback with a line for each step and candidate that is tried, see `SearchProgress`.
+        deeper: search longer before the task is refused, see `SearchBudget`.
 
     Raises:
         NotPlannable: names the step and the cause; later steps are not planned.
@@ -151,7 +156,8 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     planner = _planner(task)
     start = _start(task)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
-    return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
+    budget = _budget(task, planner, deeper=deeper)
+    return Plan(steps=_steps(task, planner, start, on_progress, budget), start=start, planner=planner, judged=judged)
 
 
 def spans(
@@ -203,9 +209,12 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
         NotPlannable: with the id of the step.
     """
     try:
-        return first(_candidates(planner, step, state), exclude=grasps)
+        with SearchBudget(planner.kinematics.work).searching():
+            return first(_candidates(planner, step, state), exclude=grasps)
     except NotPlannable as refusal:
         raise refusal.but(step=step.id) from refusal
+    except WorkSpent:
+        raise NotPlannable(SPENT, step=step.id) from None
 
 
 def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
@@ -225,8 +234,15 @@ def _start(task: Task) -> PlanningState:
     return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
 
 
+def _budget(task: Task, planner: Planner, *, deeper: bool) -> SearchBudget:
+    """The budget of the search; larger where the task asks for more samples of each path."""
+    samples = PlannerSpec.model_fields["samples"].default
+    share = max(1.0, task.spec.planner.samples / samples)
+    return SearchBudget(planner.kinematics.work, deeper=deeper, step=round(share * STEP))
+
+
 def _steps(
-    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None]
+    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None], budget: SearchBudget
 ) -> tuple[PlannedStep, ...]:
     """Plans all steps; see `task_search`."""
     steps = task.spec.steps
@@ -248,17 +264,18 @@ def _steps(
         except NotPlannable as refusal:
             raise located(k, refusal) from refusal
 
-    def on_step(k: int, again: bool) -> None:
-        on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
-
     def explain(refusal: NotPlannable, refused: Sequence[tuple[int, Dropped]]) -> NotPlannable:
         return explained(refusal, [(str(steps[k].id), one) for k, one in refused])
 
+    progress = SearchProgress(on_progress, [str(step.id) for step in steps])
+    planner.kinematics.work.doing = progress.doing
     solved = search_task(
         opens,
         len(steps),
         start,
-        on_step=on_step,
+        on_step=progress.step,
+        on_candidate=progress.candidate,
+        budget=budget,
         explain=explain,
         optimise=task.spec.plan.optimise,
         cost=lambda plan: step_cost(planner, plan).total,

@@ -10,6 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import check_outputs
+from manipcli.cli.progress import PlanningProgress
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, NotPlannable
 
 if TYPE_CHECKING:
@@ -40,6 +41,10 @@ def plan(
         Path | None,
         typer.Option("--to", metavar="FOLDER", help="With --export: folder of the files [default: TASK_trajectories]."),
     ] = None,
+    why: Annotated[
+        bool,
+        typer.Option("--why", help="Search longer before the task is refused, and show every refused candidate."),
+    ] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -71,7 +76,8 @@ def plan(
         allow_outside=allow_outside,
     )
     try:
-        planned = pipeline.plan_task(loaded)
+        with PlanningProgress() as progress:
+            planned = pipeline.plan_task(loaded, on_progress=progress.activity, deeper=why)
     except NotPlannable as refusal:
         if html is not None:
             _write_refused_page(pipeline.unplanned(loaded), loaded.spec.task, html, refusal)
