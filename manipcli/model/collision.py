@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.core.work import EVERY_CONTACT, TOUCH
+from manipcli.core.work import PAIRS, TOUCH
 from manipcli.model.collision_pairs import Part, checked_pairs, margins_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.motion_bound import MotionBound, Mover
@@ -251,7 +251,7 @@ class CollisionQuery:
         """Every touching pair of parts at `q` (n) with its deepest contact, sorted by name."""
         pin, geometry = self._pin, self._geometry
         q = np.asarray(q, dtype=np.float64)
-        self._kinematics.work.add(EVERY_CONTACT)
+        self._kinematics.work.add(TOUCH + len(geometry.collisionPairs) // PAIRS)
         self._require(self._broad, self._margins)
         pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, q, False)
         deepest: dict[Pair, float] = {}

@@ -29,7 +29,7 @@ STEP = 2
 first candidate, half for the second, a quarter for the third."""
 TELLING = 0.05
 """A search with a smaller share of the samples says nothing about the way: the refusal before it is repeated."""
-NARROWEST = 12_000
+NARROWEST = 20_000
 """Units of work for the narrowest place and the commonest obstacle, also where the budget is spent."""
 _UNLIMITED = np.pi  # rad or m beyond start and goals: samples of a joint without limits
 

@@ -27,7 +27,7 @@ from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
-from manipcli.plan.search_budget import STEP, SearchBudget
+from manipcli.plan.search_budget import SearchBudget
 from manipcli.plan.search_progress import SearchProgress
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
@@ -77,12 +77,13 @@ class PlannedMotion:
 @dataclass(frozen=True, slots=True)
 class Plan:
     """The plan of a task. `planner` re-plans steps from measured states; `judged`: places of expectations and watches,
-    for the log."""
+    for the log; `effort`: the least `plan: {effort: ...}` with which it is found."""
 
     steps: tuple[PlannedStep, ...]
     start: PlanningState
     planner: Planner
     judged: tuple[str, ...] = ()
+    effort: float = 0.0
 
     @property
     def motions(self) -> tuple[PlannedMotion, ...]:
@@ -157,7 +158,8 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     start = _start(task)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
     budget = _budget(task, planner, deeper=deeper)
-    return Plan(steps=_steps(task, planner, start, on_progress, budget), start=start, planner=planner, judged=judged)
+    steps = _steps(task, planner, start, on_progress, budget)
+    return Plan(steps, start, planner, judged, effort=task.spec.plan.effort * budget.used)
 
 
 def spans(
@@ -235,10 +237,9 @@ def _start(task: Task) -> PlanningState:
 
 
 def _budget(task: Task, planner: Planner, *, deeper: bool) -> SearchBudget:
-    """The budget of the search; larger where the task asks for more samples of each path."""
-    samples = PlannerSpec.model_fields["samples"].default
-    share = max(1.0, task.spec.planner.samples / samples)
-    return SearchBudget(planner.kinematics.work, deeper=deeper, step=round(share * STEP))
+    """The budget of the search: larger where the task asks for more samples of each path."""
+    share = task.spec.plan.effort * max(1.0, task.spec.planner.samples / PlannerSpec().samples)
+    return SearchBudget(planner.kinematics.work, deeper=deeper, effort=share)
 
 
 def _steps(
