@@ -96,11 +96,11 @@ class PathSearch:
             self.left -= max(1, found.samples)
             if self.failed is None or samples >= TELLING * self.spec.samples:
                 with query.kinematics.work.beyond(NARROWEST):
-                    self.failed = self._refusal(space, found, keeps)
+                    self.failed = self._refusal(space, found, keeps, state)
             raise self.failed
         return shortened(found, problem, self.rng, attempts=self.spec.shortcuts)
 
-    def _refusal(self, space: FreeSpace, failure: PathFailure, keeps: str) -> NotPlannable:
+    def _refusal(self, space: FreeSpace, failure: PathFailure, keeps: str, state: PlanningState) -> NotPlannable:
         texts = [f"no path around obstacles{keeps and f' keeps {keeps}'}: {failure.why}"]
         hit = space.first_hit(failure.near_start, failure.near_goal)
         if hit is not None:
@@ -113,7 +113,9 @@ class PathSearch:
         if commonest is not None:
             (a, b), share = commonest
             texts.append(f"'{a}' and '{b}' block {100.0 * share:.0f} % of the examined motions")
-        bodies = [] if hit is None else [name for name in (hit.a, hit.b) if not name.startswith("robot/")]
+        held = "" if state.carried is None else state.carried.body
+        parts = () if hit is None else (hit.a, hit.b)
+        bodies = [name for name in parts if name != held and not name.startswith("robot/")]
         away = f"move '{bodies[0]}' away, or " if bodies else ""
         hint = f"{away}first `move` to a pose nearer to the goal, or raise `planner: {{samples: ...}}`"
         if keeps:

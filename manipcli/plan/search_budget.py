@@ -19,7 +19,7 @@ DIAGNOSIS: Final = 30_000
 """Units of the diagnosis of a refusal: the reasons of its candidates, and the change that would help."""
 DEEPER: Final = 15
 """How many times as much both are where a deeper search is asked for."""
-LONGER: Final = "`manipcli plan TASK --why` searches longer, and so does each command with `plan: {effort: 4}` in the task"
+LONGER: Final = "`manipcli plan TASK --why` searches longer; `plan: {effort: 4}` in the task does so for every command"
 """The hint for a search that ended at its budget."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from manipcli.core.errors import NotPlannable
@@ -46,14 +46,14 @@ def by_stage(refused: Refused) -> tuple[RefusedCandidates, ...]:
     return tuple(sorted(found, key=lambda group: -group.count))
 
 
-def explained(refusal: NotPlannable, refused: Refused) -> NotPlannable:
+def explained(refusal: NotPlannable, refused: Refused, handled: Mapping[str, str] = {}) -> NotPlannable:
     """The refusal of a task with its refused candidates, and with the change that would free most of them.
 
-    A pose out of reach gets how far the base would have to move; that is searched here, once, and left out where the
+    `handled`: see `change_for_most`. A pose out of reach gets how far the base would have to move; that is searched here, once, and left out where the
     budget of the diagnosis does not suffice.
     """
     hints = [] if refusal.hint is None else [refusal.hint]
-    if len(refused) > 1 and (change := change_for_most(refused)):
+    if len(refused) > 1 and (change := change_for_most(refused, handled)):
         hints.append(change)
     try:
         if refusal.remedy is not None:
@@ -65,9 +65,17 @@ def explained(refusal: NotPlannable, refused: Refused) -> NotPlannable:
     return found
 
 
-def change_for_most(refused: Refused) -> str:
-    """The body to move that is in the way of most candidates; "" if none is in the way of at least half of them."""
-    bodies = Counter(part for _, one in refused for part in sorted(one.refusal.parts) if not part.startswith("robot/"))
+def change_for_most(refused: Refused, handled: Mapping[str, str] = {}) -> str:
+    """The body to move that is in the way of most candidates; "" if none is in the way of at least half of them.
+
+    `handled`: by the id of a step, the object that it picks, carries or sets down, which is not in its own way.
+    """
+    bodies = Counter(
+        part
+        for step, one in refused
+        for part in sorted(one.refusal.parts)
+        if part != handled.get(step) and not part.startswith("robot/")
+    )
     if not bodies:
         return ""
     body, count = bodies.most_common(1)[0]

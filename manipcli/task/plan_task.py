@@ -17,7 +17,7 @@ from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
 from manipcli.plan.candidates import SPENT, Candidates, Dropped, first
 from manipcli.plan.claimed_joints import Claims
-from manipcli.plan.clearance import least_clearance
+from manipcli.plan.clearance import StatedClearance, least_clearance, stated_clearances
 from manipcli.plan.cost import step_cost
 from manipcli.plan.grasp_margin import GraspMargin, grasp_margin
 from manipcli.plan.hand import SPEED, closing_speed
@@ -106,6 +106,10 @@ class Plan:
     def clearances(self) -> tuple[CollisionHit | None, ...]:
         """The least clearance of each of `motions`: parts, distance and time; None where nothing moves."""
         return tuple(least_clearance(self.planner, motion, end) for motion, _, end in self.spans())
+
+    def stated_clearances(self) -> tuple[StatedClearance, ...]:
+        """What the motions keep of each clearance that the task states for a pair."""
+        return stated_clearances(self.planner, self.spans())
 
     def grasps(self) -> tuple[tuple[str, GraspMargin], ...]:
         """Id of each step that ends with an object in the closed hand, and the margin of its grasp."""
@@ -266,7 +270,8 @@ def _steps(
             raise located(k, refusal) from refusal
 
     def explain(refusal: NotPlannable, refused: Sequence[tuple[int, Dropped]]) -> NotPlannable:
-        return explained(refusal, [(str(steps[k].id), one) for k, one in refused])
+        handled = {str(step.id): str(getattr(step.body, "object", "")) for step in steps}
+        return explained(refusal, [(str(steps[k].id), one) for k, one in refused], handled)
 
     progress = SearchProgress(on_progress, [str(step.id) for step in steps])
     planner.kinematics.work.doing = progress.doing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -55,7 +56,7 @@ def plan(
     """Plan a task and show its motions.
 
     Shows what binds each motion, its margins, its clearance and the dropped candidates; simulates nothing. Without a
-    plan, shows the refused candidates by stage.
+    plan, shows the refused candidates by stage; with --why after a longer search, and all of them.
     """
     from manipcli import pipeline
 
@@ -85,7 +86,7 @@ def plan(
             if sum(group.count for group in refusal.candidates) > 1:
                 from manipcli.report.plan_text import render_refused
 
-                console.result(render_refused(refusal.candidates))
+                console.result(render_refused(refusal.candidates, every=why))
             raise
         from manipcli.report.json import render_verdict
 
@@ -107,6 +108,9 @@ def plan(
         _write_page(planned, name, html)
     if export is not None:
         _export(planned, folder or Path(f"{task.stem}_trajectories"))
+    if planned.effort > loaded.spec.plan.effort:
+        effort = math.ceil(planned.effort)
+        console.talk(f"note: other commands refuse this task at their work budget: add `plan: {{effort: {effort}}}`")
     if format_ == "json":
         from manipcli.report.plan import render_json
 
@@ -114,7 +118,7 @@ def plan(
     else:
         from manipcli.report.plan_text import render_text
 
-        console.result(render_text(name, planned))
+        console.result(render_text(name, planned, every=why))
     return ExitCode.PASSED
 
 
