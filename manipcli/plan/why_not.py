@@ -49,8 +49,8 @@ def by_stage(refused: Refused) -> tuple[RefusedCandidates, ...]:
 def explained(refusal: NotPlannable, refused: Refused, handled: Mapping[str, str] = {}) -> NotPlannable:
     """The refusal of a task with its refused candidates, and with the change that would free most of them.
 
-    `handled`: see `change_for_most`. A pose out of reach gets how far the base would have to move; that is searched here, once, and left out where the
-    budget of the diagnosis does not suffice.
+    A pose out of reach gets how far the base would have to move; that is searched here, once, and left out where the
+    budget of the diagnosis does not suffice. `handled`: see `change_for_most`.
     """
     hints = [] if refusal.hint is None else [refusal.hint]
     if len(refused) > 1 and (change := change_for_most(refused, handled)):
