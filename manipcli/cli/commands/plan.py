@@ -108,7 +108,7 @@ def plan(
         _write_page(planned, name, html)
     if export is not None:
         _export(planned, folder or Path(f"{task.stem}_trajectories"))
-    if planned.effort > loaded.spec.plan.effort:
+    if why and planned.effort > loaded.spec.plan.effort:
         effort = math.ceil(planned.effort)
         console.talk(f"note: other commands refuse this task at their work budget: add `plan: {{effort: {effort}}}`")
     if format_ == "json":
