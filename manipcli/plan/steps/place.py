@@ -101,7 +101,8 @@ class PlaceSpec(Model):
     )
     region: RegionSpec | None = Field(
         None,
-        description="Where on the body `onto` it may stand, instead of `at`; the nearest to its centre is tried first.",
+        description="Where on the body `onto` it may stand, instead of `at`: at least 10 mm from all other bodies; the "
+        "nearest place to its centre is tried first.",
     )
     yaw: Turn | None = Field(
         None,
