@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Protocol, Self
 
@@ -14,6 +15,9 @@ from manipcli.report.text import describe, describe_step
 REDRAW_PERIOD = 0.1
 """[s] of wall time between two drawings: drawing more often would slow a run of 1000 ticks per second."""
 
+_PLANNING = "planning step"
+"""Start of the lines of the planner."""
+
 
 class NamedStep(Protocol):
     """A step that begins."""
@@ -22,6 +26,42 @@ class NamedStep(Protocol):
     def id(self) -> str: ...
     @property
     def verb(self) -> str: ...
+
+
+class PlanningProgress:
+    """Prints what the planner tries: a live line on a terminal, one line per step elsewhere; clears the line at its
+    end."""
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        self._live = console.is_live() and not quiet
+        self._quiet = quiet
+        self._printed: set[str] = set()
+        self._next_drawing = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Removes the live line."""
+        if self._live:
+            console.redraw("")
+
+    def activity(self, what: str) -> None:
+        """Shows a line of the planner: `planning step 3 of 5, 'pick_1': candidate 12`."""
+        if self._quiet or not what.startswith(_PLANNING):
+            return
+        step = what.partition(": ")[0]
+        if self._live:
+            now = time.monotonic()
+            if step not in self._printed or now >= self._next_drawing:
+                self._next_drawing = now + REDRAW_PERIOD
+                console.redraw(what)
+        elif step not in self._printed:
+            console.talk(step)
+        self._printed.add(step)
 
 
 class StepProgress:
@@ -37,6 +77,7 @@ class StepProgress:
         self._live = console.is_live() and not quiet
         self._head = ""
         self._next_drawing = 0.0
+        self._planning = PlanningProgress(quiet=quiet)
 
     def __enter__(self) -> Self:
         return self
@@ -46,10 +87,12 @@ class StepProgress:
             console.redraw("")
 
     def activity(self, what: str) -> None:
-        """Prints nothing: these activities are short."""
+        """Shows what the planner tries; other activities are short."""
+        self._planning.activity(what)
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
         """Prints warnings before the first step."""
+        self._planning.clear()
         for finding in findings:
             if not self._quiet:
                 console.talk(describe(finding))

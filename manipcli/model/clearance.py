@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.collision import CollisionHit, CollisionQuery
+from manipcli.model.collision import CollisionHit, CollisionQuery, Pair
 
 
-def least_distance(query: CollisionQuery, configurations: Array) -> tuple[int, CollisionHit] | None:
-    """The nearest pair of parts over all configurations (k, n), and in which; None if no pair is checked.
+def least_distance(
+    query: CollisionQuery, configurations: Array, of: Callable[[Pair], bool] = lambda _: True
+) -> tuple[int, CollisionHit] | None:
+    """The nearest pair `of` parts over all configurations (k, n), and in which; None if no such pair is checked.
 
     Exact at each configuration. Most distances are not computed: between two of them, a shape of radius r about its
     centre c moves by at most |dc| + r |dR|, so that a pair whose last distance exceeds the least one so far by more
@@ -18,7 +22,8 @@ def least_distance(query: CollisionQuery, configurations: Array) -> tuple[int, C
     import pinocchio as pin
 
     geometry, names = query.shapes
-    pairs = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64)
+    chosen = [k for k, pair in enumerate(geometry.collisionPairs) if of((names[pair.first], names[pair.second]))]
+    pairs = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64)[chosen]
     if not len(pairs):
         return None
     model = query.kinematics.model
@@ -49,7 +54,7 @@ def least_distance(query: CollisionQuery, configurations: Array) -> tuple[int, C
         for number in np.argsort(bound, kind="stable").tolist():
             if bound[number] >= best:
                 break
-            found = float(pin.computeDistance(geometry, state, number).min_distance)
+            found = float(pin.computeDistance(geometry, state, chosen[number]).min_distance)
             known[number], known_at[number] = found, together[number]
             if found < best:
                 best, where, nearest = found, k, number

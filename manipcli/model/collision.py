@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.work import PAIRS, TOUCH
 from manipcli.model.collision_pairs import Part, checked_pairs, margins_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.motion_bound import MotionBound, Mover
@@ -218,6 +219,7 @@ class CollisionQuery:
 
     def _touches(self, q: Array, broad: object, margins: Array) -> bool:
         """Whether any parts touch at `q` with the margins that `broad` was made with."""
+        self._kinematics.work.add(TOUCH)
         self._require(broad, margins)
         return bool(self._pin.computeCollisions(self._kinematics.model, self._data, broad, q, True))
 
@@ -249,6 +251,7 @@ class CollisionQuery:
         """Every touching pair of parts at `q` (n) with its deepest contact, sorted by name."""
         pin, geometry = self._pin, self._geometry
         q = np.asarray(q, dtype=np.float64)
+        self._kinematics.work.add(TOUCH + len(geometry.collisionPairs) // PAIRS)
         self._require(self._broad, self._margins)
         pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, q, False)
         deepest: dict[Pair, float] = {}

@@ -18,6 +18,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.work import EDGE
 from manipcli.model.collision import CollisionQuery
 
 SLACK: Final = 0.5
@@ -39,6 +40,7 @@ class EdgeCheck:
     def __init__(self, query: CollisionQuery, *, slack: float | None = None) -> None:
         """`slack` [m]: what may be missing of the margin between checked configurations; by default `SLACK` of it."""
         self._inflated = query.inflated(LEVELS)
+        self._work = query.kinematics.work
         self._slack = max(LEAST, SLACK * query.least_margin) if slack is None else slack
         self._covered = (1.0 - _CHORD) * self._slack + np.array(LEVELS)[:, None, None] * self._inflated.weights
         self.blocked: Array | None = None
@@ -98,6 +100,7 @@ class EdgeCheck:
 
         `lengths` (k - 1, movers) are bounds of the motion on each segment.
         """
+        self._work.add(EDGE)
         moved = lengths @ self._inflated.summed
         # Along the polyline at every level: the motion in units of what one check at that level covers.
         rates = np.max(moved / self._covered, axis=2, initial=0.0)

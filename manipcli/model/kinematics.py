@@ -15,6 +15,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform, cross, frozen
 from manipcli.core.units import EARTH_GRAVITY
+from manipcli.core.work import Work
 from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 
@@ -28,6 +29,9 @@ class Kinematics:
     Args:
         robot: the robot; its mount `X_WB` is included, so poses are in the world.
         gravity: (3,) [m/s2] in the world.
+
+    Attributes:
+        work: counts the planning work done with it.
     """
 
     def __init__(self, robot: RobotModel, *, gravity: tuple[float, float, float] | Array = EARTH_GRAVITY) -> None:
@@ -35,6 +39,7 @@ class Kinematics:
 
         self._pin = pin
         self.robot = robot
+        self.work = Work()
         self._model = model = pin.Model()
         model.gravity = pin.Motion(np.asarray(gravity, dtype=np.float64), np.zeros(3))
         # Joints are added in the robot's order, which is depth first as in Pinocchio: q needs no reordering.

@@ -14,6 +14,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
+from manipcli.core.work import WorkSpent
 from manipcli.plan.motion import StepPlan
 
 Decision = Literal["nothing", "grasp", "place", "branch"]
@@ -25,6 +26,8 @@ OTHER: Final = math.radians(40.0)
 """[rad] Grasps that differ by less count as the same: where one of them fails, the other is likely to fail."""
 ELSEWHERE: Final = 0.3
 """Share of the sides of a region: places nearer in both directions count as the same."""
+SPENT: Final = "the search ended at its work budget"
+"""Ends the cause of a refusal that is not of all candidates."""
 NUMBER: Final = re.compile(r"(?<![\w.])-?\d+(\.\d+)?")
 """A number in a cause, but no digits in a name."""
 
@@ -105,12 +108,23 @@ class Attempts:
         candidates: of the step.
         exclude: grasps, R_WT (3, 3) each, and places, (2,); candidates near one of them are skipped.
         prefer: index of the candidate that is tried before all others.
+        on_candidate: called with the number of each candidate that is tried, from 1.
     """
 
-    def __init__(self, candidates: Candidates, exclude: Iterable[Array] = (), *, prefer: int = 0) -> None:
+    def __init__(
+        self,
+        candidates: Candidates,
+        exclude: Iterable[Array] = (),
+        *,
+        prefer: int = 0,
+        on_candidate: Callable[[int], None] = lambda _: None,
+    ) -> None:
         self.decides = candidates.decides
+        self._on_candidate = on_candidate
+        self._tried = 0
         self.excluded = [*exclude]
         self._refused: list[tuple[Candidate, NotPlannable | None]] = []  # None: at a look
+        self._before: tuple[Dropped, ...] = ()  # those before `further`
         self._candidates = candidates
         self._options: Iterator[tuple[int, Candidate]] = _preferring(enumerate(candidates.options), prefer)
 
@@ -123,6 +137,8 @@ class Attempts:
         for index, candidate in self._options:
             if candidate.choice is not None and any(alike(candidate.choice, other) for other in self.excluded):
                 continue
+            self._tried += 1
+            self._on_candidate(self._tried)
             # A look costs part of a plan: the first candidate often has one.
             if self._refused and candidate.look() is not None:
                 self._refused.append((candidate, None))
@@ -133,9 +149,15 @@ class Attempts:
                 self._refused.append((candidate, refusal))
         further = self._candidates.further()
         if further is None:
-            raise self._candidates.explain(refusal_of(self.dropped, self._candidates.what))
+            raise self.refusal()
+        self._before = tuple(Dropped(each.name, refusal) for each, refusal in self._refused if refusal is not None)
         self._candidates, self._options, self._refused = further, zip(itertools.repeat(0), further.options), []
         return self.take()
+
+    def refusal(self, *, cut: bool = False) -> NotPlannable:
+        """The refusal of all candidates so far; `cut`: the search ended at its budget, not at the last candidate."""
+        dropped = self.dropped or (self._before if cut else ())
+        return self._candidates.explain(refusal_of(dropped, self._candidates.what, cut=cut))
 
     @property
     def dropped(self) -> tuple[Dropped, ...]:
@@ -145,11 +167,13 @@ class Attempts:
 
 
 def _reason(candidate: Candidate) -> NotPlannable | None:
-    """The refusal by its plan of a candidate that a look refused."""
+    """The refusal by its plan of a candidate that a look refused; that of the look where the budget is spent."""
     try:
         candidate.plan()
     except NotPlannable as refusal:
         return refusal
+    except WorkSpent:
+        pass
     return candidate.look()
 
 
@@ -170,8 +194,8 @@ def first(candidates: Candidates, exclude: Iterable[Array] = ()) -> StepPlan:
     return Attempts(candidates, exclude).take().plan
 
 
-def refusal_of(dropped: Iterable[Dropped], what: str) -> NotPlannable:
-    """The refusal of all candidates: how many there were, and the commonest reasons.
+def refusal_of(dropped: Iterable[Dropped], what: str, *, cut: bool = False) -> NotPlannable:
+    """The refusal of all candidates: how many there were, and the commonest reasons; `cut`: there may be more.
 
     Reasons that differ only in their numbers are grouped, and the first is shown. The hint is that of the commonest
     reason, and the parts are those of all.
@@ -180,18 +204,19 @@ def refusal_of(dropped: Iterable[Dropped], what: str) -> NotPlannable:
     for each in dropped:
         reasons.setdefault(NUMBER.sub("#", each.refusal.cause), []).append(each.refusal)
     if not reasons:
-        return NotPlannable(f"{what}: there is no candidate")
+        return NotPlannable(": ".join(filter(None, (what, SPENT if cut else "there is no candidate"))))
     commonest = sorted(reasons.values(), key=lambda refusals: -len(refusals))
     first_, tried = commonest[0][0], sum(map(len, commonest))
     if not what:
-        return first_
+        return first_.but(cause=f"{first_.cause}; {SPENT}") if cut else first_
     parts = frozenset(part for refusals in commonest for refusal in refusals for part in refusal.parts)
+    end = f"; {SPENT}" if cut else ""
     if tried == 1:
-        return NotPlannable(f"{what}: {first_.cause}", hint=first_.hint, parts=parts, remedy=first_.remedy)
+        return NotPlannable(f"{what}: {first_.cause}{end}", hint=first_.hint, parts=parts, remedy=first_.remedy)
     shown = "; ".join(f"{refusals[0].cause} ({len(refusals)} of {tried})" for refusals in commonest[:REASONS])
     more = len(commonest) - REASONS
     others = f"; and {number_of(more, 'other reason')}" if more > 0 else ""
-    cause = f"{what}, all {tried} candidates failed: {shown}{others}"
+    cause = f"{what}, {'the first' if cut else 'all'} {tried} candidates failed: {shown}{others}{end}"
     return NotPlannable(cause, hint=first_.hint, parts=parts, remedy=first_.remedy)
 
 

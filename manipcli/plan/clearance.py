@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.clearance import least_distance
-from manipcli.model.collision import RESOLUTION, CollisionHit
+from manipcli.model.collision import RESOLUTION, CollisionHit, Pair
 from manipcli.plan.motion import Motion, PlanningState
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import ROBOT, Planner
 from manipcli.plan.sweep import swept
 
 
-def least_clearance(planner: Planner, motion: Motion, end: PlanningState) -> CollisionHit | None:
+def least_clearance(
+    planner: Planner, motion: Motion, end: PlanningState, of: Callable[[Pair], bool] = lambda _: True
+) -> CollisionHit | None:
     """The nearest pair of parts in a motion that may not touch, with its distance [m] and time [s].
 
     The motion is examined at configurations of which no joint is further apart than `RESOLUTION`, as in planning.
@@ -22,16 +27,54 @@ def least_clearance(planner: Planner, motion: Motion, end: PlanningState) -> Col
         planner: of the task.
         motion: planned.
         end: the state after it.
+        of: the pairs that are examined.
     """
     state = motion.begins
     if state is None or (motion.trajectory is None and motion.grip is None):
         return None
     times, positions = _configurations(planner, motion, state, end)
-    found = least_distance(planner.query(state, motion.allowed), positions)
+    found = least_distance(planner.query(state, motion.allowed), positions, of)
     if found is None:
         return None
     k, hit = found
     return CollisionHit(hit.a, hit.b, hit.distance, time=float(times[k]))
+
+
+@dataclass(frozen=True, slots=True)
+class StatedClearance:
+    """A clearance that the task states for a pair of parts, and what the plan keeps of it.
+
+    Attributes:
+        between: the pair; `robot` for all links.
+        stated: [m].
+        nearest: in all motions; None where the pair is never checked: it may touch, or does not move.
+        motion: index of the motion of `nearest`.
+    """
+
+    between: tuple[str, str]
+    stated: float
+    nearest: CollisionHit | None = None
+    motion: int = 0
+
+
+def stated_clearances(
+    planner: Planner, spans: Sequence[tuple[Motion, PlanningState, PlanningState]]
+) -> tuple[StatedClearance, ...]:
+    """What the motions of a plan, each with the states before and after it, keep of each clearance of `planner`."""
+    groups: dict[tuple[str, str, float], set[frozenset[str]]] = {}
+    for pair, distance in planner.clearances.items():
+        a, b = sorted("robot" if name.startswith(ROBOT) else name for name in pair)
+        groups.setdefault((a, b, distance), set()).add(pair)
+    found = []
+    for (a, b, distance), pairs in groups.items():
+        hits = [
+            (k, hit)
+            for k, (motion, _, end) in enumerate(spans)
+            if (hit := least_clearance(planner, motion, end, lambda pair: frozenset(pair) in pairs)) is not None  # noqa: B023
+        ]
+        k, nearest = min(hits, key=lambda each: each[1].distance, default=(0, None))
+        found.append(StatedClearance((a, b), distance, nearest, k))
+    return tuple(found)
 
 
 def _configurations(planner: Planner, motion: Motion, state: PlanningState, end: PlanningState) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.work import TIMING
 from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import with_joints
 from manipcli.plan.keep import Kept, refuse_unkept, reserving
@@ -91,6 +92,7 @@ def tool_motion(
     keeps = keeps_of(planner, state, label)
 
     def bounds(points: Array) -> Sequence[TimingBound]:
+        planner.kinematics.work.add(TIMING)
         return bounds_of(planner, state, limits.names, points, keeps)
 
     solver = planner.solver.leaving(leaving)
@@ -132,6 +134,7 @@ def refuse_violation(planner: Planner, state: PlanningState, label: str, traject
 def _smooth(
     planner: Planner, state: PlanningState, limits: MotionLimits, points: Array, keeps: tuple[Kept, ...]
 ) -> JointTrajectory:
+    planner.kinematics.work.add(TIMING)
     bounds = bounds_of(planner, state, limits.names, points, keeps)
     trajectory = retime(points, limits, period=planner.period, bounds=bounds)
     verify(trajectory, limits)

@@ -120,7 +120,8 @@ def line_blocked(planner: Planner, state: PlanningState, X_WT: Transform, query:
     def visit(q: Array) -> None:
         hit = nearer.check(q)
         if hit is not None:
-            raise NotPlannable(str(hit), reason="in_the_way", parts=frozenset((hit.a, hit.b)))
+            text, parts = planner.in_the_way(hit)
+            raise NotPlannable(text, reason="in_the_way", parts=parts)
 
     refused: NotPlannable | None = None
     for each in (solver, solver.leaving("yaw")) if solver.few else (solver,):

@@ -27,6 +27,7 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.text import number_of
+from manipcli.core.work import ITERATION
 from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.base_move import base_advice
@@ -288,7 +289,9 @@ class InverseKinematics:
         self._put(q, np.minimum(np.maximum(q[columns], lower), upper))
         previous = math.inf
         stalled = 0
+        work = self._kinematics.work
         for _ in range(_ITERATIONS):
+            work.add(ITERATION)
             error, J, axis_error = self._linearise(X_WT, q)
             x, y, z, *_ = error.tolist()
             position_error = math.sqrt(x * x + y * y + z * z)

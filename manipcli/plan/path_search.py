@@ -10,6 +10,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.core.work import MARGINS, Work
 from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import position_limits, with_mimics
 from manipcli.model.robot import RobotModel
@@ -20,6 +21,7 @@ from manipcli.plan.path_planner import PathFailure, PathProblem
 from manipcli.plan.path_planners import PATH_PLANNERS
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_shortening import shortened
+from manipcli.plan.search_progress import PATH_SEARCH
 from manipcli.spec.planner import PlannerSpec
 
 STEP = 2
@@ -27,6 +29,8 @@ STEP = 2
 first candidate, half for the second, a quarter for the third."""
 TELLING = 0.05
 """A search with a smaller share of the samples says nothing about the way: the refusal before it is repeated."""
+NARROWEST = 20_000
+"""Units of work for the narrowest place and the commonest obstacle, also where the budget is spent."""
 _UNLIMITED = np.pi  # rad or m beyond start and goals: samples of a joint without limits
 
 
@@ -65,6 +69,7 @@ class PathSearch:
         """
         if self.failed is not None and self.left <= 0:
             raise self.failed
+        query.kinematics.work.doing(PATH_SEARCH)
         columns = list(robot.indices(tuple(names)))
         space = FreeSpace(robot, query, names, _hands(robot, state.position, grip))
         start = np.array(state.position[columns])
@@ -80,7 +85,7 @@ class PathSearch:
             edge=space.edge,
         )
         if margin is not None:
-            problem = kept_problem(problem, partial(_at, margin, state.position, columns))
+            problem = kept_problem(problem, partial(_at, margin, state.position, columns, query.kinematics.work))
         samples = max(1, -(-self.left // STEP))
         member = PATH_PLANNERS[self.spec.type]
         settings = member.spec.model_validate({**self.spec.model_dump(), "samples": samples})
@@ -90,11 +95,12 @@ class PathSearch:
         if isinstance(found, PathFailure):
             self.left -= max(1, found.samples)
             if self.failed is None or samples >= TELLING * self.spec.samples:
-                self.failed = self._refusal(space, found, keeps)
+                with query.kinematics.work.beyond(NARROWEST):
+                    self.failed = self._refusal(space, found, keeps, state)
             raise self.failed
         return shortened(found, problem, self.rng, attempts=self.spec.shortcuts)
 
-    def _refusal(self, space: FreeSpace, failure: PathFailure, keeps: str) -> NotPlannable:
+    def _refusal(self, space: FreeSpace, failure: PathFailure, keeps: str, state: PlanningState) -> NotPlannable:
         texts = [f"no path around obstacles{keeps and f' keeps {keeps}'}: {failure.why}"]
         hit = space.first_hit(failure.near_start, failure.near_goal)
         if hit is not None:
@@ -107,7 +113,9 @@ class PathSearch:
         if commonest is not None:
             (a, b), share = commonest
             texts.append(f"'{a}' and '{b}' block {100.0 * share:.0f} % of the examined motions")
-        bodies = [] if hit is None else [name for name in (hit.a, hit.b) if not name.startswith("robot/")]
+        held = "" if state.carried is None else state.carried.body
+        parts = () if hit is None else (hit.a, hit.b)
+        bodies = [name for name in parts if name != held and not name.startswith("robot/")]
         away = f"move '{bodies[0]}' away, or " if bodies else ""
         hint = f"{away}first `move` to a pose nearer to the goal, or raise `planner: {{samples: ...}}`"
         if keeps:
@@ -115,8 +123,9 @@ class PathSearch:
         return NotPlannable("; ".join(texts), hint=hint, reason="in_the_way")
 
 
-def _at(margin: Margin, start: Array, columns: list[int], q: Array) -> Array:
+def _at(margin: Margin, start: Array, columns: list[int], work: Work, q: Array) -> Array:
     """The margin with the joints of `columns` at `q` (k, m), the others as in `start` (n)."""
+    work.add(MARGINS)
     whole = np.tile(start, (len(q), 1))
     whole[:, columns] = q
     return margin(whole)

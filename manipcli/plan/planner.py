@@ -368,7 +368,9 @@ class Planner:
 
     def in_the_way(self, hit: CollisionHit) -> InTheWay:
         """A hit as text; with the clearance where the two do not overlap."""
-        text = str(hit) if hit.distance < 0.0 else f"{hit}, the clearance is {self._clearance_text(hit)}"
+        text = str(hit)
+        if hit.distance >= 0.0:
+            text = f"{hit.a} comes within {self._clearance_text(hit)} of {hit.b} ({hit.amount} apart)"
         return InTheWay(text, frozenset((hit.a, hit.b)))
 
     def _clearance_text(self, hit: CollisionHit) -> str:

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from manipcli.conditions.condition import Problem
+from manipcli.core.errors import NotPlannable
+from manipcli.core.work import WorkSpent
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims
@@ -73,6 +75,18 @@ class StepMember(Generic[S]):
 
         def around() -> Candidates | None:
             view = straight.searching_paths()
-            return None if view is None else self.candidates(spec, view, state)
+            return None if view is None else _explaining(self.candidates(spec, view, state))
 
-        return replace(self.candidates(spec, straight, state), further=around)
+        return replace(_explaining(self.candidates(spec, straight, state)), further=around)
+
+
+def _explaining(candidates: Candidates) -> Candidates:
+    """The same candidates, whose refusal keeps its hint where the budget does not suffice for a better one."""
+
+    def explain(refusal: NotPlannable) -> NotPlannable:
+        try:
+            return candidates.explain(refusal)
+        except WorkSpent:
+            return refusal
+
+    return replace(candidates, explain=explain)

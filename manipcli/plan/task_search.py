@@ -15,8 +15,10 @@ from typing import Final
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.plan.candidates import Attempts, Candidates, Chosen, Dropped
+from manipcli.core.work import Work, WorkSpent
+from manipcli.plan.candidates import SPENT, Attempts, Candidates, Chosen, Dropped
 from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.search_budget import LONGER, SearchBudget
 
 MOST: Final = 7
 """Maximum number of plans of one step before its failure is passed on."""
@@ -69,6 +71,8 @@ def search_task(
     start: PlanningState,
     *,
     on_step: Callable[[int, bool], None] = lambda *_: None,
+    on_candidate: Callable[[int], None] = lambda _: None,
+    budget: SearchBudget | None = None,
     optimise: int = 0,
     cost: Callable[[StepPlan], float] = lambda plan: plan.duration,
     explain: Explain = lambda refusal, _: refusal,
@@ -80,6 +84,8 @@ def search_task(
         count: number of steps.
         start: the state before the first.
         on_step: called before a step is planned, with its index and whether it takes another candidate.
+        on_candidate: called with the number of each candidate of that step, from 1.
+        budget: of the work; each further candidate that is compared has the budget of a step.
         optimise: number of further candidates to compare.
         cost: of the plan of a step.
         explain: adds to the refusal what all refused candidates tell.
@@ -87,14 +93,16 @@ def search_task(
     Raises:
         NotPlannable: there is none; the refusal of the latest step that was reached.
     """
-    nodes = _search(opens, count, start, on_step, explain)
+    budget = SearchBudget(Work()) if budget is None else budget
+    nodes = _search(opens, count, start, on_step, budget, explain, on_candidate=on_candidate)
     if optimise:
-        nodes = _cheapest(opens, nodes, on_step, optimise, cost)
-    return tuple(
-        Solved(node.chosen, tuple(node.attempts.excluded), (*node.attempts.dropped, *node.left))
-        for node in nodes
-        if node.chosen is not None
-    )
+        nodes = _cheapest(opens, nodes, on_step, budget, optimise, cost)
+    with budget.diagnosing():
+        return tuple(
+            Solved(node.chosen, tuple(node.attempts.excluded), (*node.attempts.dropped, *node.left))
+            for node in nodes
+            if node.chosen is not None
+        )
 
 
 def _search(
@@ -102,8 +110,10 @@ def _search(
     count: int,
     start: PlanningState,
     on_step: Callable[[int, bool], None],
+    budget: SearchBudget,
     explain: Explain = lambda refusal, _: refusal,
     prefer: Sequence[int] = (),
+    on_candidate: Callable[[int], None] = lambda _: None,
 ) -> list[Node]:
     """The first plan of all `count` steps; raises NotPlannable. `prefer`: index of the first candidate, by step."""
     done: list[Node] = []
@@ -111,15 +121,24 @@ def _search(
     latest = -1, NotPlannable("there is no step")
     grasps: dict[int, int] = {}
     resumed: Node | None = None
+    reached = -1
     while (k := len(done)) < count:
         state = _end(done[-1]) if done else start
+        if k > reached:
+            reached = k
+            budget.renew()
         on_step(k, resumed is not None)
         node = resumed
         try:
-            if node is None:
-                node = Node(state, Attempts(opens(k, state), prefer=prefer[k] if prefer else 0))
-                opened.append((k, node.attempts))
-            node.chosen = node.attempts.take()
+            with budget.searching():
+                if node is None:
+                    first = prefer[k] if prefer else 0
+                    node = Node(state, Attempts(opens(k, state), prefer=first, on_candidate=on_candidate))
+                    opened.append((k, node.attempts))
+                node.chosen = node.attempts.take()
+        except WorkSpent:
+            refusal = None if latest[0] < reached else _counted(latest[1], max(grasps.values(), default=0))
+            raise _refused(_ended(refusal, node, budget), opened, explain, budget) from None
         except NotPlannable as refusal:
             if refusal.loc:
                 raise  # a value of the step, which no earlier step changes
@@ -130,8 +149,8 @@ def _search(
             grasps |= {j: done[j].taken for j in grasps if j < len(done)}
             resumed = _back(done, conflicts, refusal)
             if resumed is None:
-                refused = tuple((j, one) for j, attempts in opened for one in attempts.dropped)
-                raise explain(_counted(latest[1], max(grasps.values(), default=0)), refused) from refusal
+                counted = _counted(latest[1], max(grasps.values(), default=0))
+                raise _refused(counted, opened, explain, budget) from refusal
         else:
             node.taken += 1
             done.append(node)
@@ -139,10 +158,31 @@ def _search(
     return done
 
 
+def _ended(refusal: NotPlannable | None, node: Node | None, budget: SearchBudget) -> NotPlannable:
+    """The refusal of a search that ended at its budget: that of the latest step, or of its candidates so far."""
+    if refusal is not None:
+        found = refusal.but(cause=f"{refusal.cause}; {SPENT}")
+    elif node is not None:
+        with budget.diagnosing():
+            found = node.attempts.refusal(cut=True)
+    else:
+        found = NotPlannable(SPENT)
+    return found if budget.deeper else found.but(hint="; ".join(filter(None, (found.hint, LONGER))))
+
+
+def _refused(
+    refusal: NotPlannable, opened: Sequence[tuple[int, Attempts]], explain: Explain, budget: SearchBudget
+) -> NotPlannable:
+    """The refusal of the task, with all refused candidates."""
+    with budget.diagnosing():
+        return explain(refusal, tuple((j, one) for j, attempts in opened for one in attempts.dropped))
+
+
 def _cheapest(
     opens: Opens,
     nodes: list[Node],
     on_step: Callable[[int, bool], None],
+    budget: SearchBudget,
     most: int,
     cost: Callable[[StepPlan], float],
 ) -> list[Node]:
@@ -163,9 +203,11 @@ def _cheapest(
         k = max((j for j in left if j < k), default=max(left))
         node = nodes[k]
         on_step(k, True)
+        budget.renew()
         try:
-            chosen = node.attempts.take()
-        except NotPlannable:
+            with budget.searching():
+                chosen = node.attempts.take()
+        except (NotPlannable, WorkSpent):
             left.discard(k)
             continue
         looked += 1
@@ -180,7 +222,9 @@ def _cheapest(
 
         try:
             same = [each.chosen.index for each in nodes[after:] if each.chosen is not None]
-            tail = [other, *_search(later, len(nodes) - after, chosen.plan.end, on_later, prefer=same)]
+            with budget.searching():
+                rest = _search(later, len(nodes) - after, chosen.plan.end, on_later, budget, prefer=same)
+            tail = [other, *rest]
         except NotPlannable:
             continue
         costs = [total([each]) for each in tail]

@@ -35,6 +35,7 @@ def check_files(
     sample: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
+    on_progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[Diagnostic, ...]:
     """The findings of all files, without duplicates; a task is checked with its robot and controllers files.
 
@@ -43,6 +44,7 @@ def check_files(
         overrides, seed, sample: for the tasks, see `load_task`.
         package_path: folders with packages.
         allow_outside: whether a file may be outside of these folders.
+        on_progress: receives what the planner tries, see `plan_task`.
     """
 
     def of_task(path: Path) -> Task:
@@ -51,12 +53,18 @@ def check_files(
         )
 
     return tuple(
-        dict.fromkeys(finding for path in paths for finding in _findings(path, of_task, package_path, allow_outside))
+        dict.fromkeys(
+            finding for path in paths for finding in _findings(path, of_task, package_path, allow_outside, on_progress)
+        )
     )
 
 
 def _findings(
-    path: Path, of_task: Callable[[Path], Task], package_path: Sequence[Path], allow_outside: bool
+    path: Path,
+    of_task: Callable[[Path], Task],
+    package_path: Sequence[Path],
+    allow_outside: bool,
+    on_progress: Callable[[str], None],
 ) -> tuple[Diagnostic, ...]:
     try:
         if path.suffix.lower() in DESCRIPTIONS:
@@ -64,7 +72,7 @@ def _findings(
         kind = load.kind_of(path)
         if kind == "task":
             task = of_task(path)
-            return (*task.findings, *preflight_findings(task, margins=True))
+            return (*task.findings, *preflight_findings(task, margins=True, on_progress=on_progress))
         if kind == "controllers":
             return load.load_controllers(path, model=controllers_spec()).findings
         file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)

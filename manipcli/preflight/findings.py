@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from manipcli.core.errors import Diagnostic, NotPlannable
 from manipcli.core.registry import Seam
@@ -14,7 +14,12 @@ from manipcli.task.task import Task
 
 
 def preflight_findings(
-    task: Task, plan: Plan | None = None, *, checks: Seam[Check] = PREFLIGHT_CHECKS, margins: bool = False
+    task: Task,
+    plan: Plan | None = None,
+    *,
+    checks: Seam[Check] = PREFLIGHT_CHECKS,
+    margins: bool = False,
+    on_progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[Diagnostic, ...]:
     """Warnings about gains, efforts, grasps and timeouts, with a value that works, each at its place in its file.
 
@@ -26,11 +31,12 @@ def preflight_findings(
             at the named poses.
         checks: the registry.
         margins: add a note with the margin of each grasp.
+        on_progress: see `plan_task`.
     """
     found: list[Diagnostic] = []
     if plan is None:
         try:
-            plan = plan_task(task)
+            plan = plan_task(task, on_progress=on_progress)
         except NotPlannable as refusal:
             found += refusal.findings
     subject = Subject(task, plan)

@@ -25,6 +25,10 @@ def render_json(task: str, plan: Plan) -> str:
             "duration": round(sum(motion.duration for motion in plan.motions), 9),
             "motions": [_motion(motion, kind, near, margins) for motion, kind, near, margins in motions],
             "steps": [_step(step) for step in plan.steps],
+            "clearances": [
+                {"between": list(each.between), "stated": each.stated, "least": _nearest(each.nearest)}
+                for each in plan.stated_clearances()
+            ],
             "grasps": [
                 {
                     "step": step,
@@ -95,7 +99,11 @@ def _motion(motion: PlannedMotion, kind: str, near: CollisionHit | None, margins
         "bound_by": None if margins.binding is None else picked(margins.binding, "joint quantity share"),
         "margins": plain(margins.margins),
         "manipulability": None if margins.manipulability is None else picked(margins.manipulability, "least time"),
-        "clearance": None
-        if near is None
-        else {"between": [near.a, near.b], "distance": round(near.distance, 6), "time": round(near.time, 6)},
+        "clearance": _nearest(near),
     }
+
+
+def _nearest(near: CollisionHit | None) -> Json:
+    if near is None:
+        return None
+    return {"between": [near.a, near.b], "distance": round(near.distance, 6), "time": round(near.time, 6)}

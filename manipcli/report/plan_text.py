@@ -3,32 +3,62 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
+from manipcli.plan.clearance import StatedClearance
 from manipcli.plan.motion_margins import Binding, MotionMargins
 from manipcli.plan.why_not import by_stage
 from manipcli.report.table import table
 from manipcli.task.plan_task import Plan
 
+MOST: Final = 8
+"""Most rows of refused candidates, unless all are asked for."""
 
-def render_text(task: str, plan: Plan) -> str:
-    """Tables with one row per motion (the step's name only at its first), per margin, and per stage of candidates."""
+
+def render_text(task: str, plan: Plan, *, every: bool = False) -> str:
+    """Tables with one row per motion (the step's name only at its first), per margin, and per stage of candidates.
+
+    `every`: show all rows of refused candidates.
+    """
     margins = plan.margins()
     parts = [_motions(plan, margins), _margins(plan, margins)]
+    parts.append("\n".join(_stated(plan, each) for each in plan.stated_clearances()))
     parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
     chosen = [step for step in plan.steps if step.dropped and step.candidate]
     parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
-    parts.append(render_refused(by_stage([(step.id, one) for step in plan.steps for one in step.dropped])))
+    dropped = by_stage([(step.id, one) for step in plan.steps for one in step.dropped])
+    parts.append(render_refused(dropped, every=every))
     total = sum(motion.duration for motion in plan.motions)
     parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {total:.2f} s")
     return "\n\n".join(part for part in parts if part)
 
 
-def render_refused(candidates: Sequence[RefusedCandidates]) -> str:
-    """The refused candidates by stage, the commonest first; "" if there are none."""
-    rows = [(str(group.count), group.step, group.stage, group.cause) for group in candidates]
-    return table(("refused", "step", "at", "because"), rows, right=("refused",)) if rows else ""
+def render_refused(candidates: Sequence[RefusedCandidates], *, every: bool = False) -> str:
+    """The refused candidates by stage, the commonest first; "" if there are none.
+
+    `every`: show all rows, not the first only.
+    """
+    shown = candidates if every or len(candidates) <= MOST else candidates[: MOST - 1]
+    rows = [(str(group.count), group.step, group.stage, group.cause) for group in shown]
+    text = table(("refused", "step", "at", "because"), rows, right=("refused",)) if rows else ""
+    left = candidates[len(shown) :]
+    if left:
+        text += f"\nand {sum(group.count for group in left)} more in {len(left)} rows; `--why` shows all"
+    return text
+
+
+def _stated(plan: Plan, clearance: StatedClearance) -> str:
+    """`robot and shelf: stated clearance 20 mm, least 31.0 mm (robot/hand and shelf in pick_1 reach at 0.52 s)`."""
+    a, b = clearance.between
+    stated = f"stated clearance {1000.0 * clearance.stated:.3g} mm"
+    near = clearance.nearest
+    if near is None:
+        return f"{a} and {b}: {stated}; no motion is checked for it"
+    motion = plan.motions[clearance.motion]
+    where = f"{near.a} and {near.b} in {motion.step_id} {motion.label} at {near.time:.2f} s"
+    return f"{a} and {b}: {stated}, least {1000.0 * near.distance:.1f} mm ({where})"
 
 
 def _motions(plan: Plan, found: Sequence[MotionMargins]) -> str:

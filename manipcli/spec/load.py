@@ -140,13 +140,13 @@ def load_task_text(
     return validate(source, model, findings=findings)
 
 
-def task_source(path: Path, model: type[TaskSpec]) -> tuple[Source, list[Diagnostic]]:
-    """The tree of a task file with flat steps, before it is validated, and its findings so far.
+def task_source(path: Path, *, model: type[TaskSpec], find: Find) -> tuple[Source, list[Diagnostic]]:
+    """The tree of a task file with flat steps, before it is validated, and its findings so far; see `load_task`.
 
     Raises:
         InvalidInput: the file cannot be read, or is not YAML.
     """
-    return _task_source(read_bytes(path), str(path), model, (), None)
+    return _task_source(read_bytes(path), str(path), model, (), None, find)
 
 
 def salvage_task(

@@ -22,3 +22,12 @@ class PlanSpec(Model):
             "first plan is used.",
         ),
     ] = 0
+    effort: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=10_000,
+            description="Work that the search may take for each step before the task is refused, above 0 to 10000: 1 "
+            "is about 4 s on a quiet machine. It counts work, not time: a slow machine makes the same plan. Default 1.",
+        ),
+    ] = 1.0

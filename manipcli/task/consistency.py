@@ -35,6 +35,7 @@ from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.agree_limits import unusable_limits
+from manipcli.task.held_objects import impossible_steps
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged
 
@@ -77,10 +78,11 @@ def disagreements(
         claims = Claims.of(controllers.spec, controllers.place)
     found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
     warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task))
+    impossible = () if found or task.source.kept else tuple(_impossible(task, scene))
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
-    return distinct((*found, *_refused(task, robot, scene), *claimed, *misread, *warned))
+    return distinct((*found, *_refused(task, robot, scene), *claimed, *misread, *impossible, *warned))
 
 
 def not_there(
@@ -181,6 +183,13 @@ def _of_pairs(spec: TaskSpec, context: CheckContext) -> Iterator[tuple[Loc, Prob
             yield from ((("steps", k), p) for p in pair_problems(context, pair, ("allow", n)))
     for n, each in enumerate(spec.clearance.pairs):
         yield from (((), p) for p in pair_problems(context, each.between, ("clearance", "pairs", n, "between")))
+
+
+def _impossible(task: Located[TaskSpec], scene: Scene) -> Iterator[Diagnostic]:
+    """Errors for steps that cannot succeed, see `held_objects`."""
+    for each in impossible_steps(task.spec, scene):
+        at = ("steps", each.step, task.spec.steps[each.step].verb, each.key)
+        yield task.source.finding(each.number, at, each.message, hint=each.hint)
 
 
 def _unguarded(step: StepSpec, spec: TaskSpec) -> Iterator[Problem]:

@@ -10,13 +10,14 @@ import numpy as np
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.core.work import WorkSpent
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
-from manipcli.plan.candidates import Candidates, Dropped, first
+from manipcli.plan.candidates import SPENT, Candidates, Dropped, first
 from manipcli.plan.claimed_joints import Claims
-from manipcli.plan.clearance import least_clearance
+from manipcli.plan.clearance import StatedClearance, least_clearance, stated_clearances
 from manipcli.plan.cost import step_cost
 from manipcli.plan.grasp_margin import GraspMargin, grasp_margin
 from manipcli.plan.hand import SPEED, closing_speed
@@ -26,11 +27,14 @@ from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
+from manipcli.plan.search_budget import SearchBudget
+from manipcli.plan.search_progress import SearchProgress
 from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import explained
 from manipcli.spec.keep import KeepSpec
+from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.task import Task
 
@@ -73,12 +77,13 @@ class PlannedMotion:
 @dataclass(frozen=True, slots=True)
 class Plan:
     """The plan of a task. `planner` re-plans steps from measured states; `judged`: places of expectations and watches,
-    for the log."""
+    for the log; `effort`: the least `plan: {effort: ...}` with which it is found."""
 
     steps: tuple[PlannedStep, ...]
     start: PlanningState
     planner: Planner
     judged: tuple[str, ...] = ()
+    effort: float = 0.0
 
     @property
     def motions(self) -> tuple[PlannedMotion, ...]:
@@ -101,6 +106,10 @@ class Plan:
     def clearances(self) -> tuple[CollisionHit | None, ...]:
         """The least clearance of each of `motions`: parts, distance and time; None where nothing moves."""
         return tuple(least_clearance(self.planner, motion, end) for motion, _, end in self.spans())
+
+    def stated_clearances(self) -> tuple[StatedClearance, ...]:
+        """What the motions keep of each clearance that the task states for a pair."""
+        return stated_clearances(self.planner, self.spans())
 
     def grasps(self) -> tuple[tuple[str, GraspMargin], ...]:
         """Id of each step that ends with an object in the closed hand, and the margin of its grasp."""
@@ -137,12 +146,13 @@ def unplanned(task: Task) -> Plan:
     return Plan(steps=(), start=_start(task), planner=_planner(task))
 
 
-def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None) -> Plan:
+def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None, deeper: bool = False) -> Plan:
     """Plans every step. What a sample changes in the simulation only (`Task.truth`) has no effect.
 
     Args:
         task: the task.
-        on_progress: callback with a message before each step is planned.
+        on_progress: callback with a line for each step and candidate that is tried, see `SearchProgress`.
+        deeper: search longer before the task is refused, see `SearchBudget`.
 
     Raises:
         NotPlannable: names the step and the cause; later steps are not planned.
@@ -151,7 +161,9 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     planner = _planner(task)
     start = _start(task)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
-    return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
+    budget = _budget(task, planner, deeper=deeper)
+    steps = _steps(task, planner, start, on_progress, budget)
+    return Plan(steps, start, planner, judged, effort=task.spec.plan.effort * budget.used)
 
 
 def spans(
@@ -203,9 +215,12 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
         NotPlannable: with the id of the step.
     """
     try:
-        return first(_candidates(planner, step, state), exclude=grasps)
+        with SearchBudget(planner.kinematics.work).searching():
+            return first(_candidates(planner, step, state), exclude=grasps)
     except NotPlannable as refusal:
         raise refusal.but(step=step.id) from refusal
+    except WorkSpent:
+        raise NotPlannable(SPENT, step=step.id) from None
 
 
 def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
@@ -225,8 +240,14 @@ def _start(task: Task) -> PlanningState:
     return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
 
 
+def _budget(task: Task, planner: Planner, *, deeper: bool) -> SearchBudget:
+    """The budget of the search: larger where the task asks for more samples of each path."""
+    share = task.spec.plan.effort * max(1.0, task.spec.planner.samples / PlannerSpec().samples)
+    return SearchBudget(planner.kinematics.work, deeper=deeper, effort=share)
+
+
 def _steps(
-    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None]
+    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None], budget: SearchBudget
 ) -> tuple[PlannedStep, ...]:
     """Plans all steps; see `task_search`."""
     steps = task.spec.steps
@@ -248,17 +269,19 @@ def _steps(
         except NotPlannable as refusal:
             raise located(k, refusal) from refusal
 
-    def on_step(k: int, again: bool) -> None:
-        on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
-
     def explain(refusal: NotPlannable, refused: Sequence[tuple[int, Dropped]]) -> NotPlannable:
-        return explained(refusal, [(str(steps[k].id), one) for k, one in refused])
+        handled = {str(step.id): str(getattr(step.body, "object", "")) for step in steps}
+        return explained(refusal, [(str(steps[k].id), one) for k, one in refused], handled)
 
+    progress = SearchProgress(on_progress, [str(step.id) for step in steps])
+    planner.kinematics.work.doing = progress.doing
     solved = search_task(
         opens,
         len(steps),
         start,
-        on_step=on_step,
+        on_step=progress.step,
+        on_candidate=progress.candidate,
+        budget=budget,
         explain=explain,
         optimise=task.spec.plan.optimise,
         cost=lambda plan: step_cost(planner, plan).total,

@@ -15,6 +15,7 @@ from manipcli.spec.schema_names import TaskNames
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.structure.ids import step_ids
 from manipcli.task.robot_file import read_robot
+from manipcli.task.task_files import finder
 from manipcli.task.vocabulary import controllers_spec, task_spec
 
 HOLLOW = ("cup", "tray", "mesh", "urdf")
@@ -27,7 +28,8 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
     Raises:
         InvalidInput: the task file cannot be read, or is not YAML.
     """
-    source, _ = task_source(path, task_spec())
+    find = finder(path, package_path=package_path, allow_outside=allow_outside)
+    source, _ = task_source(path, model=task_spec(), find=find)
     names = {**_of_scene(source), "step": _steps(source)}
     robot_file = _named(source, path, "robot")
     args = None

@@ -300,13 +300,14 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
-    pipeline.plan_task = lambda _: SimpleNamespace(
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(
         motions=(_motion(),),
         steps=(),
         path_kinds=lambda: ("straight",),
         clearances=lambda: (NEAR,),
         margins=lambda: (margins,),
         grasps=tuple,
+        stated_clearances=tuple,
     )
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
@@ -327,7 +328,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=(), clearances=tuple)
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple)
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
     assert "' does not exist" in capsys.readouterr().err
 
@@ -403,7 +404,7 @@ def test_what_is_on_a_full_disk_is_named_and_no_bug(
 
 def test_a_file_on_a_full_disk_is_named(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _: SimpleNamespace(motions=(), clearances=tuple)
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple)
     assert main(["plan", "t.yaml", "--csv", "/dev/full"]) == 3
     assert capsys.readouterr().err == "error[INT001]: /dev/full: the disk is full (No space left on device)\n"
 

@@ -145,7 +145,8 @@ def begin(task: Path, *words: str, **options: Any) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE, **options,
     )  # fmt: skip
     assert process.stderr is not None
-    line = process.stderr.readline()
+    lines = iter(process.stderr.readline, "")
+    line = next((line for line in lines if not line.startswith("planning step")), "")
     assert "wait_1: done" in line, line
     return process
 

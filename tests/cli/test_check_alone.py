@@ -23,7 +23,7 @@ def test_controllers_alone_are_compared_with_no_robot_and_it_says_so(capsys: pyt
 @pytest.mark.slow
 def test_with_a_task_there_is_nothing_to_add(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(ROOT / "tasks" / "home.yaml"), CONTROLLERS]) == 0
-    assert capsys.readouterr().err == ""
+    assert capsys.readouterr().err == "planning step 1 of 1, 'follow_1'\n"
 
 
 def test_nor_where_they_are_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -280,7 +280,7 @@ def test_a_move_into_the_desk_is_refused_with_pair_time_and_motion(bench: Make) 
 def test_what_is_too_near_is_told_with_the_clearance_that_is_kept(bench: Make) -> None:
     planner = bench().planner
     too_near, overlap = CollisionHit("cup", "robot/palm", 0.0039), CollisionHit("floor", "robot/base", -0.005)
-    told = "cup and robot/palm have a clearance of 3.9 mm, the clearance is 4 mm"
+    told = "cup comes within 4 mm of robot/palm (3.9 mm apart)"
     assert str(planner.in_the_way(too_near)) == told
     assert str(planner.in_the_way(overlap)) == "floor and robot/base overlap by 5.0 mm"
     assert str(planner.in_the_way(CollisionHit("desk", "robot/palm", -1e-5))) == "desk and robot/palm touch"

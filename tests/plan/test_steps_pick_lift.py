@@ -199,7 +199,7 @@ def test_out_of_reach_says_so_once_for_all_ways(bench: Make) -> None:
         in (refusal.cause)
     )
     assert "(126 of 126)" in refusal.cause
-    assert refusal.hint.startswith("move 'can', or change the approach, the height of the grasp")
+    assert refusal.hint.startswith("move 'can' nearer, or change the approach, the height of the grasp")
 
 
 def test_what_is_taller_than_the_fingers_is_taken_higher_from_above(bench: Make) -> None:
@@ -233,7 +233,7 @@ def test_a_ball_and_what_is_too_wide_are_not_taken_higher(bench: Make) -> None:
     refusal = bench("panda", scene=scene).refused("pick", {"object": "ball", "approach": {"from": "top"}})
     assert "all 36 candidates failed" in refusal.cause
     assert "`open: ...`" in refusal.hint
-    assert "'ball' is wider than the hand in its pose 'open'; or move 'ball'" in refusal.hint
+    assert "'ball' is wider than the hand in its pose 'open'; or change the approach" in refusal.hint
 
 
 def test_a_grasp_that_the_hand_cannot_take_asks_for_another_height(bench: Make) -> None:

@@ -84,7 +84,8 @@ def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_pa
     assert told[0].startswith("planning step 1 of 4") and not any(
         one.startswith("planning step 1 ") for one in told[1:]
     )
-    tried = 1 + sum("'pick_1', with another candidate" in one for one in told)
+    told = [one for one in told if ": candidate" not in one]
+    tried = 1 + sum("'pick_1': another candidate" in one for one in told)
     assert 2 < tried <= MOST + 1
     picked = sum(
         before.startswith("planning step 2") and not after.startswith("planning step 2")
@@ -101,7 +102,7 @@ def test_no_other_grasp_is_tried_for_a_value_that_is_wrong_with_each(tmp_path: P
     task = task_of(tmp_path, PICK.replace("block", "block, approach: {from: top}") + LIFT + place)
     with pytest.raises(NotPlannable) as refused:
         plan_task(task, on_progress=told.append)
-    assert len(told) == 3
+    assert len({one.partition(":")[0] for one in told}) == 3
     assert refused.value.cause == "[1.5, 0] m is outside 'table', whose centre is at [0.55, 0] m"
     assert refused.value.hint == "`at` is in the world frame; 'table' offers 0.6 m x 0.8 m about its centre"
     assert refused.value.place is not None and (refused.value.place.line, refused.value.place.column) == (

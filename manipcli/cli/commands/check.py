@@ -9,6 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed
+from manipcli.cli.progress import PlanningProgress
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 UNREADABLE: Final = {"USE101", "USE102", "USE103"}
@@ -46,14 +47,16 @@ def check(
 
     if collisions:
         return _self_collisions(files, format_, tuple(package_path or ()), allow_outside=allow_outside)
-    findings = pipeline.check_files(
-        tuple(files),
-        overrides=tuple(overrides or ()),
-        seed=seed,
-        sample=sample,
-        package_path=tuple(package_path or ()),
-        allow_outside=allow_outside,
-    )
+    with PlanningProgress() as progress:
+        findings = pipeline.check_files(
+            tuple(files),
+            overrides=tuple(overrides or ()),
+            seed=seed,
+            sample=sample,
+            package_path=tuple(package_path or ()),
+            allow_outside=allow_outside,
+            on_progress=progress.activity,
+        )
     failed = any(finding.severity == "error" for finding in findings)
     kinds = () if failed else [pipeline.kind_of(file) for file in files]
     if (overrides or seed is not None or sample is not None) and not failed and "task" not in kinds:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,6 +11,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import check_outputs
+from manipcli.cli.progress import PlanningProgress
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, NotPlannable
 
 if TYPE_CHECKING:
@@ -40,6 +42,10 @@ def plan(
         Path | None,
         typer.Option("--to", metavar="FOLDER", help="With --export: folder of the files [default: TASK_trajectories]."),
     ] = None,
+    why: Annotated[
+        bool,
+        typer.Option("--why", help="Search longer before the task is refused, and show every refused candidate."),
+    ] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -50,7 +56,7 @@ def plan(
     """Plan a task and show its motions.
 
     Shows what binds each motion, its margins, its clearance and the dropped candidates; simulates nothing. Without a
-    plan, shows the refused candidates by stage.
+    plan, shows the refused candidates by stage; with --why after a longer search, and all of them.
     """
     from manipcli import pipeline
 
@@ -71,7 +77,8 @@ def plan(
         allow_outside=allow_outside,
     )
     try:
-        planned = pipeline.plan_task(loaded)
+        with PlanningProgress() as progress:
+            planned = pipeline.plan_task(loaded, on_progress=progress.activity, deeper=why)
     except NotPlannable as refusal:
         if html is not None:
             _write_refused_page(pipeline.unplanned(loaded), loaded.spec.task, html, refusal)
@@ -79,7 +86,7 @@ def plan(
             if sum(group.count for group in refusal.candidates) > 1:
                 from manipcli.report.plan_text import render_refused
 
-                console.result(render_refused(refusal.candidates))
+                console.result(render_refused(refusal.candidates, every=why))
             raise
         from manipcli.report.json import render_verdict
 
@@ -101,6 +108,9 @@ def plan(
         _write_page(planned, name, html)
     if export is not None:
         _export(planned, folder or Path(f"{task.stem}_trajectories"))
+    if why and planned.effort > loaded.spec.plan.effort:
+        effort = math.ceil(planned.effort)
+        console.talk(f"note: other commands refuse this task at their work budget: add `plan: {{effort: {effort}}}`")
     if format_ == "json":
         from manipcli.report.plan import render_json
 
@@ -108,7 +118,7 @@ def plan(
     else:
         from manipcli.report.plan_text import render_text
 
-        console.result(render_text(name, planned))
+        console.result(render_text(name, planned, every=why))
     return ExitCode.PASSED
 
 

@@ -6,6 +6,7 @@ same path only as the first plan of a process of the same version. Bytes are not
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any, Literal
 
@@ -15,6 +16,7 @@ from pydantic import Field
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
+from manipcli.core.work import WorkSpent
 from manipcli.plan.path_planner import PathFailure, PathPlannerMember, PathProblem
 from manipcli.spec.planner import PlannerSpec
 
@@ -70,7 +72,7 @@ class Ompl:
         planner.setProblemDefinition(definition)
         planner.setup()
         # A sampler that finds no free configuration checks no edge.
-        planner.solve(base.PlannerTerminationCondition(lambda: max(checked.values()) >= most))
+        planner.solve(base.PlannerTerminationCondition(lambda: checked["spent"] > 0 or max(checked.values()) >= most))
         if definition.hasExactSolution():
             return np.array([_array(state, len(problem.start)) for state in definition.getSolutionPath().getStates()])
         away = np.linalg.norm(problem.goals - problem.start, axis=1)
@@ -80,7 +82,10 @@ class Ompl:
 
 
 def space(base: ModuleType, problem: PathProblem) -> tuple[Any, dict[str, int]]:
-    """OMPL's `SpaceInformation` of a problem, and its counters of checked edges and configurations."""
+    """OMPL's `SpaceInformation` of a problem, and its counters of checked edges and configurations.
+
+    `spent` counts those that were not checked, as the work budget was spent; no exception passes through OMPL.
+    """
     n = len(problem.start)
     bounds = base.RealVectorBounds(n)
     for k in range(n):
@@ -89,17 +94,24 @@ def space(base: ModuleType, problem: PathProblem) -> tuple[Any, dict[str, int]]:
     states = base.RealVectorStateSpace(n)
     states.setBounds(bounds)
     si = base.SpaceInformation(states)
-    checked = {"edges": 0, "configurations": 0}
+    checked = {"edges": 0, "configurations": 0, "spent": 0}
+
+    def within_budget(check: Callable[[], bool]) -> bool:
+        try:
+            return check()
+        except WorkSpent:
+            checked["spent"] += 1
+            return False
 
     def valid(state: Any) -> bool:
         checked["configurations"] += 1
-        return problem.valid(_array(state, n))
+        return within_budget(lambda: problem.valid(_array(state, n)))
 
     class Edges(base.MotionValidator):  # type: ignore[misc, name-defined]
         def checkMotion(self, a: Any, b: Any, _last: Any = None) -> bool:
             checked["edges"] += 1
             end = _array(b, n)
-            return problem.valid(end) and problem.edge(_array(a, n), end)
+            return within_budget(lambda: problem.valid(end) and problem.edge(_array(a, n), end))
 
     si.setStateValidityChecker(valid)
     si.setMotionValidator(Edges(si))

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.core.geometry import Array
+from manipcli.core.work import WorkSpent
 from manipcli.plan.path_planner import PathFailure, PathPlannerMember, PathProblem
 from manipcli.spec.planner import PlannerSpec
 
@@ -40,24 +41,26 @@ class RrtConnect:
         step = self._spec.range or _SHARE * float(np.linalg.norm(problem.upper - problem.lower))
         start, goal = _Tree(problem.start[None], problem, step), _Tree(problem.goals, problem, step)
         nearest = goal.nearest(problem.start)
-        if goal.connect(nearest, problem.start):  # the straight path, or its free part
-            return _joined(start, 0, goal, goal.size - 1)
         grown, other = start, goal
-        drawn = 0
-        while drawn < self._spec.samples:
-            drawn += 1
-            new = grown.extend(rng.uniform(problem.lower, problem.upper))
-            if new is not None:
-                near = other.nearest(grown.nodes[new])
-                if other.connect(near, grown.nodes[new]):
-                    ends = (new, other.size - 1) if grown is start else (other.size - 1, new)
-                    return _joined(start, ends[0], goal, ends[1])
-            if grown.size > other.size or new is None:
-                grown, other = other, grown
+        drawn, ended = 0, ""
+        try:
+            if goal.connect(nearest, problem.start):  # the straight path, or its free part
+                return _joined(start, 0, goal, goal.size - 1)
+            while drawn < self._spec.samples:
+                drawn += 1
+                new = grown.extend(rng.uniform(problem.lower, problem.upper))
+                if new is not None:
+                    near = other.nearest(grown.nodes[new])
+                    if other.connect(near, grown.nodes[new]):
+                        ends = (new, other.size - 1) if grown is start else (other.size - 1, new)
+                        return _joined(start, ends[0], goal, ends[1])
+                if grown.size > other.size or new is None:
+                    grown, other = other, grown
+        except WorkSpent:
+            ended = ", where the work budget ended"
         i, j = _closest(start, goal)
-        return PathFailure(
-            f"the two searches did not meet within {drawn} samples", drawn, start.nodes[i].copy(), goal.nodes[j].copy()
-        )
+        why = f"the two searches did not meet within {drawn} samples{ended}"
+        return PathFailure(why, drawn, start.nodes[i].copy(), goal.nodes[j].copy())
 
 
 class _Tree:

@@ -192,10 +192,12 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             out_of_reach[frame] = near.unreachable("approach", frame.X_WT, hand=spec.open)
         refusal = out_of_reach[frame]
         if refusal is not None:
-            hint = f"move '{spec.object}', or {_OTHERWISE}"
+            others = sorted(part for part in refusal.parts - {spec.object} if not part.startswith("robot/"))
+            nearer = f"move '{others[0]}' away" if others else f"move '{spec.object}' nearer"
+            hint = _OTHERWISE if refusal.reason == "touches" and not others else f"{nearer}, or {_OTHERWISE}"
             if refusal.reason == "orientation":
-                others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
-                hint = "; or set ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
+                sides = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
+                hint = "; or set ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in sides)])
             raise refusal.but(hint=hint)
         attempts += further
         before_approach = backed_off(frame.X_WT, distance, slope)
@@ -296,7 +298,8 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
         amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
         wide = too_wide(planner, state, spec.object, spec.open, [frame.X_WT for frame in usual])
         nearer = _shorter(spec.object, *min(starts, key=lambda start: start[0])) if starts else None
-        hints = dict.fromkeys(hint for hint in (amiss or wide, nearer, refusal.hint) if hint is not None)
+        own = None if refusal.hint is None else refusal.hint.removeprefix(f"move '{spec.object}' away, or ")
+        hints = dict.fromkeys(hint for hint in (amiss or wide, nearer, own) if hint is not None)
         # An earlier step may have put the object where it cannot be picked.
         return refusal.but(hint="; or ".join(hints) or None, parts=refusal.parts | {spec.object})
 
