@@ -37,9 +37,10 @@ def render_errors(
     return dumps({**_object(None, findings, verdict=verdict), **(known or {})})
 
 
-def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
-    """The JSON object of checked files; `failed` if at least one finding is an error."""
-    failed = any(finding.severity == "error" for finding in findings)
+def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, strict: bool = False) -> str:
+    """The JSON object of checked files; `failed` if a finding is an error, with `strict` also if one is a warning."""
+    failing = ("error", "warning") if strict else ("error",)
+    failed = any(finding.severity in failing for finding in findings)
     return dumps(
         {
             "verdict": "failed" if failed else "passed",
