@@ -105,7 +105,7 @@ def _causes(verdict: Verdict) -> list[str]:
     ]
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
-        for expectation in verdict.expectations
+        for expectation in (*verdict.expectations, *verdict.implied)
         if expectation.outcome != "passed"
     ]
     return causes

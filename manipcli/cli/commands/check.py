@@ -39,7 +39,8 @@ def check(
 
     The kind (task, robot, controllers) is read from each file; --set, --seed and --sample apply to the tasks among
     them. A task is planned, and gains, motors and grasps are examined over the plan; a step that cannot be planned is
-    an error. With --strict, warnings fail, too. A controllers file does not name a robot: check a task that names both to compare joints and gains.
+    an error. With --strict, warnings fail, too. A controllers file does not name a robot: check a task that names both
+    to compare joints and gains.
     """
     from manipcli import pipeline
     from manipcli.report import json, text
