@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.members.saturation import MOST, SaturationSpec
+from manipcli.conditions.members.saturation import MOST, SaturationSpec, limited_joints
 from manipcli.control.controllers import CONTROLLERS
-from manipcli.model.motor_limits import effort_limits
 from manipcli.model.robot import RobotModel
 from manipcli.spec.condition import ExpectationSpec
 from manipcli.spec.controllers_file import ControllersSpec
@@ -34,12 +32,8 @@ def implied(task: TaskSpec, controllers: ControllersSpec, robot: RobotModel) -> 
     specs = [spec for spec in controllers.controllers.values() if spec.interfaces]
     hands = {name for spec in specs if CONTROLLERS[spec.type].hand is not None for name in spec.joints}
     commanded = {name for spec in specs for name in spec.joints} - hands
-    limits, _ = effort_limits(robot)
-    joints = tuple(
-        name
-        for name, limit in zip(robot.joint_names, limits, strict=True)
-        if name in commanded and 0.0 < limit < np.inf
-    )
+    limited = limited_joints(robot)
+    joints = tuple(name for name in robot.joint_names if name in commanded and name in limited)
     if not joints:
         return ()
     below = MOST if task.saturation is True else task.saturation

@@ -1,17 +1,20 @@
-"""Largest efforts of the motors at the joints of a robot."""
+"""Largest efforts of the motors at the joints of a robot, and when they are reached."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
 
+NEAR: Final = 1e-6
+"""Share of a limit within which an effort is at it: engines keep the limit as an impulse, with rounding."""
 _PLENTY: Final = 1e9
 """Represents an unlimited effort in sums [N m or N]."""
 
@@ -43,24 +46,68 @@ def motor_effort_limits(robot: RobotModel) -> Array:
     return limits
 
 
-def effort_limits(robot: RobotModel) -> tuple[Array, Array]:
-    """(n) the efforts [N m or N] at which the motor of each joint is at its limit: without losses, and while it drives.
+@dataclass(frozen=True, slots=True)
+class EffortLimits:
+    """What limits the effort of n joints with a actuators.
 
-    The first is the smaller of the joint's limit and the output of its actuator without losses and friction. From the
-    second, `motor_effort_limits`, viscous friction takes more.
+    Attributes:
+        joint: (n) limits of the joints [N m or N]; infinite where unlimited.
+        motor: (n) `motor_effort_limits`, which an engine's own motors reach exactly.
+        effort, motion: (a, n) efforts and velocities of the joints to those of the actuators.
+        actuator: (a) limits of the actuators.
+        output: (a) what reaches the gear of an actuator at its limit while it drives, less viscous friction.
+        viscous: (a) viscous friction of the actuators.
     """
-    ideal = replace(
-        robot,
-        actuators=tuple(replace(actuator, efficiency=1.0, coulomb_friction=0.0) for actuator in robot.actuators),
-    )
-    return motor_effort_limits(ideal), motor_effort_limits(robot)
 
+    joint: Array
+    motor: Array
+    effort: Array
+    motion: Array
+    actuator: Array
+    output: Array
+    viscous: Array
 
-def viscous_friction(robot: RobotModel) -> Array:
-    """(n) viscous friction of the actuators at each joint [N m s/rad or N s/m], without coupling between joints."""
-    drivetrain = Drivetrain.of(robot)
-    friction = np.zeros(len(robot.joint_names))
-    if drivetrain.actuators:
-        viscous = np.array([actuator.viscous_friction for actuator in drivetrain.actuators])
-        friction[list(drivetrain.joints)] = viscous @ drivetrain.transmission.maps.actuator_motion**2
-    return friction
+    @staticmethod
+    def of(robot: RobotModel) -> EffortLimits:
+        """The limits of a robot."""
+        drivetrain = Drivetrain.of(robot)
+        actuators, columns, n = drivetrain.actuators, list(drivetrain.joints), len(robot.joint_names)
+        effort, motion = np.zeros((2, len(actuators), n))
+        if actuators:
+            effort[:, columns] = drivetrain.transmission.maps.actuator_effort
+            motion[:, columns] = drivetrain.transmission.maps.actuator_motion
+        limits = np.array([math.inf if x.effort is None else x.effort for x in actuators])
+        efficiency = np.array([x.efficiency for x in actuators])
+        coulomb = np.array([x.coulomb_friction for x in actuators])
+        return EffortLimits(
+            joint=np.array([math.inf if x.limits.effort is None else x.limits.effort for x in robot.moving_joints]),
+            motor=motor_effort_limits(robot),
+            effort=effort,
+            motion=motion,
+            actuator=limits,
+            output=np.maximum(limits * efficiency - coulomb, 0.0),
+            viscous=np.array([x.viscous_friction for x in actuators]),
+        )
+
+    @property
+    def least(self) -> Array:
+        """(n) the smaller of the limits of a joint and its motor; infinite without, 0 for a joint without effort."""
+        return np.minimum(self.joint, self.motor)
+
+    def reached(self, effort: Array, velocity: Array) -> npt.NDArray[np.bool_]:
+        """(T, n) whether each joint, or an actuator that drives it, is at its limit.
+
+        An actuator gives its limit at rest and while it brakes, and `output` less viscous friction while it drives.
+
+        Args:
+            effort, velocity: (T, n) measured.
+        """
+        size, gear = np.abs(effort), effort @ self.effort.T
+        speed = velocity @ self.motion.T
+        driving = gear * speed > 0.0
+        lost = self.output * (1.0 - NEAR) - self.viscous * np.abs(speed)
+        full = (np.abs(gear) >= (1.0 - NEAR) * self.actuator) | (driving & (np.abs(gear) >= lost))
+        of_actuators = full.astype(float) @ (self.effort != 0.0).astype(float) > 0.0
+        at_motor = np.abs(size - np.where(np.isfinite(self.motor), self.motor, 0.0)) <= NEAR * self.motor
+        at_motor &= np.isfinite(self.motor)
+        return np.asarray((size >= (1.0 - NEAR) * self.joint) | at_motor | of_actuators)

@@ -13,13 +13,11 @@ from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow, StepTime
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
-from manipcli.model.motor_limits import effort_limits, viscous_friction
+from manipcli.model.motor_limits import EffortLimits
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import Share
 
-NEAR: Final = 1e-6
-"""Share of a limit within which an effort is at it: engines keep the limit as an impulse, with rounding."""
 MOST: Final = 0.2
 """Default of `below`, and of `saturation:` of a task."""
 
@@ -45,14 +43,14 @@ class SaturationSpec(Model):
 def monitor(spec: SaturationSpec, world: World) -> Monitor:
     """`below` minus the share of the ticks of a step in which a joint was at its effort limit, for the worst joint.
 
-    The limit is the smaller of those of the joint and its actuator. From the limit of a motor that drives the joint,
-    losses and friction of its actuator are taken off. The share is known at the last tick of each step, and evaluated
+    It is at its limit where its effort is, or that of an actuator that drives it: less losses and friction while it
+    drives. The share is known at the last tick of each step, and evaluated
     there; ticks outside of steps do not count. With several ends of steps the least margin decides.
     """
     joints = _joints(spec, world.robot)
     columns = world.robot.indices(joints)
-    gross, net = (limit[columns] for limit in effort_limits(world.robot))
-    viscous = viscous_friction(world.robot)[columns]
+    limits = EffortLimits.of(world.robot)
+    least = limits.least[columns]
     units = [world.robot.joint(name).effort_unit for name in joints]
     full: dict[str, npt.NDArray[np.int64]] = {}
     ticks: dict[str, int] = {}
@@ -70,22 +68,22 @@ def monitor(spec: SaturationSpec, world: World) -> Monitor:
         return last - 1 if times[last - 1] + 1.5 * world.period > end else None
 
     def look(window: StateWindow) -> Robustness:
-        times, effort = window.times, window.states.effort[:, columns]
-        velocity = window.states.velocity[:, columns]
+        times = window.times
         margins, applies = np.full(len(times), spec.below), np.zeros(len(times), dtype=bool)
         texts: dict[int, str] = {}
-        at_limit = _at_limit(effort, velocity, gross, net, viscous)
-        finite = np.isfinite(effort).all(axis=1)
+        at_limit = limits.reached(window.states.effort, window.states.velocity)[:, columns]
+        finite = bool(np.isfinite(window.states.effort[:, columns]).all())
         for step in window.steps:
             last = count(step, times, at_limit)
             if last is None:
                 continue
             worst = int(np.argmax(full[step.id]))
             share = full[step.id][worst] / ticks[step.id]
-            margin = spec.below - share if finite.all() else np.nan
+            margin = spec.below - share if finite else np.nan
             if not applies[last] or margin < margins[last]:
-                most = min(gross[worst], net[worst])
-                limit = f"its effort limit ({most:.4g} {units[worst]}) in {100.0 * share:.3g} % of step '{step.id}'"
+                limit = (
+                    f"its effort limit ({least[worst]:.4g} {units[worst]}) in {100.0 * share:.3g} % of step '{step.id}'"
+                )
                 texts[last] = f"joint '{joints[worst]}' is at {limit}; below {100.0 * spec.below:.4g} %"
                 margins[last], applies[last] = margin, True
         idle = "no step ended"
@@ -96,27 +94,17 @@ def monitor(spec: SaturationSpec, world: World) -> Monitor:
     return look
 
 
-def _at_limit(effort: Array, velocity: Array, gross: Array, net: Array, viscous: Array) -> npt.NDArray[np.bool_]:
-    """(T, k) whether each joint is at its effort limit; see `effort_limits` for `gross` and `net`.
-
-    Joints commanded by effort reach `gross` at rest and while they brake, and `net` less viscous friction while they
-    drive. An engine's own motors reach exactly `net`.
-    """
-    size = np.abs(effort)
-    driving = effort * velocity > 0.0
-    return np.asarray(
-        (size >= (1.0 - NEAR) * gross)
-        | (np.abs(size - net) <= NEAR * net)
-        | (driving & (size >= (1.0 - NEAR) * net - viscous * np.abs(velocity)))
-    )
-
-
 def _joints(spec: SaturationSpec, robot: RobotModel) -> tuple[str, ...]:
     """The joints of the spec that have an effort limit above 0."""
-    gross, _ = effort_limits(robot)
-    limited = {name for name, limit in zip(robot.joint_names, gross, strict=True) if 0.0 < limit < np.inf}
+    limited = limited_joints(robot)
     asked = spec.joints or (robot.joint_names if spec.group is None else robot.group(spec.group).joints)
     return tuple(name for name in asked if name in limited)
+
+
+def limited_joints(robot: RobotModel) -> frozenset[str]:
+    """The joints with an effort limit above 0, their own or of their motors."""
+    least = EffortLimits.of(robot).least
+    return frozenset(name for name, limit in zip(robot.joint_names, least, strict=True) if 0.0 < limit < np.inf)
 
 
 def check(spec: SaturationSpec, context: CheckContext) -> tuple[Problem, ...]:
@@ -128,7 +116,11 @@ def check(spec: SaturationSpec, context: CheckContext) -> tuple[Problem, ...]:
             message = f"'{name}' is not a moving joint of robot '{robot.name}'"
             found += (Problem(("joints", k), message, did_you_mean(name, robot.joint_names)),)
     if not found and not _joints(spec, robot):
-        return (Problem((), "no joint has an effort limit", "add it to the robot file: `limits: {JOINT: {effort: ..."),)
+        return (
+            Problem(
+                (), "no joint has an effort limit", "add it to the robot file: `limits: {JOINT: {effort: 20 N m}}`"
+            ),
+        )
     return found
 
 

@@ -1,7 +1,8 @@
 """Expectations with a foregone result: they pass, or fail, in every run of the task.
 
-Only what follows from the files is reported: conditions on fixed bodies alone, tolerances wider than the joints' ranges,
-durations above the sum of all timeouts, and `eventually` of what holds at the start. Conditions combine as three-valued logic: true, false, unknown.
+Only what follows from the files is reported: conditions on fixed bodies alone, tolerances wider than the ranges of
+joints, durations above the sum of all timeouts, and `eventually` of what holds at the start. Conditions combine as
+three-valued logic: true, false, unknown.
 """
 
 from __future__ import annotations
