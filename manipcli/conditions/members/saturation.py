@@ -81,10 +81,9 @@ def monitor(spec: SaturationSpec, world: World) -> Monitor:
             share = full[step.id][worst] / ticks[step.id]
             margin = spec.below - share if finite else np.nan
             if not applies[last] or margin < margins[last]:
-                limit = (
-                    f"its effort limit ({least[worst]:.4g} {units[worst]}) in {100.0 * share:.3g} % of step '{step.id}'"
-                )
-                texts[last] = f"joint '{joints[worst]}' is at {limit}; below {100.0 * spec.below:.4g} %"
+                limit = f"its effort limit ({least[worst]:.4g} {units[worst]}) in {100.0 * share:.3g} % of"
+                text = f"joint '{joints[worst]}' is at {limit}" if share else "no joint is at its effort limit in"
+                texts[last] = f"{text} step '{step.id}'; below {100.0 * spec.below:.4g} %"
                 margins[last], applies[last] = margin, True
         idle = "no step ended"
         return robustness(
@@ -116,11 +115,8 @@ def check(spec: SaturationSpec, context: CheckContext) -> tuple[Problem, ...]:
             message = f"'{name}' is not a moving joint of robot '{robot.name}'"
             found += (Problem(("joints", k), message, did_you_mean(name, robot.joint_names)),)
     if not found and not _joints(spec, robot):
-        return (
-            Problem(
-                (), "no joint has an effort limit", "add it to the robot file: `limits: {JOINT: {effort: 20 N m}}`"
-            ),
-        )
+        hint = "add it to the robot file: `limits: {JOINT: {effort: 20 N m}}`"
+        return (Problem((), "no joint has an effort limit", hint),)
     return found
 
 
