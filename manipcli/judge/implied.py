@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 from pydantic import Field
@@ -21,15 +22,17 @@ class ImpliedSaturation(ExpectationSpec):
     saturation: SaturationSpec = Field(description="The condition.")
 
 
-def implied(task: TaskSpec, controllers: ControllersSpec, robot: RobotModel) -> tuple[ExpectationSpec, ...]:
+def implied(
+    task: TaskSpec, controllers: Callable[[], ControllersSpec], robot: RobotModel
+) -> tuple[ExpectationSpec, ...]:
     """`saturation` of all commanded joints, without those of hands, which press by intent.
 
     Empty if the task sets `saturation: false`, if it does not state it (a log of an earlier version), or if no such
-    joint has an effort limit.
+    joint has an effort limit. `controllers` is read only where it is needed.
     """
     if "saturation" not in task.model_fields_set or task.saturation is False:
         return ()
-    specs = [spec for spec in controllers.controllers.values() if spec.interfaces]
+    specs = [spec for spec in controllers().controllers.values() if spec.interfaces]
     hands = {name for spec in specs if CONTROLLERS[spec.type].hand is not None for name in spec.joints}
     commanded = {name for spec in specs for name in spec.joints} - hands
     limited = limited_joints(robot)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from manipcli.judge.implied import implied
-from manipcli.judge.judge import judge
+from manipcli.judge.judge import RUN, judge
 from manipcli.judge.verdict import Verdict
 from manipcli.logs.recorded_files import recorded_controllers_file, recorded_robot, recorded_scene, recorded_task_file
 from manipcli.record.read.reading import open_recording
@@ -46,6 +46,7 @@ def judge_recording(recording: Recording, path: Path) -> Verdict:
     """The verdict on an open log; see `judge_log`."""
     task = recorded_task_file(recording, path).spec
     robot = recorded_robot(recording, path)
-    unwritten = implied(task, recorded_controllers_file(recording, path).spec, robot)
+    physics = recording.metadata.get(RUN, {}).get("physics", "") == "full"
+    unwritten = implied(task, lambda: recorded_controllers_file(recording, path).spec, robot) if physics else ()
     scene = recorded_scene(recording, path)
     return judge(recording, expect=task.judged, robot=robot, scene=scene, implied=unwritten)

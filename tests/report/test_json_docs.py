@@ -34,7 +34,7 @@ WRONG = Diagnostic("TASK201", "unknown key", Place("a.yaml", 3, 5))
 VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
     candidates=(RefusedCandidates("pick_1", "reach", 2, "reach: too far", ("yaw 15",)),),
-    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), saturations=Saturations({"joint_1": 3}, {"motor_1": 2}),
+    implied=(NEAR,), drawn=Drawn(3, (("scene.cup.mass", 0.25),)), saturations=Saturations({"joint_1": 3}, {"motor_1": 2}),
 )  # fmt: skip
 RUN = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
 CASE = CaseReport(

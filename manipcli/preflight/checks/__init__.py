@@ -16,6 +16,7 @@ from manipcli.preflight.checks import (
     overlapping_start,
     position_grips,
     rotation_slip,
+    unsupported,
     velocity_gains,
 )
 from manipcli.preflight.preflight import Check
@@ -38,5 +39,6 @@ PREFLIGHT_CHECKS: Seam[Check] = Seam(
         insufficient_effort.CHECK,
         inert_actuators.CHECK,
         overlapping_start.CHECK,
+        unsupported.CHECK,
     ),
 )
