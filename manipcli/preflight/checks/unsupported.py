@@ -19,6 +19,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.preflight.preflight import Check, Subject
 from manipcli.scene.drop_test import SETTLED_SHIFT, bottom, drop_height, top
 from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box
 from manipcli.shapes.proximity import coal_shape, contact_patch, distance
 from manipcli.task.plan_task import start_position
 from manipcli.task.task import Task
@@ -52,10 +53,8 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
             place = task.file.place("scene", body.name, "pose" if written.pose is not None else "at")
             yield Diagnostic("TASK330", message, place, hint)
         elif (beyond := _beyond(body, scene, fall)) > BEYOND:
-            message = (
-                f"'{escape(body.name)}' topples at the start: its centre of mass is {readable(beyond, 'm')} beyond "
-            )
-            message += "the area on which it stands"
+            message = f"'{escape(body.name)}' topples at the start: its centre of mass is "
+            message += f"{readable(beyond, 'm')} beyond the area on which it stands"
             hint = "move it further onto what carries it"
             place = task.file.place("scene", body.name, "pose" if written.pose is not None else "at")
             yield Diagnostic("TASK331", message, place, hint, "warning")
@@ -93,7 +92,8 @@ def _seen_from_above(body: Body) -> tuple[Array, Array]:
 def _beyond(body: Body, scene: Scene, fall: float) -> float:
     """[m] from the area in which the body is carried to its centre of mass, seen from above.
 
-    0 where it is inside, or where something beside the body touches it, which may hold it.
+    0 where it is inside, where something beside the body touches it, which may hold it, and where a shape that touches
+    is not a box: the area of contact of others is not known exactly.
     """
     X_WB = Transform.of(xyz=(0.0, 0.0, -fall)) @ body.X_WO
     corners: list[Array] = []
@@ -107,7 +107,7 @@ def _beyond(body: Body, scene: Scene, fall: float) -> float:
                 if patch is None:
                     continue
                 points, normal = patch
-                if abs(normal[2]) < LEVEL:
+                if abs(normal[2]) < LEVEL or not (isinstance(a.shape, Box) and isinstance(b.shape, Box)):
                     return 0.0
                 corners += [point[:2] for point in points]
     centre = (X_WB @ body.X_OI).p[:2]
