@@ -263,9 +263,9 @@ def test_a_joint_that_nobody_commands_is_a_warning_and_braked():
 
 
 def test_gains_of_no_joint_of_the_controller_point_to_a_joint_without_gains():
-    misspelt = spec(hand={"joints": ["lfet_1", "left_2"], "gains": gains(["left_1", "left_2"])})
+    misspelt = spec(hand={"joints": ["left_1", "left_2"], "gains": gains(["lfet_1", "left_2"])})
     hints = {finding.code: finding.hint for finding in findings(misspelt)}
-    assert hints["CTRL102"] == "did you mean 'lfet_1'?"
+    assert hints["CTRL102"] == "did you mean 'left_1'?"
     spare = spec(hand={"joints": ["left_2"], "gains": gains(["left_1", "left_2"])})
     hints = {finding.code: finding.hint for finding in findings(spare)}
     assert hints["CTRL102"] == "remove them, or add 'left_1' to `joints`"
