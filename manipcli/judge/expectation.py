@@ -87,6 +87,7 @@ class Expected:
         self._recent: deque[tuple[StateWindow, Robustness]] = deque()
         self._ticks, self._first, self._last = 0, 0.0, 0.0
         self._never: NotEvaluated | None = None
+        self._at_once = any(not seam[leaf.name].live for leaf in leaves(spec.condition))  # not a matter of duration
         self._when = When(None)
         reason = absent(spec.condition, world, seam)
         found = when(spec, steps, seam) if reason is None else NotEvaluated(reason)
@@ -154,7 +155,13 @@ class Expected:
     def _broken(self, found: Measured) -> str:
         """When and for how long an expectation over several ticks failed; "" if it passed."""
         first = self._extreme.broken
-        if first is None or self._spec.quantifier == "eventually" or self._when.intervals is None or self._when.last:
+        if (
+            first is None
+            or self._at_once
+            or self._spec.quantifier == "eventually"
+            or self._when.intervals is None
+            or self._when.last
+        ):
             return ""
         if isinstance(self._spec, WatchSpec):
             return "" if first == found.at else f"; broken at t = {first:.3f} s"
