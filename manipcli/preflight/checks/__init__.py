@@ -17,6 +17,7 @@ from manipcli.preflight.checks import (
     overlapping_start,
     position_grips,
     rotation_slip,
+    round_trips,
     unsupported,
     velocity_gains,
 )
@@ -40,6 +41,7 @@ PREFLIGHT_CHECKS: Seam[Check] = Seam(
         insufficient_effort.CHECK,
         goal_tolerances.CHECK,
         inert_actuators.CHECK,
+        round_trips.CHECK,
         overlapping_start.CHECK,
         unsupported.CHECK,
     ),
