@@ -98,7 +98,9 @@ def test_a_controller_that_is_never_active_is_a_warning_in_its_file(tmp_path: Pa
     text = (ROOT / "controllers" / "arm7_hand3.yaml").read_text()
     spare = tmp_path / "controllers.yaml"
     joints = ", ".join(f"joint_{k}" for k in range(1, 8))
-    spare.write_text(f"{text}  spare:\n    type: joint_trajectory\n    active: false\n    joints: [{joints}]\n")
+    spare.write_text(
+        f"{text}  spare: {{type: joint_trajectory, active: false, joints: [{joints}], command_interface: position}}\n"
+    )
     path = tmp_path / "t.yaml"
     path.write_text(HEAD.replace(f"{ROOT}/controllers/arm7_hand3.yaml", "controllers.yaml") + USED)
     (hit,) = [f for f in lint(load_task(path)) if f.code == "TASK323"]

@@ -26,6 +26,7 @@ from manipcli.core.geometry import Array, quat_from_matrix
 from manipcli.core.units import readable
 from manipcli.judge.expectation import END_WINDOW
 from manipcli.model.state import WorldState
+from manipcli.scene.drop_test import SETTLED_SHIFT
 from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.plan_task import start_position
@@ -33,7 +34,7 @@ from manipcli.task.task import Task
 
 PLACES: Final = ("inside", "outside", "upright", "near", "above", "at_rest", "unmoved", "at_pose")
 """Conditions that follow from poses of bodies and joints; the others need contacts, steps or time."""
-SHIFT: Final = 0.02
+SHIFT: Final = SETTLED_SHIFT
 """[m, rad] A margin at the start above this is left after settling."""
 HALF_TURN: Final = 3.1415
 """[rad] No two orientations differ by more than pi."""
