@@ -9,6 +9,8 @@ from typing import NoReturn
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.cli.outputs import check_outputs
+from manipcli.core.errors import InvalidInput
 from manipcli.record.faults import RecordingFailed
 
 TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"
