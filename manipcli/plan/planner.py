@@ -19,6 +19,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.lifts_off import freed
 from manipcli.plan.links_apart import links_apart
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
@@ -340,7 +341,7 @@ class Planner:
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
         hint = NO_WAY_AROUND
         if begins and held and carried is not None:
-            hint = f"`lift` '{carried.body}' first"
+            hint = freed(self.scene, partial(self.body_pose, state), carried.body, hit)
         elif hit.a.startswith(ROBOT) and hit.b.startswith(ROBOT):
             hint = links_apart(hit) if begins else f"{NO_WAY_AROUND}; or {links_apart(hit)}"
         elif begins and state.at_start:
