@@ -26,6 +26,7 @@ from manipcli.preflight.preflight import Check
 PREFLIGHT_CHECKS: Seam[Check] = Seam(
     kind="preflight check",
     members=(
+        round_trips.CHECK,
         closing_speed.CHECK,
         deadlines.CHECK,
         idle_keeps.CHECK,
@@ -41,7 +42,6 @@ PREFLIGHT_CHECKS: Seam[Check] = Seam(
         insufficient_effort.CHECK,
         goal_tolerances.CHECK,
         inert_actuators.CHECK,
-        round_trips.CHECK,
         overlapping_start.CHECK,
         unsupported.CHECK,
     ),
