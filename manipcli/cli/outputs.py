@@ -51,7 +51,22 @@ def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None
         whole = path if path.exists() and not path.is_file() else Path(os.path.realpath(path)).parent
         if not os.access(whole, os.W_OK):
             raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': '{whole}' is not writable")])
+        _try(option, path)
         taken.append(os.path.realpath(path))
+
+
+def _try(option: str, path: Path) -> None:
+    """Creates and removes the temporary file of `path`: permissions do not show a read-only or full file system.
+
+    Raises:
+        InvalidInput: it cannot be created.
+    """
+    from manipcli.core.whole_file import touched
+
+    try:
+        touched(path)
+    except OSError as error:
+        raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': {error.strerror or error}")]) from error
 
 
 def check_picture(path: Path | None) -> None:

@@ -121,6 +121,7 @@ class Condition(Generic[S]):
         example: in YAML.
         stateless: True if it uses only contacts and steps, which are known at every tick, also in a log with fewer
             states than ticks.
+        live: False if it is known only from a recording: then it is for `expect` alone.
     """
 
     name: str
@@ -132,6 +133,7 @@ class Condition(Generic[S]):
     example: str
     scope: Scope = "end"
     stateless: bool = False
+    live: bool = True
 
 
 def unmoving(world: World, bodies: Sequence[str]) -> str | None:

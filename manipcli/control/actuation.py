@@ -259,30 +259,3 @@ class Actuation:
         T[:, list(self.drivetrain.joints)] = self.drivetrain.transmission.maps.actuator_motion
         m = np.abs(T @ np.linalg.solve(M, T.T)).sum(axis=1) * self._period
         return np.concatenate((STIFFNESS / m, self._viscous / (1.0 + self._viscous * m)))
-
-
-def motor_effort_limits(robot: RobotModel) -> Array:
-    """(n) the largest effort of an engine's own motor at each joint [N m or N]; infinite where unlimited.
-
-    The smaller of the joint's limit and the output of its actuator while it drives, less losses and Coulomb friction.
-    The two joints of a pair get the largest common multiple of their individual limits that both can have at once.
-    """
-    limits = np.array(
-        [math.inf if joint.limits.effort is None else joint.limits.effort for joint in robot.moving_joints],
-        dtype=np.float64,
-    )
-    drivetrain = Drivetrain.of(robot)
-    actuators, joints = list(drivetrain.actuators), list(drivetrain.joints)
-    for block in drivetrain.transmission.blocks:
-        own, actuators = actuators[: block.size], actuators[block.size :]
-        driven, joints = joints[: block.size], joints[block.size :]
-        if all(actuator.effort is None for actuator in own):
-            continue
-        net = np.array(
-            [max((_PLENTY if x.effort is None else x.effort) * x.efficiency - x.coulomb_friction, 0.0) for x in own]
-        )
-        alone = np.abs(block.maps.joint_effort) @ net
-        need = np.abs(block.maps.actuator_effort) @ alone
-        share = np.min(net / np.where(need > 0.0, need, 1.0))
-        limits[driven] = np.minimum(limits[driven], share * alone)
-    return limits

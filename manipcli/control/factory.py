@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from functools import cache
 
+from manipcli.control.as_meant import as_meant
 from manipcli.control.chain import chain_finding, target_of
 from manipcli.control.command import may_go_together
 from manipcli.control.controller import BuildContext
@@ -90,20 +91,20 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
     commanded: set[str] = set()
     together: set[tuple[str, str, str]] = set()
     for name, own in spec.controllers.items():
-        at = ("controllers", name)
+        at, meant = ("controllers", name), as_meant(own, robot)
         if not own.joints and own.interfaces:
             yield Diagnostic("CTRL101", f"controller '{name}' has no joints", place((*at, "joints")))
         for k, joint in enumerate(own.joints):
             where = place((*at, "joints", k))
-            yield from _joint_findings(name, own, joint, robot, where)
+            yield from _joint_findings(name, own, joint, meant.joints[k], robot, where)
             if own.active and not target_of(own):
                 before = set(owners.get(joint, {}).values())
                 yield from _claim_findings(name, own, joint, owners, where)
                 together |= {(other, name, joint) for other in before if name in owners[joint].values()}
-        commanded.update(own.joints if own.interfaces and not target_of(own) else ())
+        commanded.update(meant.joints if own.interfaces and not target_of(own) else ())
         yield from chain_finding(name, own, spec.controllers, place((*at, "chained_to")))
         yield from _rate_findings(name, own, robot, period, place((*at, "update_rate")))
-        for problem in CONTROLLERS[own.type].check(own, robot):
+        for problem in CONTROLLERS[own.type].check(meant, robot):
             message, where = f"controller '{name}': {problem.message}", place((*at, *problem.loc))
             yield Diagnostic(problem.code or "CTRL100", message, where, problem.hint, problem.severity)
     yield from _rivals(spec, together, place)
@@ -180,7 +181,7 @@ def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], p
 
 
 def _joint_findings(
-    name: str, spec: ControllerSpec, joint: str, robot: RobotModel, place: Place | None
+    name: str, spec: ControllerSpec, joint: str, meant: str, robot: RobotModel, place: Place | None
 ) -> Iterator[Diagnostic]:
     known = {other.name: other for other in robot.joints}
     if joint not in known:
@@ -189,7 +190,7 @@ def _joint_findings(
             "CTRL144",
             f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
             place,
-            hint=did_you_mean(joint, commandable, kind="joints"),
+            hint=did_you_mean(joint, commandable, kind="joints") if meant == joint else f"did you mean '{meant}'?",
         )
         return
     found = known[joint]

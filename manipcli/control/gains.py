@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from manipcli.conditions.condition import Problem
 from manipcli.control.pid import AntiWindup, Pid
 from manipcli.core.errors import InvalidArgument, Loc
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, nearest
 from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import GainsSpec, Interface
@@ -111,9 +111,16 @@ def strangers(
 def idle_gains(
     robot: RobotModel, joints: Sequence[str], gains: Mapping[str, GainsSpec], interface: Interface
 ) -> Iterator[Problem]:
-    """Joints that would never move: their gains are all zero, without velocity feed-forward."""
+    """Joints that would never move: their gains are all zero, without velocity feed-forward.
+
+    Not a joint whose gains are under a misspelt name, which `strangers` reports.
+    """
+    lacking = [joint for joint in own_joints(robot, joints) if joint not in gains]
+    misspelt = {near for name in gains if name not in joints for near in nearest(name, lacking)}
     for joint in own_joints(robot, joints):
         own = gains.get(joint)
+        if joint in misspelt:
+            continue
         if own is None or own.idle:
             loc = ("gains", joint) if own is not None else ("gains",) if gains else ()
             what = "has no gains" if own is None else "has gains that are all zero"

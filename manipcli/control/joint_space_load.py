@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.control.actuation import motor_effort_limits
 from manipcli.core.geometry import Array
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.motor_limits import motor_effort_limits
 from manipcli.model.robot import RobotModel
 
 

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import Mode
 from manipcli.core.geometry import Array
+from manipcli.model.motor_limits import motor_effort_limits
 from manipcli.model.robot import RobotModel
 
 KINDS: Final = ("position", "velocity", "effort", "acceleration", "soft_limit")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -31,8 +31,7 @@ def whole_file(path: Path) -> Iterator[Path]:
             error.filename = error.filename or str(path)
             raise
         return
-    whole = Path(os.path.realpath(path))
-    partial = whole.with_name(f".{whole.name}.{os.getpid()}.partial")
+    whole, partial = _names(path)
     try:
         partial.touch()  # an unwritable path fails before the work
         yield partial
@@ -43,4 +42,24 @@ def whole_file(path: Path) -> Iterator[Path]:
             error.filename = str(path)
         raise
     finally:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):  # a name too long cannot be removed either, and must not hide the error
+            partial.unlink()
+
+
+def touched(path: Path) -> None:
+    """Creates and removes the temporary file that `whole_file` would write; `path` itself stays as it is.
+
+    Raises:
+        OSError: it cannot be created.
+    """
+    if path.exists() and not path.is_file():
+        return
+    _, partial = _names(path)
+    partial.touch()
+    partial.unlink()
+
+
+def _names(path: Path) -> tuple[Path, Path]:
+    """The file with links followed, and its temporary file."""
+    whole = Path(os.path.realpath(path))
+    return whole, whole.with_name(f".{whole.name}.{os.getpid()}.partial")

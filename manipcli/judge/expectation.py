@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manipcli.conditions.condition import CheckContext, Problem, World
-from manipcli.conditions.formula import Seams, absent, opened, problems, scopes
+from manipcli.conditions.formula import Seams, absent, leaves, opened, problems, scopes
 from manipcli.conditions.members.step_done import StepDoneSpec
 from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Robustness, never
 from manipcli.conditions.state_window import ROUNDING, StateWindow
@@ -87,6 +87,7 @@ class Expected:
         self._recent: deque[tuple[StateWindow, Robustness]] = deque()
         self._ticks, self._first, self._last = 0, 0.0, 0.0
         self._never: NotEvaluated | None = None
+        self._at_once = any(not seam[leaf.name].live for leaf in leaves(spec.condition))  # not a matter of duration
         self._when = When(None)
         reason = absent(spec.condition, world, seam)
         found = when(spec, steps, seam) if reason is None else NotEvaluated(reason)
@@ -154,7 +155,13 @@ class Expected:
     def _broken(self, found: Measured) -> str:
         """When and for how long an expectation over several ticks failed; "" if it passed."""
         first = self._extreme.broken
-        if first is None or self._spec.quantifier == "eventually" or self._when.intervals is None or self._when.last:
+        if (
+            first is None
+            or self._at_once
+            or self._spec.quantifier == "eventually"
+            or self._when.intervals is None
+            or self._when.last
+        ):
             return ""
         if isinstance(self._spec, WatchSpec):
             return "" if first == found.at else f"; broken at t = {first:.3f} s"
@@ -181,6 +188,8 @@ def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:
 def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
     """Every unknown name in an expectation, and steps that end too late; `loc` is inside the expectation."""
     found = list(problems(spec.condition, context, seam))
+    if isinstance(spec, WatchSpec):
+        found += _known_late(spec.condition, seam)
     if spec.quantifier is not None:
         found = [Problem((spec.word, *p.loc), p.message, p.hint, p.code) for p in found]
     named: list[tuple[Loc, str]] = []
@@ -204,7 +213,7 @@ def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Sea
 
 def until_problems(spec: ConditionSpec, step: str | None, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
     """Every unknown name in the `until` of a step, and steps that are not done before it ends."""
-    found = problems(spec, context, seam)
+    found = (*problems(spec, context, seam), *_known_late(spec, seam))
     if found or step is None or context.steps is None or not context.in_order:
         return found
     problems_found = []
@@ -212,6 +221,12 @@ def until_problems(spec: ConditionSpec, step: str | None, context: CheckContext,
         what = "its own end" if late == step else f"the end of step '{late}', which runs later"
         problems_found.append(Problem((spec.name,), f"step '{step}' waits for {what}", "name an earlier step"))
     return tuple(problems_found)
+
+
+def _known_late(spec: ConditionSpec, seam: Seams) -> Iterator[Problem]:
+    """Conditions that are known only from a recording."""
+    for name in dict.fromkeys(leaf.name for leaf in leaves(spec) if not seam[leaf.name].live):
+        yield Problem((spec.name,), f"`{name}` is judged after the run, not during it", "move it to `expect`")
 
 
 def _too_early(

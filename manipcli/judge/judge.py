@@ -24,7 +24,14 @@ RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
 
 
-def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: RobotModel, scene: Scene) -> Verdict:
+def judge(
+    recording: Recording,
+    *,
+    expect: Sequence[ExpectationSpec],
+    robot: RobotModel,
+    scene: Scene,
+    implied: Sequence[ExpectationSpec] = (),
+) -> Verdict:
     """Judge a recording against the expectations of its task.
 
     In this order: a run that was interrupted or did not finish, or whose log is incomplete, is an `error`; a step that
@@ -35,6 +42,8 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         recording: the log.
         expect: the expectations, in the order of the task in the log.
         robot, scene: built from the attachments of the log.
+        implied: expectations that the task does not write; they fail the run, but are not part of its expectations.
+            One that cannot be evaluated is dropped.
     """
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")
@@ -42,17 +51,18 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
     steps = step_outcomes(recording, interrupted=bool(errors))
     examined = examine(
         recording,
-        expect,
+        (*expect, *implied),
         robot=robot,
         scene=scene,
         seam=CONDITIONS,
         physics=run.get("physics", "") == "full",
         steps=steps,
     )
-    outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes)
+    outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes[: len(expect)])
+    unwritten = tuple(each for each in examined.outcomes[len(expect) :] if each.outcome != "not_evaluated")
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
-    word, text = _verdict(errors, cause, steps, outcomes)
+    word, text = _verdict(errors, cause, steps, outcomes, unwritten)
     return Verdict(
         task=run.get("task", ""),
         verdict=word,
@@ -61,6 +71,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         simulated_time=examined.end,
         steps=steps,
         expectations=outcomes,
+        implied=unwritten,
         errors=errors,
         text=text,
         drawn=_drawn(recording),
@@ -127,6 +138,7 @@ def _verdict(
     cause: str,
     steps: tuple[StepOutcome, ...],
     expectations: tuple[ExpectationOutcome, ...],
+    implied: tuple[ExpectationOutcome, ...],
 ) -> tuple[VerdictWord, str]:
     """The verdict, and its reason in one line. `cause`: what ended the simulation early; "" if nothing did."""
     if errors:
@@ -142,7 +154,7 @@ def _verdict(
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
     if not steps:
         return "failed", "the recording has no steps"
-    unmet = next((expectation for expectation in expectations if expectation.outcome != "passed"), None)
+    unmet = next((each for each in (*expectations, *implied) if each.outcome != "passed"), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"

@@ -113,6 +113,7 @@ class Verdict:
         self_contacts: the pairs of links of the robot that pressed on each other.
         holding: what held objects by an attachment instead of friction, one text per object and kind.
         candidates: the refused candidates of a task without a plan.
+        implied: outcomes of the expectations that every task has unless it sets them otherwise (`saturation`).
     """
 
     task: str
@@ -129,6 +130,7 @@ class Verdict:
     self_contacts: tuple[SelfContact, ...] = ()
     holding: tuple[str, ...] = ()
     candidates: tuple[RefusedCandidates, ...] = ()
+    implied: tuple[ExpectationOutcome, ...] = ()
 
     @property
     def ended_between(self) -> bool:

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from manipcli.judge.judge import judge
+from manipcli.judge.implied import implied
+from manipcli.judge.judge import RUN, judge
 from manipcli.judge.verdict import Verdict
-from manipcli.logs.recorded_files import recorded_robot, recorded_scene, recorded_task_file
+from manipcli.logs.recorded_files import recorded_controllers_file, recorded_robot, recorded_scene, recorded_task_file
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span
 
@@ -43,6 +44,9 @@ class _Watched:
 
 def judge_recording(recording: Recording, path: Path) -> Verdict:
     """The verdict on an open log; see `judge_log`."""
-    expect = recorded_task_file(recording, path).spec.judged
+    task = recorded_task_file(recording, path).spec
+    robot = recorded_robot(recording, path)
+    physics = recording.metadata.get(RUN, {}).get("physics", "") == "full"
+    unwritten = implied(task, lambda: recorded_controllers_file(recording, path).spec, robot) if physics else ()
     scene = recorded_scene(recording, path)
-    return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)
+    return judge(recording, expect=task.judged, robot=robot, scene=scene, implied=unwritten)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from functools import partial
@@ -17,15 +17,16 @@ from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, Co
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import arm_joints
+from manipcli.plan.contents import contents_of
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
+from manipcli.plan.lifts_off import freed
 from manipcli.plan.links_apart import links_apart
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_search import PathSearch
-from manipcli.scene.scene import Interior, Scene
+from manipcli.scene.scene import Scene
 from manipcli.scene.start_overlap import TOLERANCE
-from manipcli.shapes.primitives import Cylinder
 from manipcli.spec.keep import KeepSpec
 from manipcli.spec.planner import PlannerSpec
 
@@ -245,33 +246,8 @@ class Planner:
         return self.tool_pose(state).inverse() @ X_WO
 
     def contents(self, state: PlanningState, container: str) -> tuple[str, ...]:
-        """The movable bodies whose centre lies in the interior of this one, and what is heaped on it or on them."""
-        interior = self.scene.body(container).interior
-        if interior is None:
-            return ()
-        X_SW = (self.body_pose(state, container) @ interior.X_OS).inverse()
-        places = {
-            body.name: X_SW @ X_WO @ Transform.of(xyz=body.centre)
-            for body, X_WO in zip(self.scene.movable, state.bodies, strict=True)
-            if body.name != container
-        }
-        found = {name for name, X_SP in places.items() if interior.contains(X_SP.p)}
-        above = {name for name, X in places.items() if name not in found and self._heaped(interior, name, X)}
-        while on := {name for name in above if self._touches(state, name, {container, *found})}:
-            found |= on
-            above -= on
-        return tuple(name for name in places if name in found)
-
-    def _heaped(self, interior: Interior, name: str, X_SP: Transform) -> bool:
-        """Whether a body is above the interior, by no more than its own size."""
-        depth = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
-        high = float(X_SP.p[2]) - depth / 2.0
-        flat = Transform.of(xyz=(X_SP.p[0], X_SP.p[1], 0.0))
-        return 0.0 <= high <= float(np.max(self.scene.body(name).size)) and interior.contains(flat.p)
-
-    def _touches(self, state: PlanningState, name: str, others: Set[str]) -> bool:
-        """Whether a movable body touches one of the others."""
-        return any(name in pair and not others.isdisjoint(pair) for pair in self.touching(state, name))
+        """The movable bodies in a container; see `contents_of`."""
+        return contents_of(self, state, container)
 
     def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
         """Collision query in this state with the scene and the robot itself, with the clearances of the task.
@@ -340,7 +316,7 @@ class Planner:
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
         hint = NO_WAY_AROUND
         if begins and held and carried is not None:
-            hint = f"`lift` '{carried.body}' first"
+            hint = freed(self.scene, partial(self.body_pose, state), carried.body, hit)
         elif hit.a.startswith(ROBOT) and hit.b.startswith(ROBOT):
             hint = links_apart(hit) if begins else f"{NO_WAY_AROUND}; or {links_apart(hit)}"
         elif begins and state.at_start:

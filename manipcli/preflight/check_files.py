@@ -20,6 +20,7 @@ from manipcli.spec import load
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.source.tree import Plain
+from manipcli.task.lint import lint
 from manipcli.task.load_task import load_task
 from manipcli.task.robot_file import read_robot
 from manipcli.task.task import Task
@@ -72,7 +73,7 @@ def _findings(
         kind = load.kind_of(path)
         if kind == "task":
             task = of_task(path)
-            return (*task.findings, *preflight_findings(task, margins=True, on_progress=on_progress))
+            return (*task.findings, *lint(task), *preflight_findings(task, margins=True, on_progress=on_progress))
         if kind == "controllers":
             return load.load_controllers(path, model=controllers_spec()).findings
         file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)

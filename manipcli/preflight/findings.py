@@ -43,7 +43,10 @@ def preflight_findings(
     physics = ENGINES[task.spec.simulation.engine].physics == "full"
     for check in checks:
         if (plan is not None or not check.needs_plan) and (physics or not check.needs_physics):
-            found += check.findings(subject)
+            new = tuple(check.findings(subject))
+            found += new
+            if check.ends and new:
+                break
     if margins and plan is not None:
         found += _grasp_margins(task, plan)
     return tuple(found)

@@ -176,6 +176,7 @@ class Check:
         findings: (subject) -> warnings, each at its place in its file.
         needs_plan: skipped for a task that could not be planned.
         needs_physics: skipped for an engine without physics, where tracking is ideal.
+        ends: with a finding of it, the checks after it have no meaning.
     """
 
     name: str
@@ -183,6 +184,7 @@ class Check:
     findings: Callable[[Subject], Iterable[Diagnostic]]
     needs_plan: bool = False
     needs_physics: bool = True
+    ends: bool = False
 
 
 def once(findings: Iterable[tuple[str, Diagnostic]]) -> Iterator[Diagnostic]:

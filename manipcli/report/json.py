@@ -37,9 +37,10 @@ def render_errors(
     return dumps({**_object(None, findings, verdict=verdict), **(known or {})})
 
 
-def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
-    """The JSON object of checked files; `failed` if at least one finding is an error."""
-    failed = any(finding.severity == "error" for finding in findings)
+def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, strict: bool = False) -> str:
+    """The JSON object of checked files; `failed` if a finding is an error, with `strict` also if one is a warning."""
+    failing = ("error", "warning") if strict else ("error",)
+    failed = any(finding.severity in failing for finding in findings)
     return dumps(
         {
             "verdict": "failed" if failed else "passed",
@@ -79,16 +80,15 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
     """The object of `run` and `judge`, with all its keys in a fixed order."""
     empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
-    found |= {"self_contacts": [], "holding": [], "steps": [], "expectations": [], "candidates": []}
+    found |= {"self_contacts": [], "holding": [], "steps": [], "expectations": [], "implied": [], "candidates": []}
     if judged is not None:
         found |= picked(judged, "task verdict text seed engine simulated_time")
         found["saturated"] = saturated_object(judged.saturations)
         found["self_contacts"] = plain(judged.self_contacts)
         found["holding"] = plain(judged.holding)
         found["steps"] = [step_object(step) for step in judged.steps]
-        found["expectations"] = [
-            picked(expectation, "name outcome margin unit at text") for expectation in judged.expectations
-        ]
+        for key, outcomes in (("expectations", judged.expectations), ("implied", judged.implied)):
+            found[key] = [picked(each, "name outcome margin unit at text") for each in outcomes]
         found["candidates"] = plain(judged.candidates)
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}

@@ -42,11 +42,11 @@ def render_verdict(verdict: Verdict, log: str) -> str:
     return "\n".join([*_verdict(verdict, f"{verdict.simulated_time:.2f} s simulated"), f"log: {log}"])
 
 
-def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
-    """All findings of the checked files, then one line with their number."""
+def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, strict: bool = False) -> str:
+    """All findings of the checked files, then one line with their number; with `strict`, warnings fail."""
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = sum(finding.severity == "warning" for finding in findings)
-    mark, word = (FAIL, "failed") if errors else (PASS, "passed")
+    mark, word = (FAIL, "failed") if errors or (strict and warnings) else (PASS, "passed")
     summary = f"{mark} {word}: {number_of(len(files), 'file')} checked, {number_of(errors, 'error')}"
     if warnings:
         summary += f", {number_of(warnings, 'warning')}"
@@ -105,7 +105,7 @@ def _causes(verdict: Verdict) -> list[str]:
     ]
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
-        for expectation in verdict.expectations
+        for expectation in (*verdict.expectations, *verdict.implied)
         if expectation.outcome != "passed"
     ]
     return causes

@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.saturation import EFFORT
 from manipcli.core.geometry import Array
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.motor_limits import motor_effort_limits
 from manipcli.simulate.session import Session
 
 FALLEN: Final = 0.02

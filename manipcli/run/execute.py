@@ -21,6 +21,7 @@ from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
 from manipcli.run.saturation_counts import saturations_of
 from manipcli.run.step_loop import StepLoop
+from manipcli.scene.drop_test import SETTLED_SHIFT
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
@@ -30,8 +31,6 @@ from manipcli.task.task import Task
 
 SETTLED_SPEED: Final = 0.02
 """Bodies slower than this [m/s] have settled."""
-SETTLED_SHIFT: Final = 0.01
-"""Largest displacement [m] of a body while settling."""
 
 
 def build_manager(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:

@@ -220,5 +220,6 @@ def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:
                 f"expect.{e.name}": f"{e.outcome} {'' if e.margin is None else repr(e.margin)} {e.unit}".strip()
                 for e in verdict.expectations
             },
+            **{f"implied.{e.name}": f"{e.outcome} {e.margin!r}" for e in verdict.implied},
         }
     }

@@ -13,6 +13,8 @@ from manipcli.shapes.proximity import coal_shape, distance
 
 FORMED: Final = ("urdf", "mesh")
 """Kinds of bodies whose top may be below that of their bounding box: a drawer, a shelf."""
+SETTLED_SHIFT: Final = 0.01
+"""[m] Largest displacement of a body while settling before a run."""
 GRAZES: Final = 1e-5
 """[m] Smaller overlaps are ignored, so that a body flush with a wall slides down along it."""
 LEAST: Final = 2e-4

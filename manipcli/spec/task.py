@@ -10,7 +10,7 @@ import math
 import re
 from typing import Annotated, ClassVar, Final
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, StrictBool, field_validator, model_validator
 
 from manipcli.core.text import escape
 from manipcli.spec.agree import AgreeSpec
@@ -23,6 +23,7 @@ from manipcli.spec.expression import NAME as PARAM
 from manipcli.spec.names import PoseName
 from manipcli.spec.plan import PlanSpec
 from manipcli.spec.planner import PlannerSpec
+from manipcli.spec.quantity import Share
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.recording import JUDGED, SLOWEST, RecordSpec
 from manipcli.spec.robot import Version
@@ -86,6 +87,12 @@ class TaskSpec(Model):
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
     baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")
+    saturation: StrictBool | Annotated[Share, Field(gt=0, le=1)] = Field(
+        True,
+        description="Largest share of the ticks of a step in which a motor may be at its effort limit, for all joints "
+        "but those of hands: more fails the run, as an expectation that is not written. `false`: not judged. "
+        "Default true: 20 %.",
+    )
     plan: PlanSpec = Field(PlanSpec(), description="How the plan is chosen.")
     agree: AgreeSpec = Field(AgreeSpec(), description="Allowed differences between the runs of several engines.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")

@@ -125,10 +125,15 @@ def _refused(body: Model, scene: Scene, held: Holding, before: Sequence[Model]) 
     match body:
         case PourSpec(object=name, into=into):
             yield from _unpourable(scene, name, into, before)
-        case PlaceSpec(object=name, onto=str(onto)):
-            lack = _too_large(scene.body(name), scene.body(onto))
+        case PlaceSpec(object=name, support=str(under)):
+            lack = _too_large(scene.body(name), scene.body(under))
             if lack:
-                yield "onto", TOO_SMALL, f"'{name}' does not fit into '{onto}': {lack}", "choose a larger container"
+                yield (
+                    body.support_key,
+                    TOO_SMALL,
+                    f"'{name}' does not fit into '{under}': {lack}",
+                    "choose a larger container",
+                )
 
 
 def _unpourable(scene: Scene, name: str, into: str, before: Sequence[Model]) -> Iterator[Refusal]:

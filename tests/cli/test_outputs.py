@@ -9,6 +9,8 @@ from typing import NoReturn
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.cli.outputs import check_outputs
+from manipcli.core.errors import InvalidInput
 from manipcli.record.faults import RecordingFailed
 
 TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"
@@ -115,3 +117,12 @@ def test_a_run_whose_log_the_disk_refused_is_not_told_by_the_page_of_an_earlier_
     for path in (folder / "report.html", folder / "junit.xml"):
         assert path.exists() == room
         assert not room or "recording stopped at t = 1.500 s" in path.read_text("utf-8")
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a file system that refuses new files")
+def test_a_folder_that_refuses_files_is_found_before_the_run(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        check_outputs(("--report", Path("/proc/x.html")))
+    assert caught.value.findings[0].code == "USE082"
+    check_outputs(("--report", tmp_path / "x.html"))
+    assert not [path for path in tmp_path.iterdir() if "x.html" in path.name]

@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.control.actuation import STIFFNESS, Actuation, motor_effort_limits
+from manipcli.control.actuation import STIFFNESS, Actuation
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial, Joint, JointLimits, Link, TransmissionTag
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.motor_limits import motor_effort_limits
 from manipcli.model.robot import Actuator, RobotModel
 
 PERIOD = 1e-3

@@ -245,7 +245,7 @@ def test_all_findings_of_a_file_come_at_once_each_with_its_place():
         "joint 'mount' is fixed",
         "joint 'follower' mimics 'left_1'",
         "'left_1' has gains, but is not a joint of the controller",
-        "joint 'elbwo' has no gains",
+        "joint 'elbow' has no gains",
         "joint 'left_2' has no gains",
     ):
         assert part in texts
@@ -263,9 +263,9 @@ def test_a_joint_that_nobody_commands_is_a_warning_and_braked():
 
 
 def test_gains_of_no_joint_of_the_controller_point_to_a_joint_without_gains():
-    misspelt = spec(hand={"joints": ["lfet_1", "left_2"], "gains": gains(["left_1", "left_2"])})
+    misspelt = spec(hand={"joints": ["left_1", "left_2"], "gains": gains(["lfet_1", "left_2"])})
     hints = {finding.code: finding.hint for finding in findings(misspelt)}
-    assert hints["CTRL102"] == "did you mean 'lfet_1'?"
+    assert hints["CTRL102"] == "did you mean 'left_1'?"
     spare = spec(hand={"joints": ["left_2"], "gains": gains(["left_1", "left_2"])})
     hints = {finding.code: finding.hint for finding in findings(spare)}
     assert hints["CTRL102"] == "remove them, or add 'left_1' to `joints`"
@@ -353,3 +353,18 @@ def test_a_position_controller_is_not_told_the_velocity_and_effort_of_the_one_be
     manager.switch_to(["plain"], time=1.5)
     assert manager.update(1.5, world).effort[0] == 0.0
     assert command.modes == ("position",)
+
+
+@pytest.mark.parametrize(
+    ("arm", "code", "hint"),
+    [
+        ({"joints": ["shoulder", "elbwo"], "gains": gains(["shoulder", "elbow"])}, "CTRL144", "did you mean 'elbow'?"),
+        ({"joints": ["shoulder", "elbwo"], "gains": gains(["shoulder", "elbwo"])}, "CTRL144", "did you mean 'elbow'?"),
+        ({"joints": ["shoulder", "j2"], "gains": gains(["shoulder", "elbow"])}, "CTRL144", "did you mean 'elbow'?"),
+        ({"joints": ["shoulder", "elbow"], "gains": gains(["shoulder", "elbwo"])}, "CTRL102", "did you mean 'elbow'?"),
+    ],
+)
+def test_one_misspelt_joint_is_one_error(arm, code, hint):
+    hand = {"joints": ["left_1", "left_2", "right_1"], "gains": gains(["left_1", "left_2", "right_1"])}
+    found = [finding for finding in findings(spec(arm=arm, hand=hand)) if finding.severity == "error"]
+    assert [(finding.code, finding.hint) for finding in found] == [(code, hint)]

@@ -28,6 +28,7 @@ def check(
             "--collisions", help="Show the self-collision matrix of the robot of one robot file, URDF or task."
         ),
     ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Fail on warnings, too.")] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -39,7 +40,8 @@ def check(
 
     The kind (task, robot, controllers) is read from each file; --set, --seed and --sample apply to the tasks among
     them. A task is planned, and gains, motors and grasps are examined over the plan; a step that cannot be planned is
-    an error. A controllers file does not name a robot: check a task that names both to compare joints and gains.
+    an error. With --strict, warnings fail, too. A controllers file does not name a robot: check a task that names both
+    to compare joints and gains.
     """
     from manipcli import pipeline
     from manipcli.report import json, text
@@ -58,12 +60,13 @@ def check(
             on_progress=progress.activity,
         )
     failed = any(finding.severity == "error" for finding in findings)
+    refused = failed or (strict and any(finding.severity == "warning" for finding in findings))
     kinds = () if failed else [pipeline.kind_of(file) for file in files]
     if (overrides or seed is not None or sample is not None) and not failed and "task" not in kinds:
         raise InvalidInput([Diagnostic("USE052", "--set, --seed and --sample need a task; no file is a task")])
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings
-    text_ = render(findings, names)
+    text_ = render(findings, names, strict=strict)
     if format_ == "text" and kinds == ["robot"]:
         rows = pipeline.inertials(files[0], package_path=tuple(package_path or ()), allow_outside=allow_outside)
         text_ = f"{render_table(rows)}\n\n{text_}" if rows else text_
@@ -72,7 +75,7 @@ def check(
         return ExitCode.USAGE
     if "controllers" in kinds and "task" not in kinds:
         console.talk("joints and gains of controllers were not compared with a robot: check a task that names both")
-    return ExitCode.FAILED if failed else ExitCode.PASSED
+    return ExitCode.FAILED if refused else ExitCode.PASSED
 
 
 def _self_collisions(

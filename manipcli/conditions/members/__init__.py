@@ -18,6 +18,7 @@ from manipcli.conditions.members.limits import LIMITS
 from manipcli.conditions.members.moved import MOVED, UNMOVED
 from manipcli.conditions.members.near import NEAR
 from manipcli.conditions.members.rests_on import RESTS_ON
+from manipcli.conditions.members.saturation import SATURATION
 from manipcli.conditions.members.slip import SLIP
 from manipcli.conditions.members.step_done import STEP_DONE
 from manipcli.conditions.members.tool_speed import TOOL_SPEED
@@ -30,6 +31,6 @@ CONDITIONS: Seam[Condition[Any]] = Seam(
     kind="condition",
     members=(
         INSIDE, OUTSIDE, UPRIGHT, NEAR, ABOVE, RESTS_ON, AT_REST, MOVED, UNMOVED, GRASPED, SLIP, CONTACT_FORCE,
-        COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
+        COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, SATURATION, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
     ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ from manipcli.preflight.checks import (
     deadlines,
     error_dynamics,
     gain_stability,
+    goal_tolerances,
     grip_force_limit,
     grip_friction,
     grip_stiffness,
@@ -16,6 +17,8 @@ from manipcli.preflight.checks import (
     overlapping_start,
     position_grips,
     rotation_slip,
+    round_trips,
+    unsupported,
     velocity_gains,
 )
 from manipcli.preflight.preflight import Check
@@ -23,6 +26,7 @@ from manipcli.preflight.preflight import Check
 PREFLIGHT_CHECKS: Seam[Check] = Seam(
     kind="preflight check",
     members=(
+        round_trips.CHECK,
         closing_speed.CHECK,
         deadlines.CHECK,
         idle_keeps.CHECK,
@@ -36,7 +40,9 @@ PREFLIGHT_CHECKS: Seam[Check] = Seam(
         velocity_gains.CHECK,
         error_dynamics.CHECK,
         insufficient_effort.CHECK,
+        goal_tolerances.CHECK,
         inert_actuators.CHECK,
         overlapping_start.CHECK,
+        unsupported.CHECK,
     ),
 )

@@ -13,9 +13,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand
 from manipcli.core.geometry import Array
+from manipcli.model.motor_limits import motor_effort_limits
 from manipcli.model.robot import RobotModel
 from manipcli.simulate.engines.conventions import POSITION_TIME, UNLIMITED_EFFORT
 

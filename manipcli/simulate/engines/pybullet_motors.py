@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 from types import ModuleType
 
-from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand, Mode
+from manipcli.model.motor_limits import motor_effort_limits
 from manipcli.model.robot import RobotModel
 from manipcli.simulate.engines.conventions import POSITION_TIME, UNLIMITED_EFFORT
 
