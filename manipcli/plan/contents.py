@@ -1,48 +1,56 @@
-"""What a container holds in a planned state."""
+"""What a container holds."""
 
 from __future__ import annotations
 
-from collections.abc import Set
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
 from manipcli.core.geometry import Transform
-from manipcli.plan.motion import PlanningState
-from manipcli.scene.scene import Interior
+from manipcli.model.collision import Pair
+from manipcli.scene.scene import Body, Interior, Scene
 from manipcli.shapes.primitives import Cylinder
 
-if TYPE_CHECKING:
-    from manipcli.plan.planner import Planner
+Touching = Callable[[str], Set[Pair]]
+"""The pairs of a movable body with what it touches."""
 
 
-def contents_of(planner: Planner, state: PlanningState, container: str) -> tuple[str, ...]:
-    """The movable bodies whose centre lies in the interior of this one, and what is heaped on it or on them."""
-    interior = planner.scene.body(container).interior
+def contents_of(
+    scene: Scene, container: Body, X_WC: Transform, bodies: Sequence[Transform], touching: Touching
+) -> tuple[str, ...]:
+    """The movable bodies whose centre lies in the interior of a container, and what is heaped on it or on them.
+
+    Args:
+        scene: the scene.
+        container: a body, at X_WC.
+        bodies: X_WO of the movable bodies.
+        touching: see `Touching`.
+    """
+    interior = container.interior
     if interior is None:
         return ()
-    X_SW = (planner.body_pose(state, container) @ interior.X_OS).inverse()
+    X_SW = (X_WC @ interior.X_OS).inverse()
     places = {
         body.name: X_SW @ X_WO @ Transform.of(xyz=body.centre)
-        for body, X_WO in zip(planner.scene.movable, state.bodies, strict=True)
-        if body.name != container
+        for body, X_WO in zip(scene.movable, bodies, strict=True)
+        if body.name != container.name
     }
     found = {name for name, X_SP in places.items() if interior.contains(X_SP.p)}
-    above = {name for name, X in places.items() if name not in found and _heaped(planner, interior, name, X)}
-    while on := {name for name in above if _touches(planner, state, name, {container, *found})}:
+    above = {name for name, X in places.items() if name not in found and _heaped(interior, scene.body(name), X)}
+    while on := {name for name in above if _touches(touching(name), name, {container.name, *found})}:
         found |= on
         above -= on
     return tuple(name for name in places if name in found)
 
 
-def _heaped(planner: Planner, interior: Interior, name: str, X_SP: Transform) -> bool:
+def _heaped(interior: Interior, body: Body, X_SP: Transform) -> bool:
     """Whether a body is above the interior, by no more than its own size."""
     depth = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
     high = float(X_SP.p[2]) - depth / 2.0
     flat = Transform.of(xyz=(X_SP.p[0], X_SP.p[1], 0.0))
-    return 0.0 <= high <= float(np.max(planner.scene.body(name).size)) and interior.contains(flat.p)
+    return 0.0 <= high <= float(np.max(body.size)) and interior.contains(flat.p)
 
 
-def _touches(planner: Planner, state: PlanningState, name: str, others: Set[str]) -> bool:
-    """Whether a movable body touches one of the others."""
-    return any(name in pair and not others.isdisjoint(pair) for pair in planner.touching(state, name))
+def _touches(pairs: Set[Pair], name: str, others: Set[str]) -> bool:
+    """Whether a body touches one of the others."""
+    return any(name in pair and not others.isdisjoint(pair) for pair in pairs)

@@ -247,7 +247,8 @@ class Planner:
 
     def contents(self, state: PlanningState, container: str) -> tuple[str, ...]:
         """The movable bodies in a container; see `contents_of`."""
-        return contents_of(self, state, container)
+        body, X_WC = self.scene.body(container), self.body_pose(state, container)
+        return contents_of(self.scene, body, X_WC, state.bodies, partial(self.touching, state))
 
     def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
         """Collision query in this state with the scene and the robot itself, with the clearances of the task.
