@@ -10,6 +10,8 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.evaluate import examine
+from manipcli.judge.outside import not_asked, unless_outside
+from manipcli.judge.part import PART, RunPart
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
@@ -29,7 +31,8 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
 
     In this order: a run that was interrupted or did not finish, or whose log is incomplete, is an `error`; a step that
     is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`); an expectation that fails or is
-    not evaluated makes it `failed`. Without expectations only the steps count, and the text says so.
+    not evaluated makes it `failed`. Of a part of a task, steps outside of it and expectations that concern them do not
+    count (see `judge/outside.py`). Without expectations only the steps count, and the text says so.
 
     Args:
         recording: the log.
@@ -49,10 +52,20 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         physics=run.get("physics", "") == "full",
         steps=steps,
     )
+    part = RunPart.from_metadata(recording.metadata[PART]) if PART in recording.metadata else None
+    steps = not_asked(steps, part)
     outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes)
+    if part is not None:
+        outcomes = tuple(
+            unless_outside(outcome, spec, part, steps, CONDITIONS)
+            for outcome, spec in zip(outcomes, expect, strict=True)
+        )
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
-    word, text = _verdict(errors, cause, steps, outcomes)
+    asked = tuple(step for step in steps if not step.excused)
+    word, text = _verdict(errors, cause, asked, tuple(one for one in outcomes if not one.excused))
+    if part is not None:
+        text = f"{text}; {part}"
     return Verdict(
         task=run.get("task", ""),
         verdict=word,
@@ -67,6 +80,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
         holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
+        part=part,
     )
 
 

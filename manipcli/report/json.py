@@ -90,6 +90,8 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
             picked(expectation, "name outcome margin unit at text") for expectation in judged.expectations
         ]
         found["candidates"] = plain(judged.candidates)
+        if judged.part is not None:
+            found["part"] = plain(judged.part)
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
     return {**found, **known, "errors": plain(errors)}

@@ -106,7 +106,7 @@ def _expectation(verdict: Verdict, expectation: ExpectationOutcome, attributes: 
             [margin, when],
         )
     elif expectation.outcome == "not_evaluated":
-        excused = verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
+        excused = expectation.excused or verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
         message = f"expectation '{expectation.name}' was never evaluated: {expectation.text}"
         _add(case, "skipped" if excused else "failure", message, "not_evaluated", [])
     elif margin:

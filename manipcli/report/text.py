@@ -139,7 +139,7 @@ def _summary(verdict: Verdict) -> str:
 def steps_table(steps: Sequence[StepOutcome]) -> str:
     rows = [
         (
-            f"{PASS if step.outcome == 'done' else FAIL} {_word(step)}{_tries(step)}",
+            f"{PASS if step.outcome == 'done' else '-' if step.excused else FAIL} {_word(step)}{_tries(step)}",
             step.id,
             step.verb,
             _seconds(step.started),
@@ -154,7 +154,8 @@ def steps_table(steps: Sequence[StepOutcome]) -> str:
 def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
     rows = [
         (
-            f"{PASS if expectation.outcome == 'passed' else FAIL} {expectation.outcome.replace('_', ' ')}",
+            f"{PASS if expectation.outcome == 'passed' else '-' if expectation.excused else FAIL} "
+            f"{expectation.outcome.replace('_', ' ')}",
             expectation.name,
             _margin(expectation),
         )

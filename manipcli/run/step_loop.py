@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Final
 
@@ -23,6 +23,7 @@ from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
+from manipcli.run.restore import RESUMED
 from manipcli.run.saturation_counts import saturated_since, saturations_of
 from manipcli.run.step_results import not_placed, not_poured, not_squeezed
 from manipcli.simulate.engines import ENGINES
@@ -93,7 +94,12 @@ class StepLoop:
         """Run all steps in order, until a step fails without being tolerated, or a watch is broken."""
         total = len(self._plan.steps)
         planned_start = self._plan.start
+        part = self._task.part
+        if part.state is not None:
+            self._resume(self._plan.steps[part.first])
         for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
+            if not part.done(index):
+                continue
             self._progress.step_started(planned, index, total)
             outcome = self._step(index, step, planned, planned_start)
             self._progress.step_ended(outcome)
@@ -105,6 +111,12 @@ class StepLoop:
             self._executor.hold(AFTERMATH)
         except Alarmed:
             self._executor.stop()
+
+    def _resume(self, first: PlannedStep) -> None:
+        """Let the forces return before the first step of a run that begins with the state of another run."""
+        self._attaching.resumed(first)
+        with suppress(Alarmed):
+            self._executor.hold(RESUMED)
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: PlanningState) -> StepOutcome:
         """All attempts at a step. A broken watch ends the step at once; the stopping motion follows the step."""
