@@ -63,7 +63,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     asked = tuple(step for step in steps if not step.excused)
-    word, text = _verdict(errors, cause, asked, tuple(one for one in outcomes if not one.excused))
+    word, text = _verdict(errors, cause, asked, outcomes)
     if part is not None:
         text = f"{text}; {part}"
     return Verdict(
@@ -156,7 +156,8 @@ def _verdict(
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
     if not steps:
         return "failed", "the recording has no steps"
-    unmet = next((expectation for expectation in expectations if expectation.outcome != "passed"), None)
+    asked = [expectation for expectation in expectations if not expectation.excused]
+    unmet = next((expectation for expectation in asked if expectation.missed), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
@@ -166,5 +167,9 @@ def _verdict(
         done = f"{len(steps) - len(failed)} of {len(steps)} steps done, failure of {listed(failed)} tolerated"
     if not expectations:
         return "passed", f"{done}; the task has no expectations"
-    met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "1 expectation met"
+    if not asked:
+        return "passed", f"{done}, no expectation evaluated"
+    met = f"all {len(asked)} expectations met" if len(asked) > 1 else "1 expectation met"
+    if len(asked) < len(expectations):
+        met = f"{len(asked)} of {len(expectations)} expectations met, the others not evaluated"
     return "passed", f"{done}, {met}"

@@ -27,12 +27,14 @@ def not_asked(steps: tuple[StepOutcome, ...], part: RunPart | None) -> tuple[Ste
     ids = [step.id for step in steps]
     first = ids.index(part.first) if part.first in ids else 0
     last = ids.index(part.last) if part.last in ids else len(ids) - 1
-    return tuple(
-        step
-        if first <= k <= last
-        else replace(step, excused=True, planned_duration=None, text=_why(part, before=k < first))
-        for k, step in enumerate(steps)
-    )
+    found = []
+    for k, step in enumerate(steps):
+        if first <= k <= last:
+            found.append(step)
+        else:
+            why = _why(part, before=k < first)
+            found.append(replace(step, excused=True, planned_duration=None, text=why))
+    return tuple(found)
 
 
 def _why(part: RunPart, *, before: bool) -> str:

@@ -99,6 +99,11 @@ class ExpectationOutcome:
     excused: bool = False
 
     @property
+    def missed(self) -> bool:
+        """Whether it is not met, and the run was asked to do what it concerns."""
+        return self.outcome != "passed" and not self.excused
+
+    @property
     def distance(self) -> float:
         """|margin| in `unit`; 0 if it is too small to show, or if there is no unit."""
         size = abs(self.margin or 0.0)
@@ -142,5 +147,5 @@ class Verdict:
         """Whether the run ended before its first step or after its last, so that no step or expectation shows why."""
         if any(step.went_wrong for step in self.steps):
             return False
-        undone = any(step.outcome == "not_run" for step in self.steps)
-        return undone or all(expectation.outcome == "passed" for expectation in self.expectations)
+        undone = any(step.outcome == "not_run" and not step.excused for step in self.steps)
+        return undone or not any(expectation.missed for expectation in self.expectations)

@@ -81,7 +81,7 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
     took = 0.0 if step.started is None or step.ended is None else step.ended - step.started
     case = _case(verdict, "steps", step.id, took, attributes)
     if step.outcome == "not_run":
-        _add(case, "skipped", "not run: the run ended before this step", "", [])
+        _add(case, "skipped", f"not run: {step.text or 'the run ended before this step'}", "", [])
     elif step.tolerated:
         SubElement(case, "system-out").text = safe(f"{step.outcome}, tolerated by the task: {step.text}")
     elif step.outcome != "done":

@@ -106,7 +106,7 @@ def _causes(verdict: Verdict) -> list[str]:
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
         for expectation in verdict.expectations
-        if expectation.outcome != "passed"
+        if expectation.missed
     ]
     return causes
 
@@ -154,7 +154,7 @@ def steps_table(steps: Sequence[StepOutcome]) -> str:
 def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
     rows = [
         (
-            f"{PASS if expectation.outcome == 'passed' else '-' if expectation.excused else FAIL} "
+            f"{PASS if expectation.outcome == 'passed' else '-' if not expectation.missed else FAIL} "
             f"{expectation.outcome.replace('_', ' ')}",
             expectation.name,
             _margin(expectation),
@@ -168,7 +168,7 @@ def _margin(expectation: ExpectationOutcome) -> str:
     """`passes with 4.1 mm to spare (tightest at 17.32 s)`, `fails by ...`, or why it has no margin."""
     detail = f": {expectation.text}" if expectation.text else ""
     if expectation.outcome == "not_evaluated":
-        return f"was never evaluated{detail}"
+        return f"{'not evaluated' if expectation.excused else 'was never evaluated'}{detail}"
     passed = expectation.outcome == "passed"
     when = "" if expectation.at is None else f" ({'tightest' if passed else 'worst'} at {expectation.at:.2f} s)"
     if not expectation.distance:
