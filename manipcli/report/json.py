@@ -77,7 +77,7 @@ def picked(value: object, keys: str) -> dict[str, Json]:
 
 def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json) -> dict[str, Json]:
     """The object of `run` and `judge`, with all its keys in a fixed order."""
-    empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
+    empty = "task verdict text seed engine sample part simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
     found |= {"self_contacts": [], "holding": [], "steps": [], "expectations": [], "candidates": []}
     if judged is not None:
