@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from itertools import islice
 from typing import Final
 
 from manipcli.control.action import GoalHandle
@@ -93,13 +94,13 @@ class StepLoop:
     def steps(self) -> None:
         """Run all steps in order, until a step fails without being tolerated, or a watch is broken."""
         total = len(self._plan.steps)
-        planned_start = self._plan.start
-        part = self._task.part
-        if part.state is not None:
-            self._resume(self._plan.steps[part.first])
-        for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
-            if not part.done(index):
-                continue
+        planned_start, part = self._plan.start, self._task.part
+        if part.state is not None:  # let the forces return
+            self._attaching.resumed(self._plan.steps[part.first])
+            with suppress(Alarmed):
+                self._executor.hold(RESUMED)
+        every = enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True))
+        for index, (step, planned) in islice(every, part.first, part.last):
             self._progress.step_started(planned, index, total)
             outcome = self._step(index, step, planned, planned_start)
             self._progress.step_ended(outcome)
@@ -111,12 +112,6 @@ class StepLoop:
             self._executor.hold(AFTERMATH)
         except Alarmed:
             self._executor.stop()
-
-    def _resume(self, first: PlannedStep) -> None:
-        """Let the forces return before the first step of a run that begins with the state of another run."""
-        self._attaching.resumed(first)
-        with suppress(Alarmed):
-            self._executor.hold(RESUMED)
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: PlanningState) -> StepOutcome:
         """All attempts at a step. A broken watch ends the step at once; the stopping motion follows the step."""

@@ -25,10 +25,6 @@ class Part:
     until: str = ""
     state: StartState | None = None
 
-    def done(self, k: int) -> bool:
-        """Whether the run does step k."""
-        return self.first <= k and (self.last is None or k < self.last)
-
     @property
     def described(self) -> RunPart | None:
         """For log and verdict; None for a whole run."""
