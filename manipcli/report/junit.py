@@ -56,6 +56,8 @@ def render_junit(
     for name, value in values:
         if value:
             SubElement(properties, "property", {"name": name, "value": safe(value)})
+    if verdict.part is not None:
+        SubElement(properties, "property", {"name": "part", "value": safe(str(verdict.part))})
     for held in verdict.holding:
         SubElement(properties, "property", {"name": "holding", "value": safe(held)})
     suite.extend(cases)

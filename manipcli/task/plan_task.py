@@ -201,6 +201,7 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
         text=f"{reason}: {refusal}",
         drawn=task.drawn,
         candidates=refusal.candidates,
+        part=task.part.described,
     )
 
 
