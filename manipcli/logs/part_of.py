@@ -16,12 +16,14 @@ from manipcli.core.text import did_you_mean, listed
 from manipcli.judge.part import PART, RunPart
 from manipcli.judge.steps import step_outcomes
 from manipcli.model.grasp import GRIP_FORCE, pinch_force
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.channels import TF
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span
 from manipcli.record.start_state import START_STATE, StartState
+from manipcli.scene.scene import Scene
 from manipcli.spec.task import TaskSpec
 from manipcli.task.part import WHOLE, Part
 from manipcli.task.task import Task
@@ -50,7 +52,7 @@ def task_part(task: Task, *, first: str | None, last: str | None, log: Path) -> 
     return Part(begin, end, last or "", state)
 
 
-def recorded_part(recording: Recording, path: Path, spec: TaskSpec) -> Part:
+def recorded_part(recording: Recording, path: Path, spec: TaskSpec, robot: RobotModel, scene: Scene) -> Part:
     """The part of its task that the run of a log did.
 
     Raises:
@@ -60,17 +62,30 @@ def recorded_part(recording: Recording, path: Path, spec: TaskSpec) -> Part:
         return WHOLE
     part = RunPart.from_metadata(recording.metadata[PART])
     ids = [step.id for step in spec.steps]
-    content = recording.attachments.get(START_STATE)
+    state = _recorded_state(recording, path)
     unknown = [name for name in (part.first, part.last) if name and name not in ids]
-    try:
-        state = None if content is None else StartState.from_json(content)
-    except ValueError as error:
-        raise InvalidInput([Diagnostic("LOG103", f"{path.name} {error}")]) from None
-    if unknown or (state is None) != (not part.first):
-        what = f"names step '{unknown[0]}', which its task does not have" if unknown else "has no start state"
-        raise InvalidInput([Diagnostic("LOG103", f"{path.name} {what}")])
+    if unknown:
+        raise _damaged(path, f"names step '{unknown[0]}', which its task does not have")
+    if (state is None) != (not part.first):
+        raise _damaged(path, "has no start state")
+    bodies = tuple(body.name for body in scene.movable)
+    if state is not None and (state.joints, state.bodies) != (robot.joint_names, bodies):
+        raise _damaged(path, "has a start state of other joints or bodies")
     end = ids.index(part.last) + 1 if part.last else None
     return Part(ids.index(part.first) if part.first else 0, end, part.last, state)
+
+
+def _recorded_state(recording: Recording, path: Path) -> StartState | None:
+    """The state in which the run of a log began, if it was that of another run."""
+    content = recording.attachments.get(START_STATE)
+    try:
+        return None if content is None else StartState.from_json(content)
+    except ValueError as error:
+        raise _damaged(path, str(error)) from None
+
+
+def _damaged(path: Path, why: str) -> InvalidInput:
+    return InvalidInput([Diagnostic("LOG103", f"{path.name} {why}")])
 
 
 def _index(task: Task, name: str, option: str) -> int:
@@ -175,8 +190,8 @@ class _StateOf:
     def _closed(self, recording: Recording, time: float) -> bool:
         """Whether the hand was closed to hold something: the last motion of the hand in the steps done before."""
         ran = {outcome.id for outcome in step_outcomes(recording, interrupted=True) if _ended(outcome.ended, time)}
-        origin = recording.attachments.get(START_STATE)
-        closed = origin is not None and StartState.from_json(origin).closed
+        origin = _recorded_state(recording, self.log)
+        closed = origin is not None and origin.closed
         for motion in _motions(recording, ran):
             if "attaches" in motion or ("hand" in motion and motion.get("force") is not None):
                 closed = True

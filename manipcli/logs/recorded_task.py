@@ -102,7 +102,7 @@ def recorded_task(
         scene=scene,
         findings=(*task.findings, *robot_file.findings, *controllers.findings, *found),
         places=_places(recording, path, task.spec),
-        part=recorded_part(recording, path, task.spec),
+        part=recorded_part(recording, path, task.spec, robot, scene),
     )
     drawn = _drawn(recording, path)
     if drawn is not None:

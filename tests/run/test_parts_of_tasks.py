@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -259,3 +261,22 @@ def test_a_damaged_state_is_refused(whole: tuple[Path, Verdict, Recording], plac
     for bad in (b"", b"{}", content[:-10], content.replace(b'"position": [', b'"position": [0.0,')):
         with pytest.raises(ValueError, match="damaged"):
             StartState.from_json(bad)
+
+
+def test_a_log_whose_state_was_damaged_is_not_verified(waves: Path, rewrite_log: Any, tmp_path: Path) -> None:
+    log, bad = tmp_path / "part.mcap", tmp_path / "bad.mcap"
+    run_task(waves / "waves.yaml", log=log, from_step="last", state=waves / "whole.mcap")
+
+    def attached(change: Callable[[bytes], bytes | None]) -> Path:
+        return rewrite_log(log, bad, attachment=lambda name, data: change(data) if name == START_STATE else data)
+
+    for change, told in (
+        (lambda _: None, "has no start state"),
+        (lambda data: data[:-10], "has a damaged start_state.json"),
+        (lambda data: data.replace(b'"elbow"', b'"other"'), "has a start state of other joints or bodies"),
+    ):
+        with pytest.raises(InvalidInput, match=told):
+            verify_log(attached(change))
+    rewrite_log(log, bad, metadata=lambda name, values: {**values, "from": "none"} if name == "part" else values)
+    with pytest.raises(InvalidInput, match="names step 'none', which its task does not have"):
+        verify_log(bad)
