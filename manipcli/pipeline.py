@@ -20,6 +20,7 @@ from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
+from manipcli.logs.part_of import task_part
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.model.robot import LinkInertial, RobotModel
@@ -37,7 +38,7 @@ from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
-from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
+from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
@@ -135,6 +136,9 @@ def run_task(
     log: Path | None = None,
     force: bool = False,
     embed_meshes: bool = False,
+    from_step: str | None = None,
+    until: str | None = None,
+    state: Path | None = None,
     progress: Progress = SILENT,
     prepared: Prepared | None = None,
     **options: Unpack[LoadOptions],
@@ -146,6 +150,10 @@ def run_task(
         log: path of the log; default `runs/<task>.mcap`, which is replaced.
         force: replace `log` if it exists.
         embed_meshes: store all mesh files in the log, so that it can be shown without packages.
+        from_step: id of the step at which the run begins, with the state of another run; its log is
+            `runs/<task>@from.mcap` by default.
+        until: id of the step after which the run ends.
+        state: the log with the state before `from_step`; default `runs/<task>.mcap`.
         progress: receives warnings, steps and ticks.
         prepared: the same task, loaded and planned before; ignored if a file has changed.
         options: how the task is loaded, see `LoadOptions`.
@@ -159,6 +167,9 @@ def run_task(
         RecordingFailed: writing the log failed.
     """
     task, loading = timed(_load, path, progress, options, prepared)
+    if from_step is not None or until is not None:
+        origin = state or RUNS / f"{task.name}.mcap"
+        task = replace(task, part=task_part(task, first=from_step, last=until, log=origin))
     (plan, warnings), planning = timed(_plan, task, progress, prepared)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings)

@@ -45,7 +45,7 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
     unmet = [
         Trouble(describe_expectation(expectation), _place(job, task, *key), expectation.at)
         for key, expectation in zip(task.spec.judged_at, verdict.expectations, strict=False)
-        if expectation.outcome != "passed" and not refused
+        if expectation.missed and not refused
     ]
     if verdict.verdict == "error" or verdict.ended_between:
         errors = [Trouble(finding.message, finding.place) for finding in verdict.errors]

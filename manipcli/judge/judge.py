@@ -10,6 +10,8 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.evaluate import examine
+from manipcli.judge.outside import not_asked, unless_outside
+from manipcli.judge.part import PART, RunPart
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
@@ -36,7 +38,8 @@ def judge(
 
     In this order: a run that was interrupted or did not finish, or whose log is incomplete, is an `error`; a step that
     is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`); an expectation that fails or is
-    not evaluated makes it `failed`. Without expectations only the steps count, and the text says so.
+    not evaluated makes it `failed`. Of a part of a task, steps outside of it and expectations that concern them do not
+    count (see `judge/outside.py`). Without expectations only the steps count, and the text says so.
 
     Args:
         recording: the log.
@@ -58,11 +61,21 @@ def judge(
         physics=run.get("physics", "") == "full",
         steps=steps,
     )
+    part = RunPart.from_metadata(recording.metadata[PART]) if PART in recording.metadata else None
+    steps = not_asked(steps, part)
     outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes[: len(expect)])
     unwritten = tuple(each for each in examined.outcomes[len(expect) :] if each.outcome != "not_evaluated")
+    if part is not None:
+        outcomes = tuple(
+            unless_outside(outcome, spec, part, steps, CONDITIONS)
+            for outcome, spec in zip(outcomes, expect, strict=True)
+        )
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
-    word, text = _verdict(errors, cause, steps, outcomes, unwritten)
+    asked = tuple(step for step in steps if not step.excused)
+    word, text = _verdict(errors, cause, asked, outcomes, unwritten)
+    if part is not None:
+        text = f"{text}; {part}"
     return Verdict(
         task=run.get("task", ""),
         verdict=word,
@@ -78,6 +91,7 @@ def judge(
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
         holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
+        part=part,
     )
 
 
@@ -154,7 +168,8 @@ def _verdict(
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
     if not steps:
         return "failed", "the recording has no steps"
-    unmet = next((each for each in (*expectations, *implied) if each.outcome != "passed"), None)
+    asked = [expectation for expectation in (*expectations, *implied) if not expectation.excused]
+    unmet = next((expectation for expectation in asked if expectation.missed), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
@@ -164,5 +179,9 @@ def _verdict(
         done = f"{len(steps) - len(failed)} of {len(steps)} steps done, failure of {listed(failed)} tolerated"
     if not expectations:
         return "passed", f"{done}; the task has no expectations"
-    met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "1 expectation met"
+    if not asked:
+        return "passed", f"{done}, no expectation evaluated"
+    met = f"all {len(asked)} expectations met" if len(asked) > 1 else "1 expectation met"
+    if len(asked) < len(expectations):
+        met = f"{len(asked)} of {len(expectations)} expectations met, the others not evaluated"
     return "passed", f"{done}, {met}"

@@ -9,6 +9,7 @@ from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Diagnostic
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.part import RunPart
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.self_contacts import SelfContact
 
@@ -47,6 +48,7 @@ class StepOutcome:
         attempts: in order.
         tolerated: it failed, and the task tolerates that (`on_fail: continue`).
         replanned: the reason of each re-planning during the run.
+        excused: the run was not asked to do it.
     """
 
     id: str
@@ -59,6 +61,7 @@ class StepOutcome:
     attempts: tuple[Attempt, ...] = ()
     tolerated: bool = False
     replanned: tuple[str, ...] = ()
+    excused: bool = False
 
     @property
     def label(self) -> str:
@@ -83,6 +86,7 @@ class ExpectationOutcome:
         at: [s] the time of the deciding tick.
         text: the measurement.
         relative: the margin divided by its tolerance, to compare margins of different units.
+        excused: it concerns steps that the run was not asked to do, so that its being not evaluated is no failure.
     """
 
     name: str
@@ -92,6 +96,12 @@ class ExpectationOutcome:
     at: float | None
     text: str = ""
     relative: float | None = None
+    excused: bool = False
+
+    @property
+    def missed(self) -> bool:
+        """Whether it is not met, and the run was asked to do what it concerns."""
+        return self.outcome != "passed" and not self.excused
 
     @property
     def distance(self) -> float:
@@ -114,6 +124,7 @@ class Verdict:
         holding: what held objects by an attachment instead of friction, one text per object and kind.
         candidates: the refused candidates of a task without a plan.
         implied: outcomes of the expectations that every task has unless it sets them otherwise (`saturation`).
+        part: the part of the task that was run; None: all of it.
     """
 
     task: str
@@ -131,11 +142,12 @@ class Verdict:
     holding: tuple[str, ...] = ()
     candidates: tuple[RefusedCandidates, ...] = ()
     implied: tuple[ExpectationOutcome, ...] = ()
+    part: RunPart | None = None
 
     @property
     def ended_between(self) -> bool:
         """Whether the run ended before its first step or after its last, so that no step or expectation shows why."""
         if any(step.went_wrong for step in self.steps):
             return False
-        undone = any(step.outcome == "not_run" for step in self.steps)
-        return undone or all(expectation.outcome == "passed" for expectation in self.expectations)
+        undone = any(step.outcome == "not_run" and not step.excused for step in self.steps)
+        return undone or not any(expectation.missed for expectation in self.expectations)

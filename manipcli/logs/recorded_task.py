@@ -12,6 +12,7 @@ from manipcli.core.geometry import frozen
 from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.logs.mesh_search import MeshSearch
+from manipcli.logs.part_of import recorded_part
 from manipcli.logs.recorded_files import (
     attached,
     recorded_controllers_file,
@@ -101,6 +102,7 @@ def recorded_task(
         scene=scene,
         findings=(*task.findings, *robot_file.findings, *controllers.findings, *found),
         places=_places(recording, path, task.spec),
+        part=recorded_part(recording, path, task.spec, robot, scene),
     )
     drawn = _drawn(recording, path)
     if drawn is not None:

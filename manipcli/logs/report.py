@@ -199,7 +199,7 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
             causes.append(Cause(how_wrong(step), step.text, at, written, hint))
             hint = ""
     for expectation, written in zip(verdict.expectations, places[1], strict=False):
-        if expectation.outcome != "passed" and end is not None:
+        if expectation.missed and end is not None:
             title = f"expectation '{expectation.name}' {_missed(expectation)}"
             causes.append(Cause(title, expectation.text, expectation.at, written))
     if verdict.verdict == "failed" and verdict.ended_between:

@@ -13,12 +13,17 @@ RECORD = "recording"
 REPAIR = "repair"
 """Name of the metadata record of a repaired file, with what it `lost`."""
 
-FORMAT = 2
-"""Version of the layout of a recording. Contacts of format 1 have no contact points."""
+FORMAT = 3
+"""Version of the layout of a recording. Contacts of format 1 have no contact points. In format 3 an inactive controller
+has no messages; a recording in which no controller is ever inactive has format 2, whose layout is the same."""
 
 
 MAX_STRIDE = 1 << 20
 """Ticks."""
+MAX_TIME = 9e9
+"""[s] Log times are 64 bit numbers of nanoseconds."""
+Interval = tuple[float, float | None]
+"""Start and end [s]; None: until the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +36,8 @@ class Contents:
             the controllers.
         strides: ticks between two messages of a topic, if not 1.
         absent: topics that the task excludes from the recording.
+        inactive: when a controller is inactive and writes no messages: from a time [s] on, up to but without another,
+            or None for the end; controllers that are always active are left out.
     """
 
     period: float
@@ -39,17 +46,19 @@ class Contents:
     controllers: dict[str, tuple[str, ...]]
     strides: dict[str, int] = field(default_factory=dict)
     absent: tuple[str, ...] = ()
+    inactive: dict[str, tuple[Interval, ...]] = field(default_factory=dict)
 
     def metadata(self) -> dict[str, str]:
         strides = {topic: stride for topic, stride in self.strides.items() if stride != 1}
         return {
-            "format": str(FORMAT),
+            "format": str(FORMAT if self.inactive else FORMAT - 1),
             "period": repr(self.period),
             "joints": json.dumps(self.joints),
             "bodies": json.dumps(self.bodies),
             "controllers": json.dumps(self.controllers),
             **({"strides": json.dumps(strides)} if strides else {}),
             **({"absent": json.dumps(self.absent)} if self.absent else {}),
+            **({"inactive": json.dumps(self.inactive)} if self.inactive else {}),
         }
 
 
@@ -67,14 +76,19 @@ def contents(values: Mapping[str, str]) -> Contents:
     try:
         period = float(values["period"])
         joints, bodies, controllers = (json.loads(values[key]) for key in ("joints", "bodies", "controllers"))
-        strides, absent = json.loads(values.get("strides", "{}")), json.loads(values.get("absent", "[]"))
+        strides, absent, inactive = (
+            json.loads(values.get(key, none)) for key, none in (("strides", "{}"), ("absent", "[]"), ("inactive", "{}"))
+        )
     except (KeyError, ValueError, RecursionError) as error:
         raise ValueError(f"has a damaged metadata record '{RECORD}'") from error
     whole = isinstance(strides, dict) and all(
         type(stride) is int and 0 < stride <= MAX_STRIDE for stride in strides.values()
     )
     groups = [joints, bodies, absent, *(controllers.values() if isinstance(controllers, dict) else [None])]
-    if not (math.isfinite(period) and period > 0 and whole) or not all(map(_is_names, groups)):
+    timed = isinstance(inactive, dict) and all(map(_are_intervals, inactive.values()))
+    if not (math.isfinite(period) and period > 0 and whole and timed) or not all(map(_is_names, groups)):
+        raise ValueError(f"has a damaged metadata record '{RECORD}'")
+    if not all(set(controllers.get(name, ())) <= set(joints) for name in inactive):
         raise ValueError(f"has a damaged metadata record '{RECORD}'")
     return Contents(
         period=period,
@@ -83,8 +97,21 @@ def contents(values: Mapping[str, str]) -> Contents:
         controllers={name: tuple(claimed) for name, claimed in controllers.items()},
         strides=strides,
         absent=tuple(absent),
+        inactive={name: tuple((start, end) for start, end in spans) for name, spans in inactive.items()},
     )
 
 
 def _is_names(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value) and len(set(value)) == len(value)
+
+
+def _are_intervals(value: object) -> bool:
+    """Whether it is a list of pairs of times; the second of a pair can be missing."""
+    return isinstance(value, list) and all(
+        isinstance(pair, list) and len(pair) == 2 and _is_time(pair[0]) and (pair[1] is None or _is_time(pair[1]))
+        for pair in value
+    )
+
+
+def _is_time(value: object) -> bool:
+    return isinstance(value, int | float) and 0.0 <= value < MAX_TIME

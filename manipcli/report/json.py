@@ -78,7 +78,7 @@ def picked(value: object, keys: str) -> dict[str, Json]:
 
 def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json) -> dict[str, Json]:
     """The object of `run` and `judge`, with all its keys in a fixed order."""
-    empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
+    empty = "task verdict text seed engine sample part simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
     found |= {"self_contacts": [], "holding": [], "steps": [], "expectations": [], "implied": [], "candidates": []}
     if judged is not None:
@@ -90,6 +90,8 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
         for key, outcomes in (("expectations", judged.expectations), ("implied", judged.implied)):
             found[key] = [picked(each, "name outcome margin unit at text") for each in outcomes]
         found["candidates"] = plain(judged.candidates)
+        if judged.part is not None:
+            found["part"] = plain(judged.part)
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
     return {**found, **known, "errors": plain(errors)}

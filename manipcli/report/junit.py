@@ -56,6 +56,8 @@ def render_junit(
     for name, value in values:
         if value:
             SubElement(properties, "property", {"name": name, "value": safe(value)})
+    if verdict.part is not None:
+        SubElement(properties, "property", {"name": "part", "value": safe(str(verdict.part))})
     for held in verdict.holding:
         SubElement(properties, "property", {"name": "holding", "value": safe(held)})
     suite.extend(cases)
@@ -81,7 +83,7 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
     took = 0.0 if step.started is None or step.ended is None else step.ended - step.started
     case = _case(verdict, "steps", step.id, took, attributes)
     if step.outcome == "not_run":
-        _add(case, "skipped", "not run: the run ended before this step", "", [])
+        _add(case, "skipped", f"not run: {step.text or 'the run ended before this step'}", "", [])
     elif step.tolerated:
         SubElement(case, "system-out").text = safe(f"{step.outcome}, tolerated by the task: {step.text}")
     elif step.outcome != "done":
@@ -106,7 +108,7 @@ def _expectation(verdict: Verdict, expectation: ExpectationOutcome, attributes: 
             [margin, when],
         )
     elif expectation.outcome == "not_evaluated":
-        excused = verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
+        excused = expectation.excused or verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
         message = f"expectation '{expectation.name}' was never evaluated: {expectation.text}"
         _add(case, "skipped" if excused else "failure", message, "not_evaluated", [])
     elif margin:

@@ -106,7 +106,7 @@ def _causes(verdict: Verdict) -> list[str]:
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
         for expectation in (*verdict.expectations, *verdict.implied)
-        if expectation.outcome != "passed"
+        if expectation.missed
     ]
     return causes
 
@@ -139,7 +139,7 @@ def _summary(verdict: Verdict) -> str:
 def steps_table(steps: Sequence[StepOutcome]) -> str:
     rows = [
         (
-            f"{PASS if step.outcome == 'done' else FAIL} {_word(step)}{_tries(step)}",
+            f"{PASS if step.outcome == 'done' else '-' if step.excused else FAIL} {_word(step)}{_tries(step)}",
             step.id,
             step.verb,
             _seconds(step.started),
@@ -154,7 +154,8 @@ def steps_table(steps: Sequence[StepOutcome]) -> str:
 def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
     rows = [
         (
-            f"{PASS if expectation.outcome == 'passed' else FAIL} {expectation.outcome.replace('_', ' ')}",
+            f"{PASS if expectation.outcome == 'passed' else '-' if not expectation.missed else FAIL} "
+            f"{expectation.outcome.replace('_', ' ')}",
             expectation.name,
             _margin(expectation),
         )
@@ -167,7 +168,7 @@ def _margin(expectation: ExpectationOutcome) -> str:
     """`passes with 4.1 mm to spare (tightest at 17.32 s)`, `fails by ...`, or why it has no margin."""
     detail = f": {expectation.text}" if expectation.text else ""
     if expectation.outcome == "not_evaluated":
-        return f"was never evaluated{detail}"
+        return f"{'not evaluated' if expectation.excused else 'was never evaluated'}{detail}"
     passed = expectation.outcome == "passed"
     when = "" if expectation.at is None else f" ({'tightest' if passed else 'worst'} at {expectation.at:.2f} s)"
     if not expectation.distance:

@@ -47,6 +47,11 @@ class Attaching:
         self._event("attached", step, "", self._holder.holding.held(motion.takes))
         return ""
 
+    def resumed(self, step: PlannedStep) -> None:
+        """Record what is attached in the start state, before its first step."""
+        if self._holder is not None and self._holder.attached:
+            self._event("attached", step, "", self._holder.holding.held(self._holder.attached))
+
     def look(self, step: PlannedStep | None) -> None:
         """At every tick: record that an attachment broke."""
         if self._holder is not None and self._holder.broken != self._broken:

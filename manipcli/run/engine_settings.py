@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from manipcli.model.self_collision import checked_pairs, overlapping
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
@@ -16,7 +18,11 @@ def engine_settings(task: Task, plan: Plan) -> EngineSettings:
     """
     simulation, start = task.spec.simulation, plan.start.position
     substeps = round(simulation.control_period / simulation.step)
-    return EngineSettings(simulation.step, substeps, start, simulation.own, _colliding(task, plan))
+    settings = EngineSettings(simulation.step, substeps, start, simulation.own, _colliding(task, plan))
+    state = task.part.state
+    if state is None:
+        return settings
+    return replace(settings, start=state.position, velocity=state.velocity, twists=state.twists)
 
 
 def _colliding(task: Task, plan: Plan) -> tuple[tuple[str, str], ...]:

@@ -19,6 +19,7 @@ from manipcli.record.write.recorder import Recorder
 from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
+from manipcli.run.restore import restore_controllers, scene_at
 from manipcli.run.saturation_counts import saturations_of
 from manipcli.run.step_loop import StepLoop
 from manipcli.scene.drop_test import SETTLED_SHIFT
@@ -92,7 +93,9 @@ def _run_steps(
     """
     simulation, true = task.spec.simulation, task.true
     settings = engine_settings(task, plan)
-    engine = ENGINES[simulation.engine].open(true.robot, true.scene, settings)
+    state = task.part.state
+    scene = true.scene if state is None else scene_at(true.scene, state)
+    engine = ENGINES[simulation.engine].open(true.robot, scene, settings)
     try:
         with stdout_to_stderr():
             session = Session(
@@ -103,7 +106,10 @@ def _run_steps(
                 period=simulation.control_period,
                 rng=np.random.default_rng((simulation.seed, 1)),
             )
-            _settle(task, session)
+            if state is None:
+                _settle(task, session)
+            else:
+                restore_controllers(session, state)
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
             observer = Observer(recorder, live, progress, simulation.control_period)
             session.restart_clock(observer)

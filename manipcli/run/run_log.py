@@ -16,6 +16,7 @@ from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL
 from manipcli.judge.measured_run import Variant
+from manipcli.judge.part import PART
 from manipcli.judge.verdict import Verdict
 from manipcli.model.link_parts import LINK_PARTS, link_parts_to_json
 from manipcli.plan.outline import PLAN_FILE
@@ -25,6 +26,7 @@ from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.recording import EMBEDDED
 from manipcli.record.selection import Selection
+from manipcli.record.start_state import START_STATE
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.embedding import embeddable
 from manipcli.run.engine_settings import engine_settings
@@ -45,7 +47,7 @@ YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/jso
 
 
 def default_log(task: Task) -> Path:
-    """`runs/<task>.mcap`; creates the folder.
+    """`runs/<task>.mcap`, or `runs/<task>@from.mcap` of a run from a step on; creates the folder.
 
     Raises:
         InvalidInput: the folder cannot be created.
@@ -55,7 +57,7 @@ def default_log(task: Task) -> Path:
     except OSError as error:
         message = f"cannot create folder '{RUNS}' for the log: {error.strerror}"
         raise InvalidInput([Diagnostic("LOG101", message, hint="choose another file with --log PATH")]) from error
-    return RUNS / f"{task.name}.mcap"
+    return RUNS / (f"{task.name}.mcap" if task.part.state is None else f"{task.name}@from.mcap")
 
 
 def variant_log(log: Path, variant: Variant) -> Path:
@@ -94,6 +96,8 @@ def open_log(
         (SCENE, JSON, scene_to_json(task.true.scene)),
         (PLAN_FILE, JSON, plan.outline.to_json()),
     ]
+    if task.part.state is not None:
+        attachments.append((START_STATE, JSON, task.part.state.to_json()))
     if (parts := link_parts_to_json(task.robot)) is not None:
         attachments.append((LINK_PARTS, JSON, parts))
     recorder = None
@@ -112,6 +116,7 @@ def open_log(
                 "run": run_metadata(task),
                 **({"engine": chosen} if (chosen := _chosen(task, plan)) else {}),
                 **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
+                **({PART: part.to_metadata()} if (part := task.part.described) is not None else {}),
                 **({INERTIALS: inertials} if (inertials := _inertials(task)) else {}),
                 "versions": {"manipcli": __version__, engine.name: engine.version()},
                 "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},

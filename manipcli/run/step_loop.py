@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from itertools import islice
 from typing import Final
 
 from manipcli.control.action import GoalHandle
@@ -23,6 +24,7 @@ from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
+from manipcli.run.restore import RESUMED
 from manipcli.run.saturation_counts import saturated_since, saturations_of
 from manipcli.run.step_results import not_placed, not_poured, not_squeezed
 from manipcli.simulate.engines import ENGINES
@@ -92,8 +94,13 @@ class StepLoop:
     def steps(self) -> None:
         """Run all steps in order, until a step fails without being tolerated, or a watch is broken."""
         total = len(self._plan.steps)
-        planned_start = self._plan.start
-        for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
+        planned_start, part = self._plan.start, self._task.part
+        if part.state is not None:  # let the forces return
+            self._attaching.resumed(self._plan.steps[part.first])
+            with suppress(Alarmed):
+                self._executor.hold(RESUMED)
+        every = enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True))
+        for index, (step, planned) in islice(every, part.first, part.last):
             self._progress.step_started(planned, index, total)
             outcome = self._step(index, step, planned, planned_start)
             self._progress.step_ended(outcome)

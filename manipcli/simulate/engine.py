@@ -29,6 +29,9 @@ class EngineSettings:
         start: (n) joint positions.
         own: the engine's own settings, of its `spec`; None: its defaults.
         self_collision: pairs of links that collide with each other, by name; other pairs pass through each other.
+        velocity: (n) of the joints at the start; None: at rest.
+        twists: (m, 6) velocity of each movable body's O and its angular velocity, in the world, at the start; None: at
+            rest.
     """
 
     step: float
@@ -36,6 +39,8 @@ class EngineSettings:
     start: Array
     own: Model | None = None
     self_collision: tuple[tuple[str, str], ...] = ()
+    velocity: Array | None = None
+    twists: Array | None = None
 
 
 class Refusal(NamedTuple):

@@ -58,10 +58,14 @@ class Holder:
             missed = self.holding.missed(surface(body, X_WO, self._pose(state)), name)
             if missed:
                 return missed
-        self._mu = friction_coefficient(self._robot, body)
+        self.hold(name)
+        return ""
+
+    def hold(self, name: str) -> None:
+        """Attach a movable body as it is, whether or not the hand touches it."""
+        self._mu = friction_coefficient(self._robot, self._scene.body(name))
         self._wrench = self._engine.attach(name)
         self.attached = name
-        return ""
 
     def let_go(self) -> None:
         """Free the object, if there is one."""

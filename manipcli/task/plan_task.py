@@ -33,9 +33,13 @@ from manipcli.plan.steps import STEPS
 from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import explained
+from manipcli.record.start_state import StartState
+from manipcli.simulate.engines import ENGINES
 from manipcli.spec.keep import KeepSpec
 from manipcli.spec.planner import PlannerSpec
 from manipcli.spec.step import StepSpec
+from manipcli.task.part import Part
+from manipcli.task.restored import restored_start
 from manipcli.task.task import Task
 
 
@@ -76,8 +80,11 @@ class PlannedMotion:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The plan of a task. `planner` re-plans steps from measured states; `judged`: places of expectations and watches,
-    for the log; `effort`: the least `plan: {effort: ...}` with which it is found."""
+    """The plan of a task; steps that the run does not do have no motions.
+
+    `planner` re-plans steps from measured states; `judged`: places of expectations and watches, for the log; `effort`:
+    the least `plan: {effort: ...}` with which it is found.
+    """
 
     steps: tuple[PlannedStep, ...]
     start: PlanningState
@@ -160,6 +167,8 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     task = task.known
     planner = _planner(task)
     start = _start(task)
+    if task.part.state is not None:
+        start = _resumed(task, planner, start, task.part.state, on_progress)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
     budget = _budget(task, planner, deeper=deeper)
     steps = _steps(task, planner, start, on_progress, budget)
@@ -205,6 +214,7 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
         text=f"{reason}: {refusal}",
         drawn=task.drawn,
         candidates=refusal.candidates,
+        part=task.part.described,
     )
 
 
@@ -240,20 +250,35 @@ def _start(task: Task) -> PlanningState:
     return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
 
 
-def _budget(task: Task, planner: Planner, *, deeper: bool) -> SearchBudget:
+def _budget(task: Task, planner: Planner, *, deeper: bool = False) -> SearchBudget:
     """The budget of the search: larger where the task asks for more samples of each path."""
     share = task.spec.plan.effort * max(1.0, task.spec.planner.samples / PlannerSpec().samples)
     return SearchBudget(planner.kinematics.work, deeper=deeper, effort=share)
 
 
+def _resumed(
+    task: Task, planner: Planner, start: PlanningState, state: StartState, on_progress: Callable[[str], None]
+) -> PlanningState:
+    """The state in which a part of the task begins. Without physics, objects are where the steps before it put them in
+    the plan: the engine does not move them."""
+    if ENGINES[task.spec.simulation.engine].physics == "full":
+        return restored_start(state, planner)
+    before = replace(task, part=Part(0, task.part.first))
+    done = _steps(before, planner, start, on_progress, _budget(task, planner))[: task.part.first]
+    ends = [start, *(step.plan.end for step in done)]
+    return replace(ends[-1], position=state.position, at_start=False)
+
+
 def _steps(
     task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None], budget: SearchBudget
 ) -> tuple[PlannedStep, ...]:
-    """Plans all steps; see `task_search`."""
-    steps = task.spec.steps
+    """Plans the steps of the task's part; see `task_search`."""
+    every, part = task.spec.steps, task.part
+    first = part.first
+    steps = every[first : part.last]
 
     def located(k: int, refusal: NotPlannable) -> NotPlannable:
-        at = task.file.place("steps", k, *((steps[k].verb, *refusal.loc) if refusal.loc else ()))
+        at = task.file.place("steps", first + k, *((steps[k].verb, *refusal.loc) if refusal.loc else ()))
         return refusal.but(step=steps[k].id, place=at)
 
     def placed(k: int, candidates: Candidates) -> Candidates:
@@ -286,13 +311,19 @@ def _steps(
         optimise=task.spec.plan.optimise,
         cost=lambda plan: step_cost(planner, plan).total,
     )
-    return tuple(
+    planned = tuple(
         PlannedStep(
             str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps,
             one.chosen.candidate.name, one.dropped, step.keep,
         )
-        for k, (step, one) in enumerate(zip(steps, solved, strict=True))
+        for k, (step, one) in enumerate(zip(steps, solved, strict=True), first)
     )  # fmt: skip
+    end = planned[-1].plan.end if planned else start
+    before, behind = (
+        [PlannedStep(str(every[k].id), every[k].verb, StepPlan((), at), task.log_place("steps", k)) for k in range(*of)]
+        for at, of in ((start, (0, first)), (end, (first + len(steps), len(every))))
+    )
+    return (*before, *planned, *behind)
 
 
 def _planner(task: Task) -> Planner:

@@ -14,6 +14,7 @@ from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
+from manipcli.task.part import WHOLE, Part
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,7 @@ class Task:
         places: places of steps, expectations and watches, for a task read from a log.
         drawn: the drawn values of a sample.
         truth: the ground truth of a sample, if it differs.
+        part: the steps that a run does.
     """
 
     file: Located[TaskSpec]
@@ -45,6 +47,7 @@ class Task:
     places: Mapping[Loc, str] = field(default_factory=dict)
     drawn: Drawn | None = None
     truth: GroundTruth | None = None
+    part: Part = WHOLE
 
     @property
     def true(self) -> GroundTruth:

@@ -226,7 +226,8 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
 
     pipeline.run_task = run_task
     words = (
-        "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --set a.b=1 --set c=x=y --package-path p"
+        "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --set a.b=1 --set c=x=y --package-path p "
+        "--from a --state b.mcap --until c"
     )
     assert main([*words.split(), "--allow-outside", "-q"]) == 0
     del given["progress"]
@@ -240,6 +241,9 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
         "overrides": ("a.b=1", "c=x=y"),
         "package_path": (Path("p"),),
         "allow_outside": True,
+        "from_step": "a",
+        "state": Path("b.mcap"),
+        "until": "c",
     }
     assert capsys.readouterr().err == ""
 

@@ -13,7 +13,7 @@ from manipcli.cli import console
 from manipcli.cli.engine_options import CheckStep, Engines, engine_names, refuse_single_outputs
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
-from manipcli.core.errors import ExitCode, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 
 def run(
@@ -33,6 +33,19 @@ def run(
     ] = False,
     engines: Engines = None,
     check_step: CheckStep = False,
+    from_step: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="STEP",
+            help="Begin at STEP, with the state of an earlier run; the log is runs/<task>@from.mcap.",
+        ),
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option("--state", metavar="LOG", help="Log with the state before --from [default: runs/<task>.mcap]."),
+    ] = None,
+    until: Annotated[str | None, typer.Option("--until", metavar="STEP", help="End after STEP.")] = None,
     report_file: ReportFile = None,
     junit: JunitFile = None,
     seed: Seed = None,
@@ -53,10 +66,14 @@ def run(
     from manipcli.cli.log_to_stdout import refuse_stdout, stdout_or
 
     to_stdout = log is not None and str(log) == "-"
+    if state is not None and from_step is None:
+        raise InvalidInput([Diagnostic("USE123", "--state needs --from STEP", hint="name the first step to run")])
     if engines is not None or check_step:
         from manipcli.cli.commands.run_engines import run_engines
 
         refuse_single_outputs(to_stdout=to_stdout, junit=junit)
+        if from_step is not None or until is not None:
+            raise InvalidInput([Diagnostic("USE123", "--from and --until run one engine, without --engines")])
         names = engine_names(engines, check_step=check_step, overrides=tuple(overrides or ()))
         with Interrupts() as interrupts:
             return run_engines(
@@ -98,6 +115,9 @@ def run(
                     log=path,
                     force=force,
                     embed_meshes=embed_meshes,
+                    from_step=from_step,
+                    until=until,
+                    state=state,
                     package_path=folders,
                     allow_outside=allow_outside,
                     progress=progress,

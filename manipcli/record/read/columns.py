@@ -53,6 +53,11 @@ class Columns:
         """Number of messages that are added and not yet taken."""
         return sum(len(times) for times, _ in self._parts)
 
+    @property
+    def times(self) -> Int:
+        """Log times [ns] of these messages."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(times for times, _ in self._parts)])
+
     def add(self, data: bytes, places: Places) -> None:
         """Add the messages of one chunk.
 
@@ -78,7 +83,7 @@ class Columns:
     def take(self, count: int) -> tuple[Int, list[Array]]:
         """The first `count` messages: log times [ns], and each run (count, width). They are removed."""
         if len(self._parts) != 1:
-            times = np.concatenate([np.zeros(0, dtype=np.int64), *(times for times, _ in self._parts)])
+            times = self.times
             empty = [np.zeros((0, width)) for width in self._widths]
             runs = [np.concatenate([none, *(runs[k] for _, runs in self._parts)]) for k, none in enumerate(empty)]
             self._parts = [(times, runs)]

@@ -198,6 +198,7 @@ class _Reader:
         for topic, kind in self._channels.values():
             if kind != self._types.get(topic, kind):
                 raise BadRecording(self._path, f"{topic} is not of type {self._types[topic]}")
+        inactive = [ControllerChannel(name, ()).state_topic for name in known.inactive]
         if lost is not None and self._newest >= 0:
             lost = f"{lost}; recorded until t = {self._newest / 1e9:.3f} s"
         if REPAIR in self._metadata:
@@ -221,7 +222,7 @@ class _Reader:
             lost=lost,
             period=known.period,
             absent=known.absent,
-            silent=tuple(topic for topic in self._types if topic not in self._heard),
+            silent=tuple(topic for topic in self._types if topic not in {*self._heard, *inactive}),
         )
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
@@ -31,6 +32,10 @@ from manipcli.record.read.differences import body_velocities
 from manipcli.record.read.scan import Record, chunk_at, guarded, readable
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
 from manipcli.record.selection import common_stride
+
+MEASURED: Final = 2
+"""Place of the measured positions among the runs of a controller state."""
+_NEVER: Final = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +94,8 @@ class FileSpans:
         def read(record: Record) -> Span | None:
             data = open_chunk(self.path, record)
             reader.add(data, chunk_places(data, indexes))
-            return reader.span(reader.ready) if reader.ready else None
+            ready = reader.ready
+            return reader.span(ready) if ready else None
 
         try:
             return guarded(self.path, chunk, read)
@@ -99,6 +105,29 @@ class FileSpans:
 
 class _Apart(Exception):
     """Joints, bodies and controllers have different times or rates than declared, or contacts are missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Inactive:
+    """When a controller is inactive: (k, 2) starts and ends [ns]; and the places of its joints."""
+
+    intervals: Int
+    joints: list[int]
+
+    @staticmethod
+    def of(contents: Contents, controller: ControllerChannel) -> _Inactive:
+        intervals = [
+            (round(start * 1e9), _NEVER if end is None else round(end * 1e9))
+            for start, end in contents.inactive[controller.name]
+        ]
+        joints = [contents.joints.index(name) for name in controller.joints]
+        return _Inactive(np.array(intervals, dtype=np.int64).reshape(-1, 2), joints)
+
+    def active(self, ns: Int) -> npt.NDArray[np.bool_]:
+        """Whether the controller is active at these times [ns]."""
+        starts, ends = self.intervals.T
+        begun, over = (np.searchsorted(times, ns, side="right") for times in (starts, ends))
+        return np.equal(begun, over)
 
 
 class _SpanReader:
@@ -114,6 +143,11 @@ class _SpanReader:
         self._channels = channels
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
         self._controllers = [controller for controller in everyone if controller.state_topic not in contents.absent]
+        self._inactive = {
+            controller.state_topic: _Inactive.of(contents, controller)
+            for controller in self._controllers
+            if controller.name in contents.inactive
+        }
         self._bodies = m
         self._columns = {
             topics.JOINT_STATES: Columns(
@@ -140,7 +174,11 @@ class _SpanReader:
     @property
     def ready(self) -> int:
         """Number of complete ticks."""
-        return min(len(columns) for columns in self._columns.values())
+        ready = min(len(columns) for topic, columns in self._columns.items() if topic not in self._inactive)
+        for topic, inactive in self._inactive.items():
+            needed = inactive.active(self._columns[topics.JOINT_STATES].times[:ready]).cumsum()
+            ready = int(np.searchsorted(needed, len(self._columns[topic]), side="right"))
+        return ready
 
     @property
     def waiting(self) -> bool:
@@ -184,10 +222,9 @@ class _SpanReader:
             body_ns, poses = self._columns[topics.TF].take(ticks)
         else:
             body_ns, poses = ns, [np.full((ticks, 7), np.nan)] * self._bodies
-        taken = [self._columns[controller.state_topic].take(ticks) for controller in self._controllers]
-        for times in (body_ns, *(times for times, _ in taken)):
-            if not np.array_equal(ns, times):
-                raise _Apart
+        taken = [self._trace(controller.state_topic, ns, position) for controller in self._controllers]
+        if not np.array_equal(ns, body_ns):
+            raise _Apart
         self._count(ns)
         time = _settled(ns / 1e9)
         bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
@@ -197,10 +234,28 @@ class _SpanReader:
             states=states.map(_settled),
             controllers=tuple(
                 ControllerTrace(controller.name, controller.joints, time, *map(_settled, runs))
-                for controller, (_, runs) in zip(self._controllers, taken, strict=True)
+                for controller, runs in zip(self._controllers, taken, strict=True)
             ),
             contacts=self._contacts_until(time[-1] if ticks else np.inf),
         )
+
+    def _trace(self, topic: str, ns: Int, position: Array) -> list[Array]:
+        """The numbers of a controller at the ticks `ns`; NaN where it is inactive, except for its measured joints."""
+        columns, inactive = self._columns[topic], self._inactive.get(topic)
+        if inactive is None:
+            times, runs = columns.take(len(ns))
+        else:
+            active = inactive.active(ns)
+            times, found = columns.take(int(active.sum()))
+            ns = ns[active]
+            runs = [np.full((len(active), run.shape[1]), np.nan) for run in found]
+            runs[MEASURED][:] = position[:, inactive.joints]
+            if len(times) == len(ns):
+                for run, values in zip(runs, found, strict=True):
+                    run[active] = values
+        if not np.array_equal(ns, times):
+            raise _Apart
+        return runs
 
     def _count(self, ns: Int) -> None:
         """Check that ticks start at 0 without gaps."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -60,16 +60,45 @@ class ChunkContent:
 
 
 Values = Callable[[Ticks], list[Array]]
-_Source = tuple[str, Template, Values]
-"""A topic, the template of its message, and a function of its numbers at some ticks."""
 
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """Messages of a topic, and a function of their numbers at some ticks; `controller`: index of the controller that
+    writes them while it is active, None for messages of every tick."""
+
+    topic: str
+    template: Template
+    values: Values
+    controller: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Messages of some ticks of a block, the same on each tick.
+
+    Attributes:
+        ticks: (n,) rows of the block.
+        bytes: (n, size) the messages of each tick.
+        channels, starts: channel of each message and its offset in a row.
+    """
+
+    ticks: Places
+    bytes: npt.NDArray[np.uint8]
+    channels: tuple[int, ...]
+    starts: tuple[int, ...]
+
+
+_Idle = tuple[int, frozenset[int]]
+"""Indices of the inactive controllers from a row of a block on."""
+_NOBODY: list[_Idle] = [(0, frozenset())]
 FIELDS: tuple[Interface, ...] = ("position", "velocity", "acceleration", "effort")
 """The order of the fields of a message."""
 
 
 class _ControllerRows:
-    """Output of a controller on the ticks of a block: `rows` (capacity, 3 + k, n) as `ControllerOutput.rows`, NaN while
-    it is inactive."""
+    """Output of a controller on the ticks of a block: `rows` (capacity, 3 + k, n) as `ControllerOutput.rows`; rows
+    of ticks at which it is inactive have no meaning."""
 
     def __init__(self, channel: ControllerChannel, robot: RobotModel, capacity: int) -> None:
         self.rows = np.zeros((capacity, REFERENCE_ROWS + len(channel.interfaces), len(channel.joints)))
@@ -99,22 +128,35 @@ class _ControllerRows:
         return [error, reference_speed - velocity[:, self._columns]]
 
 
-@dataclass(slots=True)
 class _Group:
-    """The messages of every `stride`-th tick; `values` are functions of their numbers at some ticks."""
+    """The messages of every `stride`-th tick."""
 
-    stride: int
-    rows: RowBlock
-    values: list[Values]
-    written: int = 0
+    def __init__(self, stride: int, sources: Sequence[_Source], capacity: int) -> None:
+        self._stride = stride
+        self._rows = RowBlock([source.template for source in sources], capacity)
+        self._values = [source.values for source in sources]
+        self._controllers = [source.controller for source in sources]
+        self._written = np.zeros(len(sources), dtype=np.int64)
 
-    def fill(self, ticks: Times, times: Times) -> Places:
-        """Encode its messages of a block; returns their ticks."""
-        picked = np.flatnonzero(ticks % self.stride == 0)
-        at: Ticks = slice(0, len(ticks)) if self.stride == 1 else picked
-        self.rows.fill(times[picked], self.written + 1, [run for values in self.values for run in values(at)])
-        self.written += len(picked)
-        return picked
+    def fill(self, ticks: Times, times: Times, idle: Sequence[_Idle]) -> Iterator[_Rows]:
+        """Encode its messages of a block."""
+        picked = np.flatnonzero(ticks % self._stride == 0)
+        if not len(picked):
+            return
+        at: Ticks = slice(0, len(ticks)) if self._stride == 1 else picked
+        there = np.ones((len(self._controllers), len(picked)), dtype=bool)
+        changes: list[int] = []
+        if idle != _NOBODY:
+            for first, controllers in idle:
+                there[:, picked >= first] = [[own not in controllers] for own in self._controllers]
+            changes = (np.flatnonzero((there[:, 1:] != there[:, :-1]).any(axis=0)) + 1).tolist()
+        numbers = self._written[:, None] + there.cumsum(axis=1)
+        self._rows.fill(times[picked], numbers, [run for values in self._values for run in values(at)])
+        self._written = numbers[:, -1]
+        for first, end in pairwise([0, *changes, len(picked)]):
+            kept = np.flatnonzero(there[:, first]).tolist()
+            if kept:
+                yield _Rows(picked[first:end], *self._rows.part(first, end, kept))
 
 
 class Block:
@@ -142,14 +184,14 @@ class Block:
         self._rows: list[Array | None] = []
         self._seen: tuple[Array, Sequence[ControllerOutput | None]] | None = None
         self._compiled: Run | None = None
+        self._idle = [*_NOBODY]
         self._ids = {channel.topic: channel.id for channel in channels}
         sources = self._sources(robot, scene, controllers)
-        strides = [selection.stride(topic, period) for topic, _, _ in sources]
+        strides = [selection.stride(source.topic, period) for source in sources]
         self._groups = []
         for stride in sorted(set(strides)):
             mine = [source for source, every in zip(sources, strides, strict=True) if every == stride]
-            rows = RowBlock([template for _, template, _ in mine], capacity)
-            self._groups.append(_Group(stride, rows, [values for _, _, values in mine]))
+            self._groups.append(_Group(stride, mine, capacity))
 
     def _sources(self, robot: RobotModel, scene: Scene, controllers: Sequence[Recorded]) -> list[_Source]:
         """All periodic messages; allocates the buffers of the controllers."""
@@ -159,38 +201,40 @@ class Block:
         states: list[_Source] = []
         readings: list[_Source] = []
         plots: list[_Source] = []
-        for c in controllers:
+        for index, c in enumerate(controllers):
             if isinstance(c, ControllerChannel):
                 of = _ControllerRows(c, robot, self.capacity)
                 self._rows.append(of.rows)
                 if c.state_topic in ids:
                     template = controller_state_template(ids[c.state_topic], c.joints, c.interfaces)
-                    states.append((c.state_topic, template, partial(self._state, of)))
+                    states.append(_Source(c.state_topic, template, partial(self._state, of), index))
                 curves: list[tuple[str, Values]] = [
                     (c.reference_topic, of.reference),
                     (c.error_topic, partial(self._errors, of)),
                 ]
                 for topic, values in curves:
                     if topic in ids:
-                        plots.append((topic, joint_state_template(ids[topic], c.joints, effort=False), values))
+                        template = joint_state_template(ids[topic], c.joints, effort=False)
+                        plots.append(_Source(topic, template, values, index))
             elif isinstance(c, SensorChannel):
                 template = sensor_template(ids.get(c.topic, 0), c.frame, c.width)
                 room = np.zeros((self.capacity, 1, c.width))
                 self._rows.append(room)
                 if c.topic in ids:
-                    readings.append((c.topic, template, partial(_reading, room)))
+                    readings.append(_Source(c.topic, template, partial(_reading, room), index))
             else:
                 self._rows.append(None)
         found: list[_Source] = []
         if topics.JOINT_STATES in ids:
             template = joint_state_template(ids[topics.JOINT_STATES], robot.joint_names, effort=True)
-            found.append((topics.JOINT_STATES, template, self._measured))
+            found.append(_Source(topics.JOINT_STATES, template, self._measured))
         if topics.TF in ids:
-            found.append((topics.TF, tf_template(ids[topics.TF], frames), self._frames))
+            found.append(_Source(topics.TF, tf_template(ids[topics.TF], frames), self._frames))
         found += [*states, *readings, *plots]
         if self._actuators.names and topics.ACTUATOR_STATES in ids:
             template = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
-            found.append((topics.ACTUATOR_STATES, template, lambda at: self._actuators.state(*self._measured(at))))
+            actuators: Values = lambda at: self._actuators.state(*self._measured(at))  # noqa: E731
+            found.append(_Source(topics.ACTUATOR_STATES, template, actuators))
         return found
 
     def add(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
@@ -207,16 +251,24 @@ class Block:
             return
         self._numbers[k] = numbers
         for rows, output in zip(self._rows, outputs, strict=True):
-            if rows is not None:
-                rows[k] = np.nan if output is None else output.rows
+            if rows is not None and output is not None:
+                rows[k] = output.rows
+
+    @property
+    def idle(self) -> tuple[tuple[int, frozenset[int]], ...]:
+        """Changes of inactive controllers since the block was emptied: their indices, from a tick on."""
+        return tuple((int(self._ticks[k]), controllers) for k, controllers in self._idle[1:])
 
     def _look(self, numbers: Array, outputs: Sequence[ControllerOutput | None]) -> None:
-        """Bind the compiled copy to these arrays, which are overwritten at every tick."""
+        """Bind the compiled copy to these arrays, which are overwritten at every tick; note inactive controllers."""
         self._seen = numbers, outputs
+        idle = frozenset(index for index, output in enumerate(outputs) if output is None)
+        if idle != self._idle[-1][1]:
+            self._idle.append((self.count - 1, idle))
         groups = [self._numbers, numbers]
         for rows, output in zip(self._rows, outputs, strict=True):
-            if rows is not None and rows[0].size:
-                groups += [rows, np.full(rows[0].shape, np.nan) if output is None else output.rows]
+            if rows is not None and output is not None and rows[0].size:
+                groups += [rows, output.rows]
         self._compiled = bind("rows", 0, *groups)
 
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:
@@ -224,10 +276,11 @@ class Block:
         T, self.count = self.count, 0
         ticks = self._ticks[:T]
         times = np.rint(ticks * self._period * 1e9).astype(np.int64)
-        picked = [group.fill(ticks, times) for group in self._groups]
-        if not singles and not any(map(len, picked)):
+        rows = [part for group in self._groups for part in group.fill(ticks, times, self._idle)]
+        self._idle = [(0, self._idle[-1][1])]
+        if not singles and not rows:
             return None
-        return self._join(times, picked, sorted(singles, key=lambda single: single.ns))
+        return _joined(times, rows, sorted(singles, key=lambda single: single.ns))
 
     def _measured(self, at: Ticks) -> list[Array]:
         return [self._states.position[at], self._states.velocity[at], self._states.effort[at]]
@@ -244,42 +297,44 @@ class Block:
     def _errors(self, of: _ControllerRows, at: Ticks) -> list[Array]:
         return of.errors(at, *self._measured(at)[:2])
 
-    def _join(self, times: Times, picked: Sequence[Places], singles: Sequence[Single]) -> ChunkContent:
-        """Rows and singles in time order, and the offset of each message.
 
-        A tick has the rows of its groups, the most frequent first, then the singles up to the next tick.
-        """
-        T = len(times)
-        ns = np.array([single.ns for single in singles], dtype=np.int64)
-        lengths = np.array([len(single.record) for single in singles], dtype=np.int64)
-        behind = np.searchsorted(times, ns, side="right")  # ticks before each single
-        before = np.zeros(T + 1, dtype=np.int64)  # bytes before each tick, and before the end
-        for group, ticks in zip(self._groups, picked, strict=True):
-            before[1:] += np.bincount(ticks, minlength=T).cumsum() * group.rows.size if T else 0
-        single_at = before[behind] + lengths.cumsum() - lengths
-        before += np.bincount(behind, weights=lengths, minlength=T + 1).cumsum().astype(np.int64)
+def _joined(times: Times, rows: Sequence[_Rows], singles: Sequence[Single]) -> ChunkContent:
+    """Rows and singles in time order, and the offset of each message.
 
-        indexes: dict[int, Index] = {}
-        parts: list[tuple[int, bytes | memoryview]] = []
-        within = np.zeros(T, dtype=np.int64)  # bytes of a tick so far
-        for group, ticks in zip(self._groups, picked, strict=True):
-            at = before[ticks] + within[ticks]
-            within[ticks] += group.rows.size
-            if len(ticks):
-                # Adjacent rows are one part.
-                breaks = np.flatnonzero(np.diff(at) != group.rows.size) + 1
-                for first, end in pairwise([0, *breaks.tolist(), len(ticks)]):
-                    parts.append((int(at[first]), group.rows.bytes[first:end].data))
-                starts = zip(group.rows.channels, group.rows.starts, strict=True)
-                indexes |= {i: _index(times[ticks], at + start) for i, start in starts}
-        channels = np.array([single.channel for single in singles], dtype=np.int64)
-        for i in sorted(set(channels.tolist())):
-            indexes[i] = _index(ns[channels == i], single_at[channels == i])
-        parts += zip(single_at.tolist(), (single.record for single in singles), strict=True)
-        parts.sort(key=itemgetter(0))
-        stamps = np.concatenate([times[ticks] for ticks in picked] + [ns])
-        data = b"".join([part for _, part in parts])
-        return ChunkContent(data, int(stamps.min()), int(stamps.max()), indexes)
+    A tick has its rows, the most frequent first, then the singles up to the next tick.
+    """
+    T = len(times)
+    ns = np.array([single.ns for single in singles], dtype=np.int64)
+    lengths = np.array([len(single.record) for single in singles], dtype=np.int64)
+    behind = np.searchsorted(times, ns, side="right")  # ticks before each single
+    before = np.zeros(T + 1, dtype=np.int64)  # bytes before each tick, and before the end
+    for each in rows:
+        before[1:] += np.bincount(each.ticks, minlength=T).cumsum() * each.bytes.shape[1]
+    single_at = before[behind] + lengths.cumsum() - lengths
+    before += np.bincount(behind, weights=lengths, minlength=T + 1).cumsum().astype(np.int64)
+
+    indexes: dict[int, Index] = {}
+    parts: list[tuple[int, bytes | memoryview]] = []
+    within = np.zeros(T, dtype=np.int64)  # bytes of a tick so far
+    for each in rows:
+        ticks, size = each.ticks, each.bytes.shape[1]
+        at = before[ticks] + within[ticks]
+        within[ticks] += size
+        # Adjacent rows are one part.
+        breaks = np.flatnonzero(np.diff(at) != size) + 1
+        for first, end in pairwise([0, *breaks.tolist(), len(ticks)]):
+            parts.append((int(at[first]), each.bytes[first:end].data))
+        for channel, start in zip(each.channels, each.starts, strict=True):
+            index = _index(times[ticks], at + start)
+            indexes[channel] = np.concatenate((indexes[channel], index)) if channel in indexes else index
+    channels = np.array([single.channel for single in singles], dtype=np.int64)
+    for i in sorted(set(channels.tolist())):
+        indexes[i] = _index(ns[channels == i], single_at[channels == i])
+    parts += zip(single_at.tolist(), (single.record for single in singles), strict=True)
+    parts.sort(key=itemgetter(0))
+    stamps = np.concatenate([times[each.ticks] for each in rows] + [ns])
+    data = b"".join([part for _, part in parts])
+    return ChunkContent(data, int(stamps.min()), int(stamps.max()), indexes)
 
 
 def _reading(room: Array, at: Ticks) -> list[Array]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from manipcli.control.action import Feedback, GoalResult
@@ -81,7 +82,8 @@ class Recorder:
         self._container = Container(path, overwrite=overwrite)
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._writing: Future[None] | None = None
-        holds = Contents(
+        self._names = [None if c is None else c.name for c in controllers]
+        self._contents = Contents(
             period=period,
             joints=robot.joint_names,
             bodies=tuple(body.name for body in scene.movable),
@@ -92,7 +94,7 @@ class Recorder:
         self._goals = {c.name: GoalLog(c) for c in controllers if isinstance(c, ControllerChannel) and c.action}
         self._touches = topics.CONTACTS in self._ids
         try:
-            self._begin(table, attachments, {RECORD: holds.metadata(), **metadata}, robot, scene)
+            self._begin(table, attachments, {RECORD: self._contents.metadata(), **metadata}, robot, scene)
         except BaseException:
             self._thread.shutdown()
             self._container.close()
@@ -174,10 +176,30 @@ class Recorder:
         """Encode the block and hand it to the writer thread after its previous block; write errors are raised here or
         in the next flush."""
         singles, self._singles = self._singles, []
+        changes = self._block.idle
         content = self._block.encode(singles)
         self._written()
+        if changes:
+            self._switched(changes)
         if content is not None:
             self._writing = self._thread.submit(self._container.chunk, content)
+
+    def _switched(self, changes: Sequence[tuple[int, frozenset[int]]]) -> None:
+        """Write, before their chunk, which controllers are inactive from which ticks on."""
+        inactive = dict(self._contents.inactive)
+        for tick, idle in changes:
+            time = self._ns(tick) / 1e9
+            names = {self._names[k] for k in idle}
+            for name, spans in inactive.items():
+                if spans[-1][1] is None and name not in names:
+                    inactive[name] = (*spans[:-1], (spans[-1][0], time))
+            for name in filter(None, (self._names[k] for k in sorted(idle))):
+                spans = inactive.get(name, ())
+                if not spans or spans[-1][1] is not None:
+                    inactive[name] = (*spans, (time, None))
+        if inactive != self._contents.inactive:
+            self._contents = replace(self._contents, inactive=inactive)
+            self._container.metadata(RECORD, self._contents.metadata())
 
     def _written(self) -> None:
         """Wait for the writer thread and raise its error; after an interrupted wait it continues to write."""

@@ -137,12 +137,11 @@ class RowBlock:
         view: Field = self.bytes.view(layout)[:, 0]["field"]
         return view
 
-    def fill(self, times_ns: Times, first_sequence: int, values: Sequence[Array]) -> None:
-        """Write the first T rows: times (T,), sequence numbers from `first_sequence` on, and one array (T, count)
-        for every run of every template, in order."""
+    def fill(self, times_ns: Times, sequences: Times, values: Sequence[Array]) -> None:
+        """Write the first T rows: times (T,), sequence numbers (messages, T), and one array (T, count) for every run
+        of every template, in order."""
         T = len(times_ns)
-        sequence = np.arange(first_sequence, first_sequence + T)
-        for field in self._sequences:
+        for field, sequence in zip(self._sequences, sequences, strict=True):
             field[:T] = sequence
         for field in self._times:
             field[:T] = times_ns
@@ -152,3 +151,16 @@ class RowBlock:
             nanosec_field[:T] = nanosec
         for field, value in zip(self._runs, values, strict=True):
             field[:T] = value
+
+    def part(
+        self, first: int, end: int, messages: Sequence[int]
+    ) -> tuple[npt.NDArray[np.uint8], tuple[int, ...], tuple[int, ...]]:
+        """Some messages of the rows [first, end): bytes (n, size), channel of each message, its offset in a row."""
+        channels = tuple(self.channels[k] for k in messages)
+        rows = self.bytes[first:end]
+        if len(messages) == len(self.channels):
+            return rows, channels, self.starts
+        ends = (*self.starts[1:], self.size)
+        pieces = [rows[:, self.starts[k] : ends[k]] for k in messages]
+        starts = tuple(accumulate((piece.shape[1] for piece in pieces[:-1]), initial=0))
+        return np.concatenate(pieces, axis=1), channels, starts

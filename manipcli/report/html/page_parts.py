@@ -85,10 +85,10 @@ def image(picture: Picture, label: str) -> Markup:
     return element("img", src=f"data:image/webp;base64,{data}", alt=label, width=str(width), height=str(height))
 
 
-def mark(good: bool, word: str) -> Markup:
-    """`✓ done`, `✗ failed`, `– not run`."""
-    if word == "not_run":
-        return element("span", "– not run", class_="idle")
+def mark(good: bool, word: str, *, excused: bool = False) -> Markup:
+    """`✓ done`, `✗ failed`, `– not run`; with a dash also what is `excused`."""
+    if word == "not_run" or excused:
+        return element("span", f"– {word.replace('_', ' ')}", class_="idle")
     return element("span", f"{'✓' if good else '✗'} {word.replace('_', ' ')}", class_="yes" if good else "no")
 
 

@@ -41,11 +41,13 @@ def head(page: RunPage) -> Markup:
     entries: list[tuple[str, str]] = []
     if page.facts is not None:
         entries.append(("simulated", f"{verdict.simulated_time:.2f} s"))
-        done = sum(step.outcome == "done" for step in verdict.steps)
-        entries.append(("steps done", f"{done} of {len(verdict.steps)}"))
+        asked = [step for step in verdict.steps if not step.excused]
+        done = sum(step.outcome == "done" for step in asked)
+        entries.append(("steps done", f"{done} of {len(asked)}"))
     if verdict.expectations and page.facts is not None:
-        met = sum(expectation.outcome == "passed" for expectation in verdict.expectations)
-        entries.append(("expectations met", f"{met} of {len(verdict.expectations)}"))
+        judged = [expectation for expectation in verdict.expectations if not expectation.excused]
+        met = sum(expectation.outcome == "passed" for expectation in judged)
+        entries.append(("expectations met", f"{met} of {len(judged)}"))
     if page.facts is not None:
         entries += _figures(page.facts)
     figures = (element("div", element("dt", name), element("dd", value)) for name, value in entries)
@@ -59,6 +61,7 @@ def head(page: RunPage) -> Markup:
         element("p", verdict.text, class_="subtitle") if good or not page.causes else None,
         element("p", f"Warning: {touching}", class_="warn") if touching else None,
         *(element("p", f"Attachment: {text}") for text in verdict.holding),
+        element("p", f"This run did a {verdict.part}.", class_="warn") if verdict.part is not None else None,
         element("p", verdict.drawn.described()) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),
@@ -135,7 +138,15 @@ def expectations(page: RunPage) -> Markup | None:
         name = joined(element("b", expectation.name), line_link(written), element("small", expectation.text))
         margin = "–" if expectation.margin is None else signed(expectation.margin, expectation.unit)
         at = seek(expectation.at, playable=page.playback is not None)
-        rows.append((mark(expectation.outcome == "passed", expectation.outcome), name, margin, used, at))
+        rows.append(
+            (
+                mark(expectation.outcome == "passed", expectation.outcome, excused=expectation.excused),
+                name,
+                margin,
+                used,
+                at,
+            )
+        )
     headers = ("outcome", "expectation", "margin", "of limit", "tightest at")
     about = "Margin: distance to the limit at the tightest moment; + is met, − is violated."
     return element(

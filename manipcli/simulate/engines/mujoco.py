@@ -79,6 +79,10 @@ class MujocoEngine:
         self._position, self._velocity = data.qpos[:n], data.qvel[:n]
         self._state = WorldState.room(n, m)
         self._bodies = BodyStates(data, scene, self._state)
+        if settings.velocity is not None:
+            self._velocity[:] = settings.velocity
+        if settings.twists is not None:
+            self._bodies.move(settings.twists)
         self._motors = Motors(model, data, robot, settings.step)
         self._contacts = Contacts(model, data, built.parts)
         self._wrenches = WrenchSensors(mujoco, model, data, built.links, settings.step)

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, cast
 
+import numpy as np
+
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
@@ -50,6 +52,17 @@ class BodyStates:
             numbers[at], numbers[at + 1], numbers[at + 2] = px - x, py - y, pz - z
         if velocities:
             self._read_velocities()
+
+    def move(self, twists: Array) -> None:
+        """Give the bodies velocities (m, 6) of their frames O, linear then angular, in the world."""
+        for pose, twist, own, offset in zip(
+            self._poses.tolist(), twists.tolist(), self._twists, self._offsets, strict=True
+        ):
+            w, *vector = pose[3:]
+            angular = twist[3:]
+            arm = _rotated([w, *vector], offset or (0.0, 0.0, 0.0))
+            own[:3] = np.add(twist[:3], np.cross(angular, arm))
+            own[3:] = _rotated([w, *(-x for x in vector)], angular)
 
     def _read_velocities(self) -> None:
         linear, angular, at = self._linear, self._angular, 0

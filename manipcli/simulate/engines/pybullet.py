@@ -138,11 +138,26 @@ class PybulletEngine:
 
     def _start(self, robot: RobotModel, settings: EngineSettings) -> None:
         p, client = self._p, self._client
-        for k, position in zip(self._joints, settings.start, strict=True):
-            p.resetJointState(self._robot, k, float(position), 0.0, physicsClientId=client)
+        velocity = 0.0 * settings.start if settings.velocity is None else settings.velocity
+        for k, position, speed in zip(self._joints, settings.start, velocity, strict=True):
+            p.resetJointState(self._robot, k, float(position), float(speed), physicsClientId=client)
+        if settings.twists is not None:
+            self._move_bodies(settings.twists)
         couple_mimics(p, client, robot, self._robot, self._joints)
         add_rotor_inertia(p, client, robot, self._robot, self._joints, step=settings.step)
         self._motors = Motors(p, client, self._robot, self._joints, robot, settings.step)
+
+    def _move_bodies(self, twists: Array) -> None:
+        """Give the movable bodies their velocities; Bullet's are those of their centres."""
+        p, client = self._p, self._client
+        for (k, offset, turned), twist in zip(self._movable, twists.tolist(), strict=True):
+            linear, angular = twist[:3], twist[3:]
+            if offset is not None:
+                _, quat = p.getBasePositionAndOrientation(k, client)
+                if turned is not None:
+                    _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
+                linear = [v + w for v, w in zip(linear, _cross(angular, _rotated(quat, offset)), strict=True)]
+            p.resetBaseVelocity(k, linear, angular, physicsClientId=client)
 
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state

@@ -452,8 +452,8 @@ class TestWhoseFile:
 
     def test_later_format(self, small: tuple[Any, Path]) -> None:
         data = small[1].read_bytes()
-        small[1].write_bytes(data.replace(b"format\x01\x00\x00\x002", b"format\x01\x00\x00\x003"))
-        with pytest.raises(BadRecording, match=r"has format 3; this manipcli reads up to 2"):
+        small[1].write_bytes(data.replace(b"format\x01\x00\x00\x002", b"format\x01\x00\x00\x004"))
+        with pytest.raises(BadRecording, match=r"has format 4; this manipcli reads up to 3"):
             read_recording(small[1])
 
 

@@ -36,7 +36,7 @@ def test_wrenches_stand_among_the_controllers(tmp_path: Path, make_run: Callable
         active = None if k == 7 else wrench
         recorder.tick(k, WorldState(*one, none, none), [arm, ControllerOutput.published(0), active, hand])
     recorder.finish({})
-    wrenches[7] = np.nan
+    active_at = [k for k in range(T) if k != 7]
 
     store = get_typestore(Stores.EMPTY)
     found = []
@@ -46,13 +46,13 @@ def test_wrenches_stand_among_the_controllers(tmp_path: Path, make_run: Callable
             if not found:
                 store.register(get_types_from_msg(schema.data.decode(), schema.name))
             found.append((message.log_time, store.deserialize_cdr(message.data, schema.name)))
-    assert [time for time, _ in found] == [k * 1_000_000 for k in range(T)]
+    assert [time for time, _ in found] == [k * 1_000_000 for k in active_at]
     assert {m.header.frame_id for _, m in found} == {"wheel"}
-    assert [m.header.stamp.nanosec for _, m in found] == [k * 1_000_000 for k in range(T)]
+    assert [m.header.stamp.nanosec for _, m in found] == [k * 1_000_000 for k in active_at]
     values = [
         [*(getattr(part, axis) for part in (m.wrench.force, m.wrench.torque) for axis in "xyz")] for _, m in found
     ]
-    np.testing.assert_array_equal(values, wrenches)
+    np.testing.assert_array_equal(values, wrenches[active_at])
 
     read = read_recording(path).whole()
     assert [trace.name for trace in read.controllers] == ["arm", "hand"]

@@ -1,0 +1,105 @@
+"""State of a running task at the start of a step, from which another run can begin; its attachment in logs."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, frozen
+
+START_STATE: Final = "start_state.json"
+"""The attachment of a run that begins with the state of another run."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartState:
+    """The state of a run at one control tick.
+
+    Attributes:
+        log: name of the log that it is from.
+        sha256: of that file.
+        step: id of the step that begins with it.
+        time: [s] in that log.
+        joints: (n) names of the moving joints.
+        position, velocity: (n) [rad or m, per second].
+        reference: (n) positions commanded by the active controllers; NaN for uncommanded joints.
+        bodies: (m) names of the movable bodies.
+        poses: (m, 7) x y z [m] and quaternion xyzw of each body's frame O in the world.
+        twists: (m, 6) velocity of O [m/s] and angular velocity [rad/s], in the world.
+        active: names of the active controllers that command joints; `inactive`: of the others.
+        held: the body in the hand; "" without one.
+        closed: the hand was closed to hold something, and not opened since.
+    """
+
+    log: str
+    sha256: str
+    step: str
+    time: float
+    joints: tuple[str, ...]
+    position: Array
+    velocity: Array
+    reference: Array
+    bodies: tuple[str, ...]
+    poses: Array
+    twists: Array
+    active: tuple[str, ...]
+    inactive: tuple[str, ...]
+    held: str
+    closed: bool
+
+    def to_json(self) -> bytes:
+        """The attachment; numbers are exact, and an unknown reference is null."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return json.dumps({name: _plain(value) for name, value in values.items()}, indent=1).encode()
+
+    @staticmethod
+    def from_json(content: bytes) -> StartState:
+        """The inverse of `to_json`.
+
+        Raises:
+            ValueError: the content is damaged.
+        """
+        try:
+            read = json.loads(content)
+            state = StartState(
+                log=str(read["log"]),
+                sha256=str(read["sha256"]),
+                step=str(read["step"]),
+                time=float(read["time"]),
+                joints=tuple(map(str, read["joints"])),
+                position=_array(read["position"]),
+                velocity=_array(read["velocity"]),
+                reference=_array(read["reference"]),
+                bodies=tuple(map(str, read["bodies"])),
+                poses=_array(read["poses"]).reshape(-1, 7),
+                twists=_array(read["twists"]).reshape(-1, 6),
+                active=tuple(map(str, read["active"])),
+                inactive=tuple(map(str, read["inactive"])),
+                held=str(read["held"]),
+                closed=bool(read["closed"]),
+            )
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise ValueError(f"has a damaged {START_STATE}") from error
+        n, m = len(state.joints), len(state.bodies)
+        shapes = (state.position.shape, state.velocity.shape, state.reference.shape)
+        known = (state.position, state.velocity, state.poses.ravel(), state.twists.ravel(), [state.time])
+        finite = bool(np.isfinite(np.concatenate(known)).all())
+        if shapes != ((n,),) * 3 or len(state.poses) != m or len(state.twists) != m or not finite:
+            raise ValueError(f"has a damaged {START_STATE}")
+        return state
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return [_plain(row) for row in value.tolist()]
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _array(value: object) -> Array:
+    return frozen(np.array(value, dtype=np.float64))
