@@ -11,7 +11,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
-from manipcli.description.expanded import is_plain, unread_description
+from manipcli.description.expanded import OPTENV, is_plain, unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
@@ -208,7 +208,7 @@ class _Descriptions:
             read = [
                 each
                 for each in parts.findings
-                if (each.severity == "warning" and each.code != UNSTATED) or each.code == REGULARISED
+                if (each.severity == "warning" and each.code != UNSTATED) or each.code in (REGULARISED, OPTENV)
             ]
             self._reporter.findings += _grouped(list(dict.fromkeys(read)))
         return parts
