@@ -15,8 +15,6 @@ from manipcli.description.packages import Packages, Unread
 
 XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro", "http://wiki.ros.org/xacro")
 
-OPTENV = "XACRO011"
-"""Code of the note on a `$(optenv NAME DEFAULT)` whose default is used."""
 
 _USES = re.compile(r"<xacro:|\sxacro:|\$\{|\$\(")
 """An element, an attribute or an expression of xacro."""

@@ -11,13 +11,14 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
-from manipcli.description.expanded import OPTENV, is_plain, unread_description
+from manipcli.description.expanded import is_plain, unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages
 from manipcli.description.urdf.joint import UNSTATED
 from manipcli.description.urdf.link import MISSING_VISUAL, REGULARISED
 from manipcli.description.urdf.urdf import Parts, read_parts
+from manipcli.description.xacro.values import OPTENV
 from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.build_limits import with_limits
 from manipcli.model.holding import CUP_RADIUS, Holding

@@ -21,12 +21,20 @@ from xml.dom.minidom import Element as DomElement
 
 from manipcli.core.errors import EXPANDED, Diagnostic, InvalidInput, Place
 from manipcli.description.bounds import bounds
-from manipcli.description.expanded import OPTENV
 from manipcli.description.located_xml import called_from, invalid, place_of, read_document
 from manipcli.description.packages import Absent, NotFound, Packages
 from manipcli.description.xacro.expression import Evaluator
 from manipcli.description.xacro.similar_names import UnknownArgument, names_of, near_macro, near_name
-from manipcli.description.xacro.values import Beyond, Clock, Refused, math_symbols, python_symbols, size_of, too_large
+from manipcli.description.xacro.values import (
+    OPTENV,
+    Beyond,
+    Clock,
+    Refused,
+    math_symbols,
+    python_symbols,
+    size_of,
+    too_large,
+)
 from manipcli.description.xacro.yaml_data import Mistyped, load_yaml
 
 _loading = threading.Lock()
