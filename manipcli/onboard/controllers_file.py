@@ -123,7 +123,7 @@ def _tuned(
         parts["arm_controller"] = Entry(_trajectory(arm, None, None))
     if hand:
         parts["hand_controller"] = Entry(_gripper(hand, None, None))
-    path.write_text(written({"controllers": Entry(parts)}))
+    path.write_text(written({"controllers": Entry(parts)}), encoding="utf-8")
     failed = ""
     for bandwidth in BANDWIDTHS:
         wish = Wish(bandwidth, 1.0, PERIOD)
