@@ -139,7 +139,7 @@ def _end_of(job: Job, beats: _Beats, prepared: Prepared | None = None) -> End:
             notes += better
         except InvalidInput as invalid:
             findings, found = invalid.findings, troubles_of(invalid.findings)
-    if found and report.log is not None:
+    if found and report.log is not None and settings.pictures:
         beats.activity("drawing a picture")
         notes += _noted(
             "no picture",

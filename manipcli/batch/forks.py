@@ -216,9 +216,9 @@ class ForkPool:
         self._templates: dict[Loading, ForkServer | None] = {}
         self._note = ""
 
-    def open(self) -> None:
-        """Starts the first server, where it can save time, and waits until it is ready."""
-        if not available() or self._left.total() < 2:
+    def open(self, *, least: int = 2) -> None:
+        """Starts the first server, where it can save time, and waits until it is ready; `least`: number of runs."""
+        if not available() or self._left.total() < least:
             return
         try:
             self._first = _server(self._new_process)

@@ -42,6 +42,7 @@ class Settings:
     Attributes:
         pages: folder for a page about each run; None for no pages.
         keep_logs: keep the logs of passed runs, too.
+        pictures: draw runs that did not pass.
         baseline: compare a run of a task as written with its baseline.
         engines: run each task in these engines and compare the runs; empty: in its own engine.
         check_step: run each task also at half the physics step, and compare the runs.
@@ -56,6 +57,7 @@ class Settings:
     folder: Path = FOLDER
     pages: Path | None = None
     keep_logs: bool = False
+    pictures: bool = True
     baseline: bool = True
     engines: tuple[str, ...] = ()
     check_step: bool = False

@@ -57,9 +57,9 @@ LONGEST_WAIT = 60.0
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
 
 
-def run_job(job: Job, *, command: tuple[str, ...] = ()) -> CaseReport:
+def run_job(job: Job, *, command: tuple[str, ...] = (), pool: ForkPool | None = None) -> CaseReport:
     """Runs a job and returns its report; see `run_jobs`."""
-    (report,) = run_jobs([job], command=command)
+    (report,) = run_jobs([job], command=command, pool=pool)
     return report
 
 
@@ -70,6 +70,7 @@ def run_jobs(
     observer: Callable[[Job, Beat], None] | None = None,
     command: tuple[str, ...] = (),
     server: tuple[str, ...] = (),
+    pool: ForkPool | None = None,
 ) -> Generator[CaseReport, None, None]:
     """Runs jobs and yields their reports, in the order in which they end.
 
@@ -81,12 +82,15 @@ def run_jobs(
         observer: callback for each start and each heartbeat.
         command: another program instead of `batch/child.py`, started as a new process.
         server: another program instead of `batch/fork_server.py`.
+        pool: an open one, of whoever starts runs one at a time; it stays open.
     """
     waiting = deque(jobs)
     running: list[Process] = []
-    pool = ForkPool([] if command and not server else waiting, command=server)
+    own = None if pool is not None else ForkPool([] if command and not server else waiting, command=server)
+    pool = pool or own
     try:
-        pool.open()
+        if own is not None:
+            own.open()
         while waiting or running:
             while waiting and len(running) < at_once:
                 started = _started(waiting.popleft(), command, pool)
@@ -110,10 +114,11 @@ def run_jobs(
     finally:
         for process in running:
             process.forget()
-        pool.close()
+        if own is not None:
+            own.close()
 
 
-def _started(job: Job, command: tuple[str, ...], pool: ForkPool) -> Process | CaseReport:
+def _started(job: Job, command: tuple[str, ...], pool: ForkPool | None) -> Process | CaseReport:
     """The process of a job, or why there is none."""
     if job.case.findings:
         return _unreadable(job)
@@ -325,7 +330,7 @@ class Process:
 
     def _draw_what_is_left(self) -> None:
         """Draws the end of the partial log, in another process: it may crash for the same reason as the run."""
-        if not self.job.partial.exists():
+        if not self.job.partial.exists() or not self.job.settings.pictures:
             return
         settings = self.job.settings
         packages = [str(path) for path in settings.package_path]

@@ -55,10 +55,16 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> Non
         console.result(f"written: {path}")
 
 
-def notes(folder: Path) -> Iterator[str]:
-    """Notes on the folder of a written project."""
+def notes(folder: Path, *, workflow: bool) -> Iterator[str]:
+    """Notes on the folder of a written project; `workflow`: whether it has one."""
     yield from _unignored(folder / ".gitignore")
-    yield from _not_at_the_top(folder)
+    if workflow:
+        yield from _not_at_the_top(folder)
+    else:
+        yield (
+            "no workflow for GitHub Actions is written: manipcli runs without being installed, so what its jobs would "
+            "install is unknown; install manipcli with pip and repeat with --force"
+        )
 
 
 def enter(folder: Path) -> str:

@@ -11,11 +11,14 @@ import base64
 import hashlib
 import io
 import json
+import re
+import subprocess
 import zipfile
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Final
+from urllib.parse import urlsplit
 
 from manipcli.core.version import __version__
 
@@ -49,30 +52,50 @@ def installation() -> Installation | None:
 
 
 def _address(text: str | None) -> str | None:
-    """The address on the network in `direct_url.json`, as pip reads it; None for a folder of this machine."""
+    """The address on the network in `direct_url.json`, as pip reads it; None for a folder of this machine.
+
+    None, too, for an address with a name, a password or a query, which could be a secret: it must not get into a
+    repository, and is of no use without.
+    """
     try:
         stated = json.loads(text or "{}")
-        url = str(stated.get("url", ""))
-        version = stated.get("vcs_info") or {}
-        if version and not url.startswith("file:"):
-            return f"{version['vcs']}+{url}@{version['commit_id']}"
-    except (ValueError, KeyError, AttributeError):
+        url, version = str(stated.get("url", "")), stated.get("vcs_info") or {}
+        parts = urlsplit(url)
+        public = parts.scheme in ("http", "https") and parts.username is None
+        public |= parts.scheme in ("ssh", "git") and parts.username in (None, "git") and parts.password is None
+        if not public or parts.query or parts.fragment or (parts.scheme in ("ssh", "git") and not version):
+            return None
+        address = f"{version['vcs']}+{url}@{version['commit_id']}" if version else url
+        folder = stated.get("subdirectory")
+        return f"{address}#subdirectory={folder}" if folder else address
+    except (ValueError, KeyError, AttributeError, TypeError):
         return None
-    return url if url.startswith(("http://", "https://")) else None
+
+
+def _files() -> list[Path]:
+    """The files of the package; where it is a checkout, those that git tracks, so that no other file gets out."""
+    try:
+        command = ["git", "-c", "core.fsmonitor=", "ls-files", "-z"]
+        listed = subprocess.run(command, cwd=PACKAGE, capture_output=True, check=False).stdout
+        tracked = [PACKAGE / name for name in listed.decode("utf-8", "surrogateescape").split("\0") if name]
+    except OSError:
+        tracked = []
+    return sorted(path for path in tracked or PACKAGE.rglob("*") if path.is_file())
 
 
 def _wheel(own: metadata.Distribution) -> bytes:
-    """The wheel of the installed package (PEP 427)."""
+    """The wheel of the installed package (PEP 427), with the version of its files whatever was installed before."""
     info = f"manipcli-{__version__}.dist-info"
     files = {
         f"manipcli/{path.relative_to(PACKAGE).as_posix()}": path.read_bytes()
-        for path in sorted(PACKAGE.rglob("*"))
-        if path.is_file() and path.suffix not in LEFT_OUT and "__pycache__" not in path.parts
+        for path in _files()
+        if path.suffix not in LEFT_OUT and "__pycache__" not in path.parts
     }
-    for name in ("METADATA", "entry_points.txt"):
+    for name in ("METADATA", "entry_points.txt", "licenses/LICENSE"):
         text = own.read_text(name)
         if text is not None:
-            files[f"{info}/{name}"] = text.encode()
+            version = re.sub(r"(?m)^Version: .*$", f"Version: {__version__}", text, count=1)
+            files[f"{info}/{name}"] = (version if name == "METADATA" else text).encode()
     files[f"{info}/WHEEL"] = b"Wheel-Version: 1.0\nGenerator: manipcli\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
     record = "".join(f"{name},sha256={_digest(data)},{len(data)}\n" for name, data in files.items())
     files[f"{info}/RECORD"] = f"{record}{info}/RECORD,,\n".encode()

@@ -354,6 +354,17 @@ def package_name(folder: Path) -> str | None:
     return found[1].decode("utf-8", "replace") if found else None
 
 
+def may_name(folder: Path, name: str, root: Path) -> bool:
+    """Whether a file below `root` may name a folder as package `name`: a ROS package of this name, or one below `root`.
+
+    Hidden folders below `root` are not packages. Symbolic links are resolved.
+    """
+    real = Path(os.path.realpath(folder))
+    if package_name(real) == name:
+        return True
+    return real.is_relative_to(root) and not any(part.startswith(".") for part in real.relative_to(root).parts)
+
+
 def packages_below(folder: Path) -> dict[str, Path]:
     """The packages at or below a folder by name, the nearest of each name, as rospack searches.
 

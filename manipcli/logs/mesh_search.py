@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
-from manipcli.description.packages import NotFound, Packages
+from manipcli.description.packages import NotFound, Packages, may_name
 from manipcli.model.robot import RobotModel
 from manipcli.run.run_log import RUNS
 from manipcli.scene.scene import Scene
@@ -51,8 +51,9 @@ class MeshSearch:
         project = _folders(beside.parent) if beside.name == RUNS.name else []
         places = [*package_path, *project, *_folders(beside), here, *_folders(here)]
         tasks = [*([beside.parent] if project else []), beside, *places]
+        root = None if allow_outside else beside.parent if project else beside
         self._packages = Packages(
-            log, package_path=places, allow_outside=allow_outside, named=_named_packages(tasks, *robot)
+            log, package_path=places, allow_outside=allow_outside, named=_named_packages(tasks, *robot, root=root)
         )
         self._hashes = hashes
         self._known = known
@@ -110,17 +111,20 @@ class MeshSearch:
         return path
 
 
-def _named_packages(tasks: Sequence[Path], robot: str, packages: Mapping[str, str]) -> dict[str, Path]:
+def _named_packages(
+    tasks: Sequence[Path], robot: str, packages: Mapping[str, str], *, root: Path | None
+) -> dict[str, Path]:
     """The folders of `packages:` of a robot file, if it lies where a task in one of the folders `tasks` names it.
 
     By their names, and by the names of the folders, which the URIs of a log use for a package without `package.xml`.
+    A log is of unknown origin: a folder outside `root` must be a ROS package of this name; None permits all folders.
     """
     found: dict[str, Path] = {}
     for file in dict.fromkeys(folder / robot for folder in tasks) if packages else ():
         if file.is_file():
             for name, folder in packages.items():
                 place = (file.parent / folder).resolve()
-                if place.is_dir():
+                if place.is_dir() and (root is None or may_name(place, name, root)):
                     found.setdefault(name, place)
                     found.setdefault(place.name, place)
     return found

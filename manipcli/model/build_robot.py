@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
@@ -14,10 +14,11 @@ from manipcli.description.elements import Joint, JointLimits, Link, Mimic, Trans
 from manipcli.description.expanded import is_plain, unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
-from manipcli.description.packages import NotFound, Packages
+from manipcli.description.packages import NotFound, Packages, may_name, own_root
 from manipcli.description.urdf.joint import UNSTATED
 from manipcli.description.urdf.link import MISSING_VISUAL, REGULARISED
 from manipcli.description.urdf.urdf import Parts, read_parts
+from manipcli.description.xacro.values import OPTENV
 from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.build_limits import with_limits
 from manipcli.model.holding import CUP_RADIUS, Holding
@@ -152,11 +153,6 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     )
 
 
-def package_folders(spec: RobotSpec, file: Path) -> dict[str, Path]:
-    """The folders of `packages:` by name; relative ones start at the folder of the robot file."""
-    return {name: file.resolve().parent / folder for name, folder in (spec.packages or {}).items()}
-
-
 class _Descriptions:
     """Reads the description files that a robot file names."""
 
@@ -168,12 +164,25 @@ class _Descriptions:
         self._folder = file.resolve().parent
         self._package_path = package_path
         self._allow_outside = allow_outside
-        self._named = package_folders(spec, file)
-        for name, folder in self._named.items():
-            if not folder.is_dir():
-                message = f"package '{name}': there is no folder '{(spec.packages or {})[name]}'"
-                reporter.error("ROBOT309", message, ("packages", name), hint="write it relative to this file")
+        self._named = dict(self._packages(own_root(file) or self._folder))
         self._sources = Packages(file, package_path=package_path, allow_outside=True, named=self._named)
+
+    def _packages(self, root: Path) -> Iterator[tuple[str, Path]]:
+        """The folders of `packages:` by name, which start at the folder of the robot file; `root`: of its project."""
+        for name, written in (self._spec.packages or {}).items():
+            folder, loc = self._folder / written, ("packages", name)
+            given = any(folder.resolve().is_relative_to(place.resolve()) for place in self._package_path)
+            if not folder.is_dir():
+                message = f"package '{name}': there is no folder '{written}'"
+                self._reporter.error("ROBOT309", message, loc, hint="write it relative to this file")
+            elif not (self._allow_outside or given or may_name(folder, name, root)):
+                message = (
+                    f"package '{name}': '{written}' is outside the robot file's folder, and no ROS package '{name}'"
+                )
+                hint = "move it into the project, add its folder with --package-path DIR, or pass --allow-outside"
+                self._reporter.error("ROBOT370", message, loc, hint=hint)
+            else:
+                yield name, folder
 
     def parts(
         self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc, prefix: str = ""
@@ -208,7 +217,7 @@ class _Descriptions:
             read = [
                 each
                 for each in parts.findings
-                if (each.severity == "warning" and each.code != UNSTATED) or each.code == REGULARISED
+                if (each.severity == "warning" and each.code != UNSTATED) or each.code in (REGULARISED, OPTENV)
             ]
             self._reporter.findings += _grouped(list(dict.fromkeys(read)))
         return parts

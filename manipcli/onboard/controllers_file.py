@@ -107,9 +107,6 @@ class ControllersGuess:
             entries["hand_controller"] = Entry(_gripper(self._hand, self._tuning, reason))
         file = {"controllers": Entry(entries)}
         notes = self._tuning.notes if self._tuning is not None else ()
-        if by_position:
-            parts = [name for name, own in (("arm", self._arm), ("hand", self._hand)) if own and name in by_position]
-            notes = (*notes, f"commanded by position: {' and '.join(parts)}, because by effort: {why}")
         return WrittenControllers(written(file, head=_HEAD), file, notes)
 
 
@@ -123,7 +120,7 @@ def _tuned(
         parts["arm_controller"] = Entry(_trajectory(arm, None, None))
     if hand:
         parts["hand_controller"] = Entry(_gripper(hand, None, None))
-    path.write_text(written({"controllers": Entry(parts)}))
+    path.write_text(written({"controllers": Entry(parts)}), encoding="utf-8")
     failed = ""
     for bandwidth in BANDWIDTHS:
         wish = Wish(bandwidth, 1.0, PERIOD)
@@ -141,7 +138,7 @@ def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | 
         "stopped_velocity_tolerance": Entry(0.05),
         "joints": Entry(tolerances),
     }
-    control = {"command_interface": Entry("position", f"by effort: {position}", True)}
+    control = {"command_interface": Entry("position", f"because by effort: {position}", True)}
     if position is None:
         control = {
             "command_interface": Entry("effort", "PID on efforts, and the model's inverse dynamics as feed-forward"),
@@ -158,7 +155,7 @@ def _trajectory(joints: tuple[str, ...], tuning: Tuning | None, position: str | 
 
 def _gripper(joints: tuple[str, ...], tuning: Tuning | None, position: str | None) -> dict[str, Entry]:
     control = (
-        {"command_interface": Entry("position", f"by effort: {position}", True)}
+        {"command_interface": Entry("position", f"because by effort: {position}", True)}
         if position is not None
         else _gains(joints, tuning)
     )

@@ -1,17 +1,22 @@
-"""A first task for a robot, found by trying: plans and runs of candidates until one passes."""
+"""A first task for a robot, found by trying: runs of candidates until one passes.
+
+Each run is a process, so that a crash or a hang of native code fails a candidate, and not the search.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
-from manipcli import pipeline
-from manipcli.core.errors import InvalidInput, NotPlannable
+from manipcli.batch.forks import ForkPool
+from manipcli.batch.job import Job, Settings
+from manipcli.batch.process import run_job
 from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
@@ -20,7 +25,7 @@ from manipcli.onboard.home import HomeSearch
 from manipcli.onboard.reachable import Spots, reachable_spots
 from manipcli.onboard.robot_draft import BLOCK, NOTHING_TO_HOLD_WITH, RobotDraft
 from manipcli.onboard.writer import Entry, Value, written
-from manipcli.task.load_task import LoadOptions
+from manipcli.report.suite.suite import Case
 
 MOST_PLANS: Final = 10
 MOST_RUNS: Final = 3
@@ -33,8 +38,28 @@ UNDONE: Final = 0.25
 SHARES: Final = (1.0, 0.75, 0.5)
 """Of the way to closed, tried in turn."""
 LEAST_UNDONE: Final = {"rad": 0.09, "m": 0.003}
+NO_ARM: Final = "the robot has no arm"
+NO_HAND: Final = "the robot has no hand"
 MOVES: Final = 12
 """Pairs of poses that are tried."""
+
+
+Shown = Literal["passed", "failed", "not tried"]
+
+
+@dataclass(frozen=True, slots=True)
+class Ability:
+    """What a run showed of the robot.
+
+    Attributes:
+        what: the robot does, or should do.
+        shown: by a run.
+        why: the run that showed it; else why no run did.
+    """
+
+    what: str
+    shown: Shown
+    why: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +68,11 @@ class FirstTask:
 
     Attributes:
         name: of the task and its file.
-        text: of the file.
+        entries: of the file.
         poses: named poses that it needs in the robot file.
         does: what it does, in words.
-        passed: whether its run passed.
-        notes: what was tried before, and why it failed.
+        passed: whether its run passed, and the robot does more in it than hold still.
+        abilities: what was shown and what not, the least first.
     """
 
     name: str
@@ -55,7 +80,7 @@ class FirstTask:
     poses: Mapping[str, Entry]
     does: str
     passed: bool
-    notes: tuple[str, ...]
+    abilities: tuple[Ability, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +91,8 @@ class _Candidate:
     poses: Mapping[str, Entry]
 
 
-class TaskSearch:
-    """Tries tasks in a folder with the robot and controllers files."""
+class TaskSearch(AbstractContextManager["TaskSearch"]):
+    """Tries tasks in a folder with the robot and controllers files; its end ends the process that forks the runs."""
 
     def __init__(
         self,
@@ -88,9 +113,20 @@ class TaskSearch:
             on_progress: receives what is being tried.
         """
         self._folder, self._draft, self._write_robot = folder, draft, write_robot
-        self._options: LoadOptions = {"package_path": package_path, "allow_outside": allow_outside}
+        self._settings = Settings(
+            package_path=package_path,
+            allow_outside=allow_outside,
+            folder=folder / "runs",
+            baseline=False,
+            pictures=False,
+        )
         self._progress = on_progress
         self._causes: list[str] = []
+        self._pool = ForkPool([])
+        self._pool.open(least=0)
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.close()
 
     def unsteady(self) -> str | None:
         """Why the robot does not hold still with these controllers, or a hand alone does not close; None if it does."""
@@ -99,77 +135,72 @@ class TaskSearch:
         if self._draft.parts.arm is None:
             candidates += itertools.islice(self._closes(), 1)
         for candidate in candidates:
-            self._progress(f"{candidate.does}: a run")
-            if self._plans(candidate) and not self._passes(candidate):
+            self._progress(candidate.does)
+            if self._tried(candidate) == "failed":
                 return self._causes[-1]  # a task without a plan is not the fault of controllers
         return None
 
     def search(self) -> FirstTask:
-        """The most ambitious task that passes: pick and place, else moves, else open and close."""
-        notes: list[str] = []
-        last: _Candidate | None = None
-        for kind, candidates in (
-            ("picking and placing a block", self._picks()),
-            ("moving between poses", self._moves()),
-            ("opening and closing the hand", self._closes()),
-            ("holding still", iter((self._waits(),))),
+        """The most ambitious task that passes: picking and placing, else moves, else opening and closing."""
+        best: _Candidate | None = None
+        poses: dict[str, Entry] = {}
+        abilities: list[Ability] = []
+        for what, candidates in (
+            ("picks and places a block", self._picks()),
+            ("moves between poses", self._moves()),
+            ("opens and closes the hand", self._closes()),
+            ("holds still", iter((self._waits(),))),
         ):
-            self._causes.clear()
-            runs = plans = 0
-            for candidate in candidates:
-                last = candidate
-                plans += 1
-                self._progress(f"{candidate.does} ({plans})")
-                planned = self._plans(candidate)
-                runs += planned
-                if planned:
-                    self._progress(f"{candidate.does}: a run")
-                if planned and self._passes(candidate):
-                    return FirstTask(
-                        candidate.name, candidate.entries, candidate.poses, candidate.does, True, tuple(notes)
-                    )
-                if plans >= MOST_PLANS or runs >= MOST_RUNS:
-                    break
-            if plans or self._causes:
-                cause = max(self._causes, key=self._causes.count) if self._causes else "unknown"
-                notes.append(f"{kind} failed in {number_of(plans, 'attempt')} ({number_of(runs, 'run')}): {cause}")
-        assert last is not None
-        return FirstTask(last.name, last.entries, last.poses, last.does, False, tuple(notes))
+            own = what == "opens and closes the hand" and best is not None and best.name == "moves"
+            if best is not None and not own:
+                abilities.append(Ability(what, "passed", f"in the run of {best.name}"))
+                continue
+            found, ability = self._first(what, candidates)
+            abilities.append(ability)
+            if found is not None:
+                best, poses = best or found, {**found.poses, **poses}
+        passed = best is not None and best.name != "wait"
+        best = best or self._waits()
+        return FirstTask(best.name, best.entries, poses, best.does, passed, tuple(reversed(abilities)))
 
-    def _path(self, candidate: _Candidate) -> Path:
+    def _first(self, what: str, candidates: Iterator[_Candidate]) -> tuple[_Candidate | None, Ability]:
+        """The first candidate that passes."""
+        self._causes.clear()
+        runs = tried = 0
+        for candidate in candidates:
+            tried += 1
+            self._progress(f"{candidate.does} ({tried})")
+            outcome = self._tried(candidate)
+            if outcome == "passed":
+                return candidate, Ability(what, "passed", f"{candidate.does}: {candidate.name}")
+            runs += outcome == "failed"
+            if tried >= MOST_PLANS or runs >= MOST_RUNS:
+                break
+        cause = max(self._causes, key=self._causes.count) if self._causes else "unknown"
+        if not tried:
+            return None, Ability(what, "not tried", cause)
+        attempts = f"{number_of(tried, 'attempt')}, {number_of(runs, 'run')}"
+        return None, Ability(what, "failed", f"{attempts}: {cause}")
+
+    def _tried(self, candidate: _Candidate) -> Literal["passed", "failed", "unplanned"]:
+        """The outcome of a run; the cause of another one than "passed" is the last of `_causes`."""
         self._write_robot(candidate.poses)
         path = self._folder / "tasks" / f"{candidate.name}.yaml"
         path.parent.mkdir(exist_ok=True)
-        path.write_text(written(candidate.entries))
-        return path
-
-    def _plans(self, candidate: _Candidate) -> bool:
-        try:
-            pipeline.plan_task(pipeline.load_task(self._path(candidate), **self._options))
-        except NotPlannable as refusal:
-            self._causes.append(f"{refusal.step}: {refusal.cause}")
-            return False
-        except InvalidInput as refused:
-            self._causes.append(refused.findings[0].message)
-            return False
-        return True
-
-    def _passes(self, candidate: _Candidate) -> bool:
-        try:
-            report = pipeline.run_task(
-                self._path(candidate), log=self._folder / "first.mcap", force=True, **self._options
-            )
-        except InvalidInput as refused:
-            self._causes.append(refused.findings[0].message)
-            return False
-        if report.verdict.verdict != "passed":
-            self._causes.append(report.verdict.text)
-        return report.verdict.verdict == "passed"
+        path.write_text(written(candidate.entries), encoding="utf-8")
+        report = run_job(Job(Case(path.name, candidate.name), path, self._settings), pool=self._pool)
+        if report.passed:
+            return "passed"
+        cause = [finding.message for finding in report.findings] or [report.text]
+        self._causes.append(cause[0])
+        planned = report.outcome in ("crashed", "hung") or report.log is not None
+        return "failed" if planned else "unplanned"
 
     def _picks(self) -> Iterator[_Candidate]:
         draft = self._draft
         arm, frame = draft.parts.arm, draft.frame
         if arm is None or frame is None or draft.parts.hand is None:
+            self._causes.append(NO_ARM if arm is None else NO_HAND)
             return
         if not any(draft.robot.link(link).collisions for branch in draft.parts.hand.branches for link in branch):
             self._causes.append(NOTHING_TO_HOLD_WITH)
@@ -192,6 +223,7 @@ class TaskSearch:
     def _moves(self) -> Iterator[_Candidate]:
         draft = self._draft
         if draft.search is None or draft.parts.arm is None:
+            self._causes.append(NO_ARM)
             return
         columns = draft.robot.indices(draft.parts.arm.joints)
         others = _elsewhere(draft.search, draft.home[columns])
@@ -211,6 +243,8 @@ class TaskSearch:
                 "expect": Entry([{"at_pose": {"pose": "home", "group": draft.arm_name, "within": "2 deg"}}]),
             }
             yield _Candidate("moves", entries, "the arm moves between three poses", poses)
+        if not others:
+            self._causes.append("no other configuration was found that is free of collision and inside the limits")
 
     def _waits(self) -> _Candidate:
         entries = {**_head("wait", "The robot holds still."), "steps": Entry([{"wait": "0.5 s"}])}
@@ -218,6 +252,7 @@ class TaskSearch:
 
     def _closes(self) -> Iterator[_Candidate]:
         if self._draft.parts.hand is None:
+            self._causes.append(NO_HAND)
             return
         robot, hand = self._draft.robot, self._draft.parts.hand
         group = self._draft.hand_name

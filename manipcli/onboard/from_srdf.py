@@ -78,8 +78,8 @@ class StatedParts:
 def stated_parts(robot: RobotModel, srdf: Srdf) -> StatedParts:
     """The parts of a robot as its SRDF states them.
 
-    The hand is the group of the first end effector, the arm its parent group; without one, the arm is the group with
-    the most joints in series.
+    The hand is the group of an end effector, the arm its parent group; without one, the arm is the group with the most
+    joints in series that lead to the end effector's parent link. Of several, those with the longest arm.
 
     Raises:
         InvalidInput: groups or states name links or joints that the robot does not have.
@@ -120,27 +120,33 @@ class _Reader:
         self.findings: list[Diagnostic] = []
 
     def chosen(self) -> tuple[SrdfGroup | None, SrdfGroup | None]:
-        """The groups of the hand and of the arm."""
-        srdf = self._srdf
-        effectors = sorted(srdf.end_effectors, key=lambda each: -len(self._joints(srdf.group(each.parent_group))))
-        for effector in effectors:
-            hand = srdf.group(effector.group)
+        """The groups of the hand and of the arm: of all end effectors, those with the longest arm."""
+        srdf, found = self._srdf, []
+        for effector in srdf.end_effectors:
+            hand, stated = srdf.group(effector.group), srdf.group(effector.parent_group)
             if hand is not None and self._joints(hand):
-                arm = srdf.group(effector.parent_group) or self._longest(without=hand, ends=effector.parent_link)
-                return hand, arm
-        return None, self._longest()
+                arm = stated if self._in_series(self._joints(stated)) else self._longest(hand, effector.parent_link)
+                found.append((len(self._joints(arm)), hand, arm))
+        if not found:
+            return None, self._longest()
+        _, hand, arm = max(found, key=lambda each: each[0])
+        return hand, arm
 
-    def _longest(self, *, without: SrdfGroup | None = None, ends: str = "") -> SrdfGroup | None:
-        """The group with the most joints in series, one after the other."""
+    def _longest(self, without: SrdfGroup | None = None, above: str | None = None) -> SrdfGroup | None:
+        """The group with the most joints in series; with `above`, of those that lead to this link."""
         own = set(self._joints(without))
+        leading = None if above is None else {joint.name for joint in self._chain(above)}
         serial = []
         for group in self._srdf.groups:
             joints = self._joints(group)
-            if joints and not own & set(joints) and self._in_series(joints):
+            reaches = leading is None or leading.issuperset(joints)
+            if reaches and not own & set(joints) and self._in_series(joints):
                 serial.append((len(joints), group))
         return max(serial, key=lambda pair: pair[0])[1] if serial else None
 
     def _in_series(self, joints: tuple[str, ...]) -> bool:
+        if not joints:
+            return False
         chain = self._chain(self._robot.joint(joints[-1]).child)
         return set(joints) <= {joint.name for joint in chain}
 

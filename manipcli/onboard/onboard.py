@@ -92,18 +92,10 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
 
         def write_robot(poses: Mapping[str, Entry]) -> None:
             entries = {**source.anywhere, **_with_poses(draft, poses)}
-            (folder / "robot.yaml").write_text(written(entries, head=head))
+            (folder / "robot.yaml").write_text(written(entries, head=head), encoding="utf-8")
 
         write_robot({})
         parts = draft.parts
-        search = TaskSearch(
-            folder,
-            draft,
-            write_robot=write_robot,
-            package_path=request.package_path,
-            allow_outside=request.allow_outside,
-            on_progress=on_progress,
-        )
         variants: Iterable[Callable[[str], WrittenControllers]]
         if given is not None:
             variants = [lambda _: given]
@@ -117,13 +109,21 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
                 allow_outside=request.allow_outside,
             ).variants()
         why: str | None = ""
-        for variant in variants:
-            controllers = variant(why or "")
-            (folder / "controllers.yaml").write_text(controllers.text)
-            why = search.unsteady()
-            if why is None:
-                break
-        task = search.search()
+        with TaskSearch(
+            folder,
+            draft,
+            write_robot=write_robot,
+            package_path=request.package_path,
+            allow_outside=request.allow_outside,
+            on_progress=on_progress,
+        ) as search:
+            for variant in variants:
+                controllers = variant(why or "")
+                (folder / "controllers.yaml").write_text(controllers.text, encoding="utf-8")
+                why = search.unsteady()
+                if why is None:
+                    break
+            task = search.search()
     task_file = f"tasks/{task.name}.yaml"
     entries = {**source.entries, **_with_poses(draft, task.poses)}
     files = {

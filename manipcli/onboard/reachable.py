@@ -17,7 +17,9 @@ from manipcli.plan.inverse_kinematics import InverseKinematics
 ABOVE: Final = 0.12
 """[m] The tool must also reach so high above the place: to come and to lift."""
 STEP: Final = 0.1
-"""[m] between the examined heights and distances."""
+"""[m] between the examined heights and distances; more for a robot so large that there would be over `CELLS`."""
+CELLS: Final = 100
+"""Heights and distances at most: a description in the wrong unit can be kilometres large."""
 ASIDE: Final = (25.0, 40.0)
 """[deg] Place and pick are so far to the left and the right of the direction in which the arm starts."""
 LEAST_APART: Final = 0.12
@@ -82,8 +84,9 @@ def reachable_spots(
     ahead = solver.forward(home).p - axis
     front = float(np.arctan2(ahead[1], ahead[0]))
     far = _farthest(solver, search, home, axis)
-    heights = [0.0, *np.arange(STEP, axis[2] + 0.7 * far, STEP).tolist()]
-    radii = np.arange(max(0.15, 0.2 * far), far, STEP / 2 if far < 0.6 else STEP).tolist()
+    step = max(STEP, (axis[2] + far) / CELLS)
+    heights = [0.0, *np.arange(step, axis[2] + 0.7 * far, step).tolist()]
+    radii = np.arange(max(0.15, 0.2 * far), far, STEP / 2 if far < 0.6 else step).tolist()
     grid = sorted(itertools.product(heights, radii), key=lambda cell: _oddness(cell, axis, far))
     grid = [(h, r) for h, r in grid if np.hypot(r, h + tool_height - axis[2]) < far][:EXAMINED]
     for approach in APPROACHES:

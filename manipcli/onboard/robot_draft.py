@@ -109,7 +109,7 @@ def draft_robot(bare: RobotModel, scene: Scene, stated: StatedParts | None = Non
     entries: dict[str, Entry] = {}
     if mount_entry is not None:
         entries["mount"] = mount_entry
-    entries["groups"] = Entry(group_entries(parts, *names))
+    entries["groups"] = Entry(group_entries(bare, parts, *names))
     if touching:
         entries["collision_ignore"] = Entry([list(pair) for pair in touching], "`disable_collisions` of the SRDF")
     if ignored:

@@ -10,21 +10,35 @@ from manipcli.onboard.closure import Closure
 from manipcli.onboard.from_srdf import StatedParts
 from manipcli.onboard.home import Home
 from manipcli.onboard.limits import ProposedLimits
-from manipcli.onboard.parts import RobotParts
+from manipcli.onboard.parts import Arm, RobotParts
 from manipcli.onboard.writer import Entry, Value
 
 
-def group_entries(parts: RobotParts, arm_name: str, hand_name: str) -> dict[str, Entry]:
-    """The groups of the arm and of the hand."""
+def group_entries(robot: RobotModel, parts: RobotParts, arm_name: str, hand_name: str) -> dict[str, Entry]:
+    """The groups of the arm and of the hand: the arm as a chain, or as joints where the chain has more of them."""
     found: dict[str, Entry] = {}
     if parts.arm is not None:
         why = parts.arm_evidence
         if parts.others:
             why += f"; not commanded, held by brakes: {listed(parts.others)}"
-        found[arm_name] = Entry({"chain": {"base": parts.arm.base, "tip": parts.arm.tip}}, why)
+        arm: dict[str, Value] = {"chain": {"base": parts.arm.base, "tip": parts.arm.tip}}
+        if not _is_whole_chain(robot, parts.arm):
+            arm = {"joints": list(parts.arm.joints), "tip": parts.arm.tip}
+        found[arm_name] = Entry(arm, why)
     if parts.hand is not None:
         found[hand_name] = Entry({"joints": list(parts.hand.joints)}, parts.hand_evidence)
     return found
+
+
+def _is_whole_chain(robot: RobotModel, arm: Arm) -> bool:
+    """Whether the arm has all the independent joints between its base and its tip."""
+    above = {joint.child: joint for joint in robot.joints}
+    names, at = [], arm.tip
+    while at != arm.base and at in above:
+        if above[at].independent:
+            names.append(above[at].name)
+        at = above[at].parent
+    return at == arm.base and tuple(reversed(names)) == arm.joints
 
 
 def pose_entries(

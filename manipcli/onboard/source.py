@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed, number_of
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
-from manipcli.description.packages import NotFound, Packages
+from manipcli.description.packages import NotFound, Packages, may_name, own_root
 from manipcli.description.urdf.link import MISSING_VISUAL
 from manipcli.description.urdf.urdf import Parts
 from manipcli.model.build_robot import build_robot
@@ -83,6 +84,13 @@ def read_source(
     name = parts.name if path.name.partition(".")[0] in GENERIC and parts.name else path.name.partition(".")[0]
     mended, notes = _mended(parts, examination.findings)
     outer = _outer_packages(path, packages, allow_outside)
+    root = own_root(folder / "robot.yaml") or Path(os.path.realpath(folder))
+    notes += [
+        f"package '{name}' is outside the project and has no package.xml: commands need --allow-outside, or "
+        f"--package-path {shlex.quote(str(place.parent))}, or copy it into the project"
+        for name, place in outer.items()
+        if not may_name(place, name, root)
+    ]
     spec = RobotSpec.model_validate(
         {
             "robot": name,

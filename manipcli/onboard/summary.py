@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from manipcli.onboard.first_task import FirstTask
+from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
 
 
@@ -24,15 +25,19 @@ def summary(
         yield ""
         yield "please check (CHECK in the files):"
         yield from (f"  {', '.join(paths)}: {why}" for paths, why in _alike(checks))
-    if notes or task.notes:
+    if notes:
         yield ""
-        yield from (f"note: {note}" for note in (*notes, *task.notes))
+        yield from (f"note: {note}" for note in notes)
     yield ""
-    yield (
-        f"{PASS} first task: {task.does}; its run passed"
-        if task.passed
-        else f"{FAIL} first task: {task.does}; no run passed"
-    )
+    marks = {"passed": f"{PASS} passed", "failed": f"{FAIL} failed", "not tried": "- not tried"}
+    rows = [(ability.what, marks[ability.shown], ability.why) for ability in task.abilities]
+    yield table(("the robot", "shown", "evidence"), rows)
+    yield ""
+    if task.passed:
+        yield f"{PASS} first task: {task.does}; its run passed"
+    else:
+        held = any(ability.shown == "passed" for ability in task.abilities)
+        yield f"{FAIL} first task: {task.does}; {'no run showed more' if held else 'no run passed'}"
 
 
 def _alike(checks: Sequence[tuple[str, str]]) -> list[tuple[list[str], str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -41,12 +42,15 @@ def effort_shortage(session: Session, gravity: Array) -> str:
 
 
 def _errors(session: Session, position: Array) -> Array:
-    """(n) distance of each joint to its controller's reference; 0 for joints without one."""
+    """(n) distance of each joint to its controller's reference, the shorter way round if continuous; 0 without one."""
     names, errors = session.robot.joint_names, np.zeros(len(position))
     for controller, output in zip(session.manager.controllers, session.manager.outputs, strict=False):
         if output is None or not controller.interfaces:
             continue
         for joint, reference in zip(controller.joints, output.position, strict=True):
             k = names.index(joint)
-            errors[k] = max(errors[k], abs(float(reference) - float(position[k])))
+            error = float(reference) - float(position[k])
+            if session.robot.joint(joint).type == "continuous":
+                error = math.remainder(error, 2.0 * math.pi)
+            errors[k] = max(errors[k], abs(error))
     return errors

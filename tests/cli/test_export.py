@@ -295,8 +295,14 @@ def test_controllers_that_ros_lacks_get_trajectories_and_are_named(tmp_path: Pat
     assert "ros2 control switch_controllers --strict --activate spare --deactivate arm\n" in script
     assert "/spare/follow_joint_trajectory" in script
     assert "sleep 0.500" in script
-    (tmp_path / "task.yaml").write_text(yaml.safe_dump(WRIST | {"steps": WRIST["steps"][:2]}, sort_keys=False))
+    assert "update_rate" not in ran.err
+    changed = {
+        "steps": WRIST["steps"][:2],
+        "simulation": {"engine": "kinematic", "step": 0.001, "control_period": 0.003},
+    }
+    (tmp_path / "task.yaml").write_text(yaml.safe_dump(WRIST | changed, sort_keys=False))
     ran = call_cli("export", "task.yaml", "--allow-outside", "--ros2", "out", "--force", cwd=tmp_path)
+    assert "`update_rate` is a whole number: 333 Hz for the control period of 0.003 s, 333.333 Hz" in ran.err
     assert "goals has other files, which the script does not send: 04.01_goal_follow.yaml" in ran.err
 
 

@@ -135,6 +135,17 @@ def test_a_folder_below_the_top_of_a_repository_is_told_where_its_workflow_belon
     assert following == "next: cd ./-sub && manipcli test"
 
 
+def test_without_an_installation_there_is_no_workflow_that_installs_another_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("manipcli.cli.commands.init._installation", lambda: None)
+    assert main(["init"]) == 0
+    assert "note: no workflow" in capsys.readouterr().err
+    assert not Path(".github").exists()
+    assert ".github" not in Path("README.md").read_text()
+
+
 def test_every_template_is_written_somewhere() -> None:
     templates = {str(path.relative_to(TEMPLATES)) for path in TEMPLATES.rglob("*") if path.is_file()}
     assert templates == {*FILES.values()}

@@ -7,8 +7,10 @@ import csv
 import hashlib
 import io
 import json
+import subprocess
 import zipfile
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -33,6 +35,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, **texts: str) -> own_wheel.Instal
 
 
 def test_the_wheel_has_all_files_and_their_digests(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")  # without git, which would leave out what is not committed yet
     first = installed(monkeypatch, direct_url=json.dumps({"url": "file:///home/me/manipcli"}))
     assert first == installed(monkeypatch)  # the same bytes
     assert first.wheel is not None
@@ -58,9 +61,58 @@ def test_the_wheel_has_all_files_and_their_digests(monkeypatch: pytest.MonkeyPat
             "manipcli @ git+https://h.example/m.git@abc",
         ),
         ({"url": "https://h.example/m.whl", "archive_info": {}}, "manipcli @ https://h.example/m.whl"),
+        (
+            {
+                "url": "ssh://git@h.example/all.git",
+                "vcs_info": {"vcs": "git", "commit_id": "abc"},
+                "subdirectory": "tools/m",
+            },
+            "manipcli @ git+ssh://git@h.example/all.git@abc#subdirectory=tools/m",
+        ),
     ],
 )
 def test_an_address_on_the_network_needs_no_wheel(
     monkeypatch: pytest.MonkeyPatch, stated: dict[str, object], requirement: str
 ) -> None:
     assert installed(monkeypatch, direct_url=json.dumps(stated)) == own_wheel.Installation(requirement)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "https://SECRET@h.example/m.git",
+        "https://me:SECRET@h.example/m.git",
+        "https://h.example/m.git?private_token=SECRET",
+        "https://h.example/m.git#SECRET",
+        "ssh://git:SECRET@h.example/m.git",
+        "https://[SECRET",
+    ],
+)
+@pytest.mark.parametrize("version", [{"vcs_info": {"vcs": "git", "commit_id": "abc"}}, {"archive_info": {}}])
+def test_a_secret_of_an_address_gets_nowhere(
+    monkeypatch: pytest.MonkeyPatch, url: str, version: dict[str, object]
+) -> None:
+    found = installed(monkeypatch, direct_url=json.dumps({"url": url, **version}))
+    assert found.wheel is not None
+    assert "SECRET" not in found.requirement
+    assert b"SECRET" not in found.wheel[1]
+
+
+def test_the_wheel_has_its_licence_and_the_version_of_its_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(own_wheel, "__version__", "7.8.9")
+    found = installed(monkeypatch, **{"licenses/LICENSE": "free"})
+    assert found.wheel is not None
+    assert "7.8.9" in found.requirement
+    with zipfile.ZipFile(io.BytesIO(found.wheel[1])) as archive:
+        assert b"\nVersion: 7.8.9\n" in archive.read("manipcli-7.8.9.dist-info/METADATA")
+        assert archive.read("manipcli-7.8.9.dist-info/licenses/LICENSE") == b"free"
+
+
+def test_an_untracked_file_of_a_checkout_stays_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("tracked.py", "own_notes.txt"):
+        (tmp_path / name).write_text("x")
+    monkeypatch.setattr(own_wheel, "PACKAGE", tmp_path)
+    assert {path.name for path in own_wheel._files()} == {"tracked.py", "own_notes.txt"}  # an installed package
+    for words in (["init", "-q"], ["add", "tracked.py"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    assert {path.name for path in own_wheel._files()} == {"tracked.py"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
@@ -18,11 +19,8 @@ if TYPE_CHECKING:
     from manipcli.cli.own_wheel import Installation
 
 TEMPLATES: Final = Path(__file__).parents[1] / "project"
-COMMON: Final = {
-    "README.md": "README.md",
-    ".gitignore": "gitignore",
-    ".github/workflows/manipcli.yml": "github/workflows/manipcli.yml",
-}
+WORKFLOW: Final = ".github/workflows/manipcli.yml"
+COMMON: Final = {"README.md": "README.md", ".gitignore": "gitignore", WORKFLOW: "github/workflows/manipcli.yml"}
 """Written files of every project, each with its template."""
 EXAMPLE: Final = {
     "tasks/pick_place.yaml": "tasks/pick_place.yaml",
@@ -76,8 +74,7 @@ def init(
             if value:
                 raise InvalidInput([Diagnostic("USE089", f"{word} has no effect: {NO_ROBOT}", hint="add --robot FILE")])
         write_files(folder, _common(folder) | _example() | _schemas() | _wheel(), force=force)
-        for note in notes(folder):
-            console.talk(f"note: {note}")
+        _print_notes(folder)
         console.talk(f"next: {enter(folder)}manipcli test")
         return ExitCode.PASSED
     refuse_conflicts(folder, [*COMMON, "robot.yaml", "controllers.yaml", *SCHEMAS], force=force)
@@ -102,8 +99,7 @@ def init(
     console.result("")
     for line in made.summary:
         console.result(line)
-    for note in notes(folder):
-        console.talk(f"note: {note}")
+    _print_notes(folder)
     options = " --allow-outside" * allow_outside
     console.talk(f"next: {enter(folder)}manipcli run {made.task_file}{options}")
     return ExitCode.PASSED if made.passed else ExitCode.FAILED
@@ -114,19 +110,24 @@ def _common(folder: Path, *, robot: str = "robots/panda.yaml", task: str = "task
     name = (Path(os.path.realpath(folder)).name or "tasks").encode("utf-8", "replace")
     found = _installation()
     words = {
-        b"INSTALL": found.requirement.encode() if found is not None else b"manipcli",
+        b"INSTALL": found.requirement.encode() if found is not None else b"",
         b"CONTROLLERS": robot.replace("robot", "controllers", 1).encode(),
         b"ROBOT": robot.encode(),
         b"TASK": Path(task).stem.encode(),
         b"PROJECT": name,
     }
-    files = {}
-    for path, template in COMMON.items():
-        data = (TEMPLATES / template).read_bytes()
-        for word, value in words.items():
-            data = data.replace(word, value)
-        files[path] = data
-    return files
+    files = {path: (TEMPLATES / template).read_bytes() for path, template in COMMON.items()}
+    if found is None:
+        del files[WORKFLOW]
+        rows = files["README.md"].splitlines(keepends=True)
+        files["README.md"] = b"".join(row for row in rows if WORKFLOW.encode() not in row)
+    pattern = re.compile(b"|".join(words))
+    return {path: pattern.sub(lambda match: words[match[0]], data) for path, data in files.items()}
+
+
+def _print_notes(folder: Path) -> None:
+    for note in notes(folder, workflow=_installation() is not None):
+        console.talk(f"note: {note}")
 
 
 @cache

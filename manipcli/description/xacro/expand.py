@@ -25,7 +25,16 @@ from manipcli.description.located_xml import called_from, invalid, place_of, rea
 from manipcli.description.packages import Absent, NotFound, Packages
 from manipcli.description.xacro.expression import Evaluator
 from manipcli.description.xacro.similar_names import UnknownArgument, names_of, near_macro, near_name
-from manipcli.description.xacro.values import Beyond, Clock, Refused, math_symbols, python_symbols, size_of, too_large
+from manipcli.description.xacro.values import (
+    OPTENV,
+    Beyond,
+    Clock,
+    Refused,
+    math_symbols,
+    python_symbols,
+    size_of,
+    too_large,
+)
 from manipcli.description.xacro.yaml_data import Mistyped, load_yaml
 
 _loading = threading.Lock()
@@ -325,15 +334,26 @@ class _Expansion:
         raise Refused(f"unknown substitution '{text}'; known: $(find NAME), $(arg NAME), $(dirname), $(eval ...)")
 
     def _environment(self, command: str, rest: str) -> str:
-        """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user allowed."""
+        """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user allowed; of others, the default.
+
+        What a file describes does not depend on the machine, so a variable is not read unless the user names it.
+        """
         name, _, default = rest.partition(" ")
+        default = default.strip()
         if name not in self._allow_env and name not in os.environ.get(ALLOW_ENV, "").replace(",", " ").split():
             hint = f"allow it with {ALLOW_ENV}={name} before the command (check-urdf: --allow-env), or use $(arg NAME)"
+            if command == "optenv":
+                note = f"$(optenv {name}): the environment is not read; the default '{default}' is used"
+                noted = Diagnostic(OPTENV, note, self._place(), hint, severity="note")
+                if all(finding.message != note for finding in self._findings):
+                    self._findings.append(noted)
+                return default
+            hint += ", with its value under `args:` of the robot file"
             raise Refused(f"$({command} {name}): a description may not read the environment", hint=hint)
         value = os.environ.get(name)
         if value is None and command == "env":
             raise NameError(f"environment variable '{name}' is not set")
-        return default.strip() if value is None else value
+        return default if value is None else value
 
     def _arguments(self) -> dict[str, str]:
         found: dict[str, str] = self._module.substitution_args_context["arg"]

@@ -10,6 +10,8 @@ from typing import Final
 from manipcli.description.bounds import BoundName, bounds, raised
 
 MAX_INTEGER: Final = 2**1024
+OPTENV: Final = "XACRO011"
+"""Code of the note on a `$(optenv NAME DEFAULT)` whose default is used."""
 
 Value = object
 

@@ -68,11 +68,16 @@ def parameters_file(controllers: Sequence[Exported], *, period: float, notes: Se
     types: dict[str, Plain] = {own.name: {"type": own.written.type} for own in controllers}
     if all(own.written.type != BROADCASTER for own in controllers):
         types.setdefault("joint_state_broadcaster", {"type": BROADCASTER})
-    manager: dict[str, Plain] = {"update_rate": round(1.0 / period), **types}
+    manager: dict[str, Plain] = {"update_rate": update_rate(period), **types}
     data: dict[str, Plain] = {"controller_manager": {"ros__parameters": manager}}
     data |= {own.name: {"ros__parameters": own.written.parameters} for own in controllers if own.written.parameters}
     comments = [note for own in controllers for note in own.notes]
     return "".join(f"# {line}\n" for line in (*notes, *comments)) + yaml_text(data)
+
+
+def update_rate(period: float) -> int:
+    """[Hz] of the controller manager, a whole number, that comes nearest to a period [s]."""
+    return max(1, round(1.0 / period))
 
 
 def _action(name: str, spec: ControllerSpec) -> tuple[str, str] | None:

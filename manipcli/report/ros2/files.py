@@ -10,7 +10,7 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import listed
 from manipcli.model.robot import RobotModel
 from manipcli.model.self_collision import SelfCollisionMatrix
-from manipcli.report.ros2.controllers import Exported, exported, parameters_file
+from manipcli.report.ros2.controllers import Exported, exported, parameters_file, update_rate
 from manipcli.report.ros2.description import PLUGIN, packages, ros2_urdf
 from manipcli.report.ros2.goals import LONGEST, Phase, phases
 from manipcli.report.ros2.srdf import srdf
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from manipcli.task.plan_task import Plan
     from manipcli.task.task import Task
 
+RATE_ERROR = 1e-6
+"""Relative error of the rate of the controller manager above which it is noted."""
 README = "README.md"
 SCRIPT = "send_goals.sh"
 _SEND = """\
@@ -80,6 +82,11 @@ def _of_robot(
     if spec is None:
         return files, (), ()
     controllers, left = exported(spec, robot)
+    rate = update_rate(period)
+    if abs(rate * period - 1.0) > RATE_ERROR:
+        left += (
+            f"`update_rate` is a whole number: {rate} Hz for the control period of {period:g} s, {1 / period:g} Hz",
+        )
     files = {"controllers.yaml": parameters_file(controllers, period=period, notes=left), **files}
     return files, controllers, (*left, *(note for each in controllers for note in each.notes))
 

@@ -177,7 +177,6 @@ ATTACKS = {
     "eval import": "<link name=\"$(eval __import__('os').system('touch CANARY')\"/>",
     "format": "<link name=\"${'{0.__globals__[os].environ[HOME]}'.format(xacro.load_yaml)}\"/>",
     "env": '<link name="$(env HOME)"/>',
-    "optenv": '<link name="$(optenv HOME x)"/>',
     "command": "<link name=\"$(command 'touch CANARY')\"/>",
     "yaml outside": "<link name=\"${xacro.load_yaml('/etc/os-release')}\"/>",
     "yaml above": "<link name=\"${xacro.load_yaml('../../../../../../etc/os-release')}\"/>",
@@ -282,6 +281,19 @@ def test_a_variable_is_read_when_the_user_names_it(tmp_path: Path, monkeypatch: 
     assert "MANIPCLI_ALLOW_ENV=SIDE" in (refused(tmp_path, body).findings[0].hint or "")
     monkeypatch.setenv("MANIPCLI_ALLOW_ENV", "SIDE,NONE")
     assert names(expand(tmp_path, body)) == ["left_x"]
+
+
+def test_an_optional_variable_has_its_default_whatever_the_environment_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SIDE", "left")
+    body = '<link name="$(optenv SIDE right)"/><link name="$(optenv SIDE right)_$(optenv BARE)"/>'
+    path = tmp_path / "r.urdf.xacro"
+    path.write_text(HEAD + body + "</robot>")
+    found = read_description(path, packages=Packages(path))
+    assert [link.attributes["name"] for link in found.root.all("link")] == ["right", "right_"]
+    assert [(note.code, note.severity) for note in found.findings] == [("XACRO011", "note")] * 2
+    assert "MANIPCLI_ALLOW_ENV=SIDE" in (found.findings[0].hint or "")
 
 
 def test_the_working_folder_is_refused_with_what_to_write_instead(tmp_path: Path) -> None:

@@ -161,4 +161,12 @@ READING_TEXT: tuple[Check, ...] = (
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="base${xacro.warning(0)}"/></robot>',
         severity="warning",
     ),
+    schema_check(
+        "XACRO011",
+        "xacro-default-of-environment",
+        "A variable of the environment is not read; its default is used",
+        "A description that depends on the environment is another robot on another machine.",
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(optenv SIDE left)"/></robot>',
+        severity="note",
+    ),
 )
