@@ -16,8 +16,8 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.model.kinematics import Kinematics
-from manipcli.onboard.home import HomeSearch
-from manipcli.onboard.reachable import Spots, reachable_spots
+from manipcli.onboard.home import CLEARANCES, HomeSearch
+from manipcli.onboard.reachable import ABOVE, Spots, reachable_spots
 from manipcli.onboard.robot_draft import BLOCK, NOTHING_TO_HOLD_WITH, RobotDraft
 from manipcli.onboard.writer import Entry, Value, written
 from manipcli.task.load_task import LoadOptions
@@ -35,6 +35,9 @@ SHARES: Final = (1.0, 0.75, 0.5)
 LEAST_UNDONE: Final = {"rad": 0.09, "m": 0.003}
 MOVES: Final = 12
 """Pairs of poses that are tried."""
+LOW: Final = 0.06
+"""[m] As `reachable.ABOVE`, for small arms that do not reach so high with the tool down."""
+PICKING: Final = "picking and placing a block"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,7 @@ class FirstTask:
         does: what it does, in words.
         passed: whether its run passed.
         notes: what was tried before, and why it failed.
+        dropped: why a run of picking failed although it was planned, so that other controllers may help; else "".
     """
 
     name: str
@@ -56,6 +60,7 @@ class FirstTask:
     does: str
     passed: bool
     notes: tuple[str, ...]
+    dropped: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +113,9 @@ class TaskSearch:
         """The most ambitious task that passes: pick and place, else moves, else open and close."""
         notes: list[str] = []
         last: _Candidate | None = None
+        dropped = ""
         for kind, candidates in (
-            ("picking and placing a block", self._picks()),
+            (PICKING, self._picks()),
             ("moving between poses", self._moves()),
             ("opening and closing the hand", self._closes()),
             ("holding still", iter((self._waits(),))),
@@ -126,15 +132,16 @@ class TaskSearch:
                     self._progress(f"{candidate.does}: a run")
                 if planned and self._passes(candidate):
                     return FirstTask(
-                        candidate.name, candidate.entries, candidate.poses, candidate.does, True, tuple(notes)
+                        candidate.name, candidate.entries, candidate.poses, candidate.does, True, tuple(notes), dropped
                     )
                 if plans >= MOST_PLANS or runs >= MOST_RUNS:
                     break
             if plans or self._causes:
                 cause = max(self._causes, key=self._causes.count) if self._causes else "unknown"
+                dropped = cause if kind == PICKING and runs else dropped
                 notes.append(f"{kind} failed in {number_of(plans, 'attempt')} ({number_of(runs, 'run')}): {cause}")
         assert last is not None
-        return FirstTask(last.name, last.entries, last.poses, last.does, False, tuple(notes))
+        return FirstTask(last.name, last.entries, last.poses, last.does, False, tuple(notes), dropped)
 
     def _path(self, candidate: _Candidate) -> Path:
         self._write_robot(candidate.poses)
@@ -181,11 +188,18 @@ class TaskSearch:
             )
             return
         assert draft.search is not None
-        spots = reachable_spots(Kinematics(draft.robot), draft.search, arm.joints, draft.home, tool_height=edge / 2)
         count = 0
-        for one in spots:
-            count += 1
-            yield _pick(one, edge)
+        for above in (ABOVE, LOW):
+            if above == LOW:
+                draft.search.keep(CLEARANCES[-1])
+            kinematics = Kinematics(draft.robot)
+            for one in reachable_spots(
+                kinematics, draft.search, arm.joints, draft.home, tool_height=edge / 2, above=above
+            ):
+                count += 1
+                yield _pick(one, edge, above)
+            if count:
+                break
         if not count:
             self._causes.append("no place was found that the tool reaches from the top or from the side")
 
@@ -266,7 +280,7 @@ def _head(name: str, comment: str) -> dict[str, Entry]:
     }
 
 
-def _pick(spots: Spots, edge: float) -> _Candidate:
+def _pick(spots: Spots, edge: float, above: float) -> _Candidate:
     h = spots.height
     mass = round(DENSITY * edge**3, 3)
     scene: dict[str, Entry] = {}
@@ -280,6 +294,8 @@ def _pick(spots: Spots, edge: float) -> _Candidate:
         scene["desk"] = Entry(
             {"box": {"size": [*size, round(h, 3)]}, "pose": {"xyz": [*centre, round(h / 2, 4)]}, "fixed": True}
         )
+    near: dict[str, Value] = {} if above == ABOVE else {"distance": f"{50.0 * above:g} cm"}
+    back: dict[str, Value] = {} if above == ABOVE else {"retreat": f"{50.0 * above:g} cm"}
     word = "down" if spots.approach == "top" else "level"
     scene["block"] = Entry(
         {
@@ -289,16 +305,16 @@ def _pick(spots: Spots, edge: float) -> _Candidate:
             "rests_on": support,
             "at": [px, py],
         },
-        f"reached with the tool {word}, here, 12 cm higher, and at the other place (inverse kinematics)",
+        f"reached with the tool {word}, here, {readable(above, 'm')} higher, and at the other place (inverse kinematics)",
     )
     entries = {
         **_head("pick_place", f"A block of {readable(edge, 'm')} is picked and placed elsewhere on the {support}."),
         "scene": Entry(scene),
         "steps": Entry(
             [
-                {"pick": {"object": "block", "approach": {"from": spots.approach}}},
-                {"lift": {"object": "block", "by": ["6 cm", "12 cm"]}},
-                {"place": {"object": "block", "at": [gx, gy], "onto": support}},
+                {"pick": {"object": "block", "approach": {"from": spots.approach, **near}}},
+                {"lift": {"object": "block", "by": [f"{50.0 * above:g} cm", f"{100.0 * above:g} cm"]}},
+                {"place": {"object": "block", "at": [gx, gy], "onto": support, **back}},
                 {"move": {"to": "home"}},
             ]
         ),
