@@ -127,7 +127,9 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
                 why = found[-1][1].dropped
                 if not why:  # other controllers would not hold the block better
                     break
-        controllers, task = min(found, key=lambda pair: bool(pair[1].dropped)) if found else (controllers, search.search())
+        controllers, task = (
+            min(found, key=lambda pair: bool(pair[1].dropped)) if found else (controllers, search.search())
+        )
     task_file = f"tasks/{task.name}.yaml"
     entries = {**source.entries, **_with_poses(draft, task.poses)}
     files = {
