@@ -305,7 +305,8 @@ def _pick(spots: Spots, edge: float, above: float) -> _Candidate:
             "rests_on": support,
             "at": [px, py],
         },
-        f"reached with the tool {word}, here, {readable(above, 'm')} higher, and at the other place (inverse kinematics)",
+        f"reached with the tool {word}, here, {readable(above, 'm')} higher, "
+        "and at the other place (inverse kinematics)",
     )
     entries = {
         **_head("pick_place", f"A block of {readable(edge, 'm')} is picked and placed elsewhere on the {support}."),

@@ -51,7 +51,7 @@ def guess_tool_frame(shape: HandShape, closure: Closure, *, width: float) -> Too
     k = int(np.argmin(np.abs(gaps - wanted)))
     # fingers that curl reach furthest before they are closed, and must not meet what the object stands on
     beyond = max(gap.far for gap in between[: k + 1]) - between[k].far
-    p = R @ (between[k].p + [0.0, 0.0, max(0.0, min(beyond, between[k].room))])
+    p = R @ between[k].p + R[:, 2] * max(0.0, min(beyond, between[k].room))
     snapped = "along axes of the palm" if np.allclose(np.abs(R).max(axis=0), 1.0) else "not along axes of the palm"
     evidence = (
         f"between the finger tips where they are {readable(float(gaps[k]), 'm')} apart, "

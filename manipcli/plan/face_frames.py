@@ -60,8 +60,8 @@ def face_frames(frames: GraspFrames, robot: RobotModel) -> tuple[GraspFrame, ...
             found += [(-float(normal[2]), _rolled(on, roll, at[2] - frames.bottom)) for roll in _rolls(frames, normal)]
     if not found:
         if frames.pitch is not None:
-            at = f"an approach at {math.degrees(frames.pitch):.0f} deg below the horizontal"
-            message = f"no face of '{body.name}' is within 30 deg of {at}, which {holding.kind} needs"
+            asked = f"an approach at {math.degrees(frames.pitch):.0f} deg below the horizontal"
+            message = f"no face of '{body.name}' is within 30 deg of {asked}, which {holding.kind} needs"
             raise NotPlannable(message, hint="set another `approach: {pitch: ...}`, or `from: top` or `from: side`")
         message = f"no face of '{body.name}' can be held from there by {holding.kind}"
         raise NotPlannable(message, hint="set another `approach: {from: ...}`")
