@@ -107,9 +107,10 @@ class GoalHandle:
     Attributes:
         result: None while the goal is active, then how it ended.
         notes: which parts of the goal were not adopted, and why.
+        bounded: joints whose position at the end has a tolerance, which the controller checks.
     """
 
-    __slots__ = ("_cancel", "_feedback", "notes", "result")
+    __slots__ = ("_cancel", "_feedback", "bounded", "notes", "result")
 
     def __init__(
         self,
@@ -117,9 +118,11 @@ class GoalHandle:
         cancel: Callable[[GoalHandle], None],
         feedback: Callable[[], Feedback],
         notes: tuple[str, ...] = (),
+        bounded: frozenset[str] = frozenset(),
     ) -> None:
         self.result: GoalResult | None = None
         self.notes = notes
+        self.bounded = bounded
         self._cancel = cancel
         self._feedback = feedback
 

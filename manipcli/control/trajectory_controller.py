@@ -241,7 +241,9 @@ class JointTrajectoryController:
             if old is not None:
                 old.preempt(self._time, as_canceled=self._compat == "ros1")
         self._goal = None
-        handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes)
+        ends = zip(self.joints, np.isfinite(tolerances.goal[0]).tolist(), strict=True)
+        bounded = frozenset(joint for joint, finite in ends if finite)
+        handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes, bounded=bounded)
         self._next = ActiveGoal(
             self.name, self._facts, handle, ordered, tolerances, goal.start_time, self._timeout,
             unchecked=not self._activated,

@@ -9,6 +9,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+import numpy.typing as npt
+
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import Array, Transform
 from manipcli.shapes.primitives import Geometry
@@ -103,13 +106,59 @@ class JointLimits:
         return min(max(position, lower), upper)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A smooth function of a joint: (k) values `y` with `slopes` at evenly spaced `x`, between them cubic (Hermite).
+
+    Beyond the ends it goes on straight.
+    """
+
+    x: Array
+    y: Array
+    slopes: Array
+
+    def at(self, position: npt.ArrayLike, *, rate: bool = False) -> Array:
+        """(...) values at these positions, or their derivatives."""
+        position = np.asarray(position, dtype=np.float64)
+        inside = np.clip(position, self.x[0], self.x[-1])
+        h = float(self.x[1] - self.x[0])
+        k = np.clip(((inside - self.x[0]) / h).astype(np.intp), 0, len(self.x) - 2)
+        t = (inside - self.x[k]) / h
+        y0, y1, m0, m1 = self.y[k], self.y[k + 1], h * self.slopes[k], h * self.slopes[k + 1]
+        c, d = 3.0 * (y1 - y0) - 2.0 * m0 - m1, 2.0 * (y0 - y1) + m0 + m1
+        slope = (m0 + t * (2.0 * c + 3.0 * t * d)) / h
+        return np.asarray(slope if rate else y0 + t * (m0 + t * (c + t * d)) + slope * (position - inside))
+
+
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """position = multiplier * position of `joint` + offset."""
+    """position = multiplier * position of `joint` + offset.
+
+    With a `curve`, of a joint that a closed loop of links moves, the position is its value, and the line its chord.
+    """
 
     joint: str
     multiplier: float = 1.0
     offset: float = 0.0
+    curve: Curve | None = field(default=None, compare=False)
+
+    def follow(self, leader: Array) -> Array:
+        """Positions (...) for these of the driving joint."""
+        return self.multiplier * leader + self.offset if self.curve is None else self.curve.at(leader)
+
+    def ratio(self, leader: Array) -> Array | float:
+        """Velocity per velocity of the driving joint, where that is at `leader` (...)."""
+        return self.multiplier if self.curve is None else self.curve.at(leader, rate=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pin:
+    """A pin that closes a loop: the `points` (3,) of two links, each in its frame, coincide. `driver`: the joint that
+    moves the loop."""
+
+    links: tuple[str, str]
+    points: tuple[Array, Array]
+    driver: str
 
 
 @dataclass(frozen=True, slots=True)

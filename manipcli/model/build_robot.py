@@ -10,7 +10,7 @@ from pathlib import Path
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
-from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
+from manipcli.description.elements import Joint, JointLimits, Link, Mimic, Pin, TransmissionTag
 from manipcli.description.expanded import is_plain, unread_description
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
@@ -26,6 +26,7 @@ from manipcli.model.inertials import ESTIMATE, repaired_links, with_inertials
 from manipcli.model.joint_units import misread_units
 from manipcli.model.link_collisions import REMEDY, replaced_meshes, with_collisions
 from manipcli.model.link_parts import LINK_PARTS, link_parts_from_json, split_links, with_parts
+from manipcli.model.loops import closed_loops, passive_joints
 from manipcli.model.named_poses import build_groups, build_poses
 from manipcli.model.normalised_urdf import portable_urdf
 from manipcli.model.reporter import Reporter
@@ -121,7 +122,11 @@ def bare_robot(parts: Parts) -> RobotModel:
 
 def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     """The robot of welded descriptions and a robot file."""
-    joints = with_limits(reporter, spec, body.ordered())
+    joints = with_limits(reporter, spec, passive_joints(reporter, spec.loops, body.ordered()))
+    pins: tuple[Pin, ...] = ()
+    if spec.loops:
+        reporter.stop()
+        joints, pins = closed_loops(reporter, spec.loops, joints)
     links = tuple(body.links)
     moving = {joint.name: joint for joint in joints if joint.moves}
     groups = build_groups(reporter, spec, links, joints)
@@ -146,10 +151,11 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
         X_WB=spec.mount.transform,
         urdf=portable_urdf(spec.robot, links, joints, transmissions),
         tool=tool,
-        collision_ignore=spec.collision_ignore,
+        collision_ignore=(*spec.collision_ignore, *(pin.links for pin in pins)),
         friction=spec.friction,
         compat=spec.compat or "ros2",
         actuators=actuators,
+        pins=pins,
     )
 
 

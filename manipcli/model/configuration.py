@@ -19,12 +19,15 @@ def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
 
 
 def with_mimics(robot: RobotModel, q: npt.ArrayLike, *, rates: bool = False) -> Array:
-    """(..., n) `q` with every mimic joint at multiplier * q_leader + offset; of `rates`, without the offset."""
+    """(..., n) `q` with every mimic joint at multiplier * q_leader + offset; of `rates`, without the offset.
+
+    A joint that a closed loop moves follows its curve; its rates are those of the curve's chord.
+    """
     position = np.array(q, dtype=np.float64)
     for k, joint in enumerate(robot.moving_joints):
         if joint.mimic is not None:
             leader = position[..., robot.joint_names.index(joint.mimic.joint)]
-            position[..., k] = joint.mimic.multiplier * leader + (0.0 if rates else joint.mimic.offset)
+            position[..., k] = joint.mimic.multiplier * leader + 0.0 if rates else joint.mimic.follow(leader)
     return frozen(position)
 
 

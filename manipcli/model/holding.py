@@ -26,6 +26,7 @@ CUP_RADIUS: Final = 0.01
 FACING: Final = math.cos(math.radians(30.0))
 """Least cosine between the tool's z axis and the direction to the surface that a cup grips."""
 _PROBE: Final = 1e-5  # [m] radius of the sphere at the tool frame whose distance is computed
+_BEHIND: Final = 1e-4  # [m]
 
 
 class Load(NamedTuple):
@@ -99,10 +100,17 @@ class Holding:
 
 def surface(body: Body, X_WO: Transform, X_WT: Transform) -> Surface:
     """The surface of a body nearest to the origin of the tool frame; a negative gap is a depth."""
+    gap, facing = _ahead(body, X_WO, X_WT)
+    if not math.isfinite(facing):  # exactly on the surface there is no direction to it: look from a little behind
+        facing = _ahead(body, X_WO, X_WT @ Transform.of(xyz=(0.0, 0.0, -_BEHIND)))[1]
+    return Surface(gap, facing if math.isfinite(facing) else -1.0)
+
+
+def _ahead(body: Body, X_WO: Transform, X_WT: Transform) -> tuple[float, float]:
+    """[m] gap of the surface nearest to the tool frame, and the cosine to its direction, which may be NaN."""
     from manipcli.shapes.proximity import coal_shape, distance
 
     probe = coal_shape(Sphere(_PROBE))
     found = (distance(probe, X_WT, coal_shape(g.shape), X_WO @ g.X_LS) for g in body.geometries)
     nearest = min(found, key=lambda each: each.distance)
-    facing = float(nearest.normal @ X_WT.R[:, 2])
-    return Surface(nearest.distance + _PROBE, facing if math.isfinite(facing) else 1.0)
+    return nearest.distance + _PROBE, float(nearest.normal @ X_WT.R[:, 2])

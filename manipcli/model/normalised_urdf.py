@@ -206,7 +206,7 @@ def _joint(joint: Joint) -> list[str]:
             ends = {"soft_lower_limit": soft.lower, "soft_upper_limit": soft.upper}
             gains = {"k_position": soft.k_position, "k_velocity": soft.k_velocity}
             lines.append(f"    <safety_controller {_attributes(ends | gains)}/>")
-        if joint.mimic is not None:
+        if joint.mimic is not None and joint.mimic.curve is None:  # a URDF has no closed loops
             mimic = joint.mimic
             ratio = _attributes({"multiplier": mimic.multiplier, "offset": mimic.offset})
             lines.append(f"    <mimic joint={quoteattr(mimic.joint)} {ratio}/>")

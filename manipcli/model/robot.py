@@ -15,6 +15,7 @@ from manipcli.core.text import digits
 from manipcli.description.elements import (
     Joint,
     Link,
+    Pin,
     TransmissionTag,
 )
 from manipcli.model.holding import Holding
@@ -132,6 +133,7 @@ class RobotModel:
     world. `friction`: friction coefficient of its surfaces. `collision_ignore`: pairs of links that planning never
     checks against each other. `compat`: convention of four-bar linkages, which differ between ROS 1 and ROS 2.
     `actuators`: those with known parameters. `inertials`: those that are not the description's.
+    `pins`: of closed loops; their passive joints mimic the driving one by a curve.
     """
 
     name: str
@@ -149,6 +151,7 @@ class RobotModel:
     compat: Literal["ros1", "ros2"] = "ros2"
     actuators: tuple[Actuator, ...] = ()
     inertials: tuple[LinkInertial, ...] = ()
+    pins: tuple[Pin, ...] = ()
 
     @property
     def holding(self) -> Holding | None:

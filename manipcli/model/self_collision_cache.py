@@ -37,9 +37,10 @@ def robot_hash(robot: RobotModel) -> str:
     """SHA-256 of what decides about collisions: description, limits, meshes, convex parts, ignored pairs."""
     collisions = {each.shape for link in robot.links for each in link.collisions if isinstance(each.shape, Mesh)}
     files = sorted((mesh.uri, hashlib.sha256(mesh.path.read_bytes()).hexdigest()) for mesh in collisions)
-    return cache_key(
-        robot.urdf, repr(sorted(map(sorted, robot.collision_ignore))), repr(files), link_parts_to_json(robot) or b""
-    )
+    pins = [(pin.links, pin.driver, *(point.tolist() for point in pin.points)) for pin in robot.pins]
+    parts = [repr(pins)] if pins else []
+    ignored = repr(sorted(map(sorted, robot.collision_ignore)))
+    return cache_key(robot.urdf, ignored, repr(files), link_parts_to_json(robot) or b"", *parts)
 
 
 def self_collision_matrix(robot: RobotModel, *, samples: int = SAMPLES) -> SelfCollisionMatrix:

@@ -21,8 +21,8 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.model.kinematics import Kinematics
-from manipcli.onboard.home import HomeSearch
-from manipcli.onboard.reachable import Spots, reachable_spots
+from manipcli.onboard.home import CLEARANCES, HomeSearch
+from manipcli.onboard.reachable import ABOVE, Spots, reachable_spots
 from manipcli.onboard.robot_draft import BLOCK, NOTHING_TO_HOLD_WITH, RobotDraft
 from manipcli.onboard.writer import Entry, Value, written
 from manipcli.report.suite.suite import Case
@@ -42,6 +42,9 @@ NO_ARM: Final = "the robot has no arm"
 NO_HAND: Final = "the robot has no hand"
 MOVES: Final = 12
 """Pairs of poses that are tried."""
+LOW: Final = 0.06
+"""[m] As `reachable.ABOVE`, for small arms that do not reach so high with the tool down."""
+PICKING: Final = "picks and places a block"
 
 
 Shown = Literal["passed", "failed", "not tried"]
@@ -55,11 +58,13 @@ class Ability:
         what: the robot does, or should do.
         shown: by a run.
         why: the run that showed it; else why no run did.
+        runs: number of runs that failed.
     """
 
     what: str
     shown: Shown
     why: str
+    runs: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +86,12 @@ class FirstTask:
     does: str
     passed: bool
     abilities: tuple[Ability, ...]
+
+    @property
+    def dropped(self) -> str:
+        """Why runs of picking failed although they were planned, so that other controllers may help; else ""."""
+        failed = (each.why for each in self.abilities if each.what == PICKING and each.shown == "failed" and each.runs)
+        return next(failed, "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +157,7 @@ class TaskSearch(AbstractContextManager["TaskSearch"]):
         poses: dict[str, Entry] = {}
         abilities: list[Ability] = []
         for what, candidates in (
-            ("picks and places a block", self._picks()),
+            (PICKING, self._picks()),
             ("moves between poses", self._moves()),
             ("opens and closes the hand", self._closes()),
             ("holds still", iter((self._waits(),))),
@@ -180,7 +191,7 @@ class TaskSearch(AbstractContextManager["TaskSearch"]):
         if not tried:
             return None, Ability(what, "not tried", cause)
         attempts = f"{number_of(tried, 'attempt')}, {number_of(runs, 'run')}"
-        return None, Ability(what, "failed", f"{attempts}: {cause}")
+        return None, Ability(what, "failed", f"{attempts}: {cause}", runs)
 
     def _tried(self, candidate: _Candidate) -> Literal["passed", "failed", "unplanned"]:
         """The outcome of a run; the cause of another one than "passed" is the last of `_causes`."""
@@ -212,11 +223,18 @@ class TaskSearch(AbstractContextManager["TaskSearch"]):
             )
             return
         assert draft.search is not None
-        spots = reachable_spots(Kinematics(draft.robot), draft.search, arm.joints, draft.home, tool_height=edge / 2)
         count = 0
-        for one in spots:
-            count += 1
-            yield _pick(one, edge)
+        for above in (ABOVE, LOW):
+            if above == LOW:
+                draft.search.keep(CLEARANCES[-1])
+            kinematics = Kinematics(draft.robot)
+            for one in reachable_spots(
+                kinematics, draft.search, arm.joints, draft.home, tool_height=edge / 2, above=above
+            ):
+                count += 1
+                yield _pick(one, edge, above)
+            if count:
+                break
         if not count:
             self._causes.append("no place was found that the tool reaches from the top or from the side")
 
@@ -301,7 +319,7 @@ def _head(name: str, comment: str) -> dict[str, Entry]:
     }
 
 
-def _pick(spots: Spots, edge: float) -> _Candidate:
+def _pick(spots: Spots, edge: float, above: float) -> _Candidate:
     h = spots.height
     mass = round(DENSITY * edge**3, 3)
     scene: dict[str, Entry] = {}
@@ -315,6 +333,8 @@ def _pick(spots: Spots, edge: float) -> _Candidate:
         scene["desk"] = Entry(
             {"box": {"size": [*size, round(h, 3)]}, "pose": {"xyz": [*centre, round(h / 2, 4)]}, "fixed": True}
         )
+    near: dict[str, Value] = {} if above == ABOVE else {"distance": f"{50.0 * above:g} cm"}
+    back: dict[str, Value] = {} if above == ABOVE else {"retreat": f"{50.0 * above:g} cm"}
     word = "down" if spots.approach == "top" else "level"
     scene["block"] = Entry(
         {
@@ -324,16 +344,17 @@ def _pick(spots: Spots, edge: float) -> _Candidate:
             "rests_on": support,
             "at": [px, py],
         },
-        f"reached with the tool {word}, here, 12 cm higher, and at the other place (inverse kinematics)",
+        f"reached with the tool {word}, here, {readable(above, 'm')} higher, "
+        "and at the other place (inverse kinematics)",
     )
     entries = {
         **_head("pick_place", f"A block of {readable(edge, 'm')} is picked and placed elsewhere on the {support}."),
         "scene": Entry(scene),
         "steps": Entry(
             [
-                {"pick": {"object": "block", "approach": {"from": spots.approach}}},
-                {"lift": {"object": "block", "by": ["6 cm", "12 cm"]}},
-                {"place": {"object": "block", "at": [gx, gy], "onto": support}},
+                {"pick": {"object": "block", "approach": {"from": spots.approach, **near}}},
+                {"lift": {"object": "block", "by": [f"{50.0 * above:g} cm", f"{100.0 * above:g} cm"]}},
+                {"place": {"object": "block", "at": [gx, gy], "onto": support, **back}},
                 {"move": {"to": "home"}},
             ]
         ),

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from manipcli.description.srdf import read_srdf
 from manipcli.onboard.controllers_file import ControllersGuess, WrittenControllers, given_controllers
-from manipcli.onboard.first_task import TaskSearch
+from manipcli.onboard.first_task import FirstTask, TaskSearch
 from manipcli.onboard.from_srdf import stated_parts
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
 from manipcli.onboard.source import read_source
@@ -109,6 +109,7 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
                 allow_outside=request.allow_outside,
             ).variants()
         why: str | None = ""
+        found: list[tuple[WrittenControllers, FirstTask]] = []
         with TaskSearch(
             folder,
             draft,
@@ -122,8 +123,13 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
                 (folder / "controllers.yaml").write_text(controllers.text, encoding="utf-8")
                 why = search.unsteady()
                 if why is None:
-                    break
-            task = search.search()
+                    found.append((controllers, search.search()))
+                    why = found[-1][1].dropped
+                    if not why:  # other controllers would not hold the block better
+                        break
+            controllers, task = (
+                min(found, key=lambda pair: bool(pair[1].dropped)) if found else (controllers, search.search())
+            )
     task_file = f"tasks/{task.name}.yaml"
     entries = {**source.entries, **_with_poses(draft, task.poses)}
     files = {

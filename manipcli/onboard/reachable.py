@@ -63,6 +63,7 @@ def reachable_spots(
     home: Array,
     *,
     tool_height: float,
+    above: float = ABOVE,
     seed: int = 0,
 ) -> Iterator[Spots]:
     """Candidates, the more dexterous of each batch first; those from the top before those from the side.
@@ -73,12 +74,13 @@ def reachable_spots(
         joints: of the arm.
         home: (n) the start.
         tool_height: [m] of the tool above the support.
+        above: [m] so much higher the tool must also reach.
         seed: of the inverse kinematics.
     """
     tool = kinematics.robot.tool
     assert tool is not None
     solver = InverseKinematics(kinematics, joints, tool.link, X_LT=tool.X_LT)
-    reach = _Reach(solver, search, home, np.random.default_rng(seed))
+    reach = _Reach(solver, search, home, np.random.default_rng(seed), above)
     first = kinematics.robot.joint(joints[0]).child
     axis = kinematics.forward(home, first).p
     ahead = solver.forward(home).p - axis
@@ -101,8 +103,10 @@ def reachable_spots(
 
 
 class _Reach:
-    def __init__(self, solver: InverseKinematics, search: HomeSearch, home: Array, rng: np.random.Generator) -> None:
-        self._solver, self._search, self._home = solver, search, home
+    def __init__(
+        self, solver: InverseKinematics, search: HomeSearch, home: Array, rng: np.random.Generator, above: float
+    ) -> None:
+        self._solver, self._search, self._home, self._above = solver, search, home, above
         self._starts = [home, *solver.random_configurations(home, rng, STARTS)]
 
     def spots(
@@ -118,7 +122,7 @@ class _Reach:
             ]
             scores = []
             for (x, y), a in zip(places, (front - aside, front + aside), strict=True):
-                for z in (h + up, h + up + ABOVE):
+                for z in (h + up, h + up + self._above):
                     score = self._reached(solver, Transform.of(xyz=(x, y, z), R=_tool_axes(approach, a)))
                     if score is None:
                         break

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -45,11 +45,13 @@ def guess_tool_frame(shape: HandShape, closure: Closure, *, width: float) -> Too
     R = _axes(shape, closure)
     shares = np.linspace(0.0, 1.0, STEPS + 1)
     between = [_between(shape, closure, share, R) for share in shares]
-    gaps = np.array([gap for gap, _ in between])
+    gaps = np.array([gap.width for gap in between])
     room = 2.0 * BESIDE if shape.hand.fixed else 0.0
     wanted = min(width + room, 0.6 * float(gaps.max()) + room)
     k = int(np.argmin(np.abs(gaps - wanted)))
-    p = R @ between[k][1]
+    # fingers that curl reach furthest before they are closed, and must not meet what the object stands on
+    beyond = max(gap.far for gap in between[: k + 1]) - between[k].far
+    p = R @ between[k].p + R[:, 2] * max(0.0, min(beyond, between[k].room))
     snapped = "along axes of the palm" if np.allclose(np.abs(R).max(axis=0), 1.0) else "not along axes of the palm"
     evidence = (
         f"between the finger tips where they are {readable(float(gaps[k]), 'm')} apart, "
@@ -88,8 +90,17 @@ def _snapped(axis: Array) -> Array:
     return np.sign(axis[k]) * np.eye(3)[k] if abs(axis[k]) >= SNAP else axis
 
 
-def _between(shape: HandShape, closure: Closure, share: float, R: Array) -> tuple[float, Array]:
-    """[m] gap of the fingers at a share of their way, and (3,) the middle of the tips in axes R."""
+class _Gap(NamedTuple):
+    """[m] Width between the fingers; `p` (3,) the middle of their tips; how far out the tips are, and `p` may be."""
+
+    width: float
+    p: Array
+    far: float
+    room: float = 0.0
+
+
+def _between(shape: HandShape, closure: Closure, share: float, R: Array) -> _Gap:
+    """The gap of the fingers at a share of their way, in axes R."""
     positions = (1.0 - share) * closure.opened + share * closure.closed
     sides: tuple[list[Array], list[Array]] = ([], [])
     sets = [shape.points(links, positions) @ R for links in closure.fingers]
@@ -106,10 +117,12 @@ def _between(shape: HandShape, closure: Closure, share: float, R: Array) -> tupl
     if not sides[0] or not sides[1]:
         every = np.vstack(sets)
         top = every[every[:, 2] >= every[:, 2].max() - SLAB]
-        return 0.0, np.array([*top[:, :2].mean(axis=0), every[:, 2].max() - INSIDE])
+        far = float(every[:, 2].max())
+        return _Gap(0.0, np.array([*top[:, :2].mean(axis=0), far - INSIDE]), far)
     low, high = (np.vstack(side) for side in sides)
     short, long = sorted((float(low[:, 2].max()), float(high[:, 2].max())))
     low, high = (side[side[:, 2] >= short - SLAB] for side in (low, high))
     inner = float(low[:, 1].max()), float(high[:, 1].min())
     x = (float(low[:, 0].mean()) + float(high[:, 0].mean())) / 2.0
-    return inner[1] - inner[0], np.array([x, (inner[0] + inner[1]) / 2.0, min(long - INSIDE, short + PAST)])
+    z = min(long - INSIDE, short + PAST)
+    return _Gap(inner[1] - inner[0], np.array([x, (inner[0] + inner[1]) / 2.0, z]), long, short + PAST - z)

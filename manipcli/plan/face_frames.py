@@ -27,8 +27,9 @@ PRESSED: Final = 1e-3
 def face_frames(frames: GraspFrames, robot: RobotModel) -> tuple[GraspFrame, ...]:
     """The frames at the faces of the object's bounding box, moved onto its surface; from above first.
 
-    Those from below are left out, and so are faces whose surface is not in front of the tool, as over the opening of a
-    cup. The gap is half the reach of a suction cup; a weld touches.
+    With a pitch, the tool comes at that angle to the faces within 30 deg of it. Those from below are left out, and so
+    are faces whose surface is not in front of the tool, as over the opening of a cup. The gap is half the reach of a
+    suction cup; a weld touches.
 
     Raises:
         NotPlannable: no face can be held from the direction that is asked for.
@@ -42,11 +43,14 @@ def face_frames(frames: GraspFrames, robot: RobotModel) -> tuple[GraspFrame, ...
             normal = frames.X_WO.R[:, k] * sign
             if -normal[2] > BELOW or not _from_here(frames, normal):
                 continue
+            towards = _approach(frames, normal)
+            if towards @ -normal < FACING:
+                continue
             at = np.array(body.centre)
             at[k] += sign * body.size[k] / 2
             if abs(normal[2]) < LEVEL and frames.height is not None:
                 at[2] = frames.bottom + frames.height
-            on = Transform.of(xyz=frames.X_WO.apply(at), R=_facing(frames, normal))
+            on = Transform.of(xyz=frames.X_WO.apply(at), R=_facing(frames, -towards))
             seen = surface(body, frames.X_WO, on)
             if seen.facing < FACING:
                 continue
@@ -55,6 +59,10 @@ def face_frames(frames: GraspFrames, robot: RobotModel) -> tuple[GraspFrame, ...
                 continue
             found += [(-float(normal[2]), _rolled(on, roll, at[2] - frames.bottom)) for roll in _rolls(frames, normal)]
     if not found:
+        if frames.pitch is not None:
+            asked = f"an approach at {math.degrees(frames.pitch):.0f} deg below the horizontal"
+            message = f"no face of '{body.name}' is within 30 deg of {asked}, which {holding.kind} needs"
+            raise NotPlannable(message, hint="set another `approach: {pitch: ...}`, or `from: top` or `from: side`")
         message = f"no face of '{body.name}' can be held from there by {holding.kind}"
         raise NotPlannable(message, hint="set another `approach: {from: ...}`")
     return tuple(frame for _, frame in sorted(found, key=lambda each: round(each[0], 3)))
@@ -85,6 +93,19 @@ def _from_here(frames: GraspFrames, normal: Array) -> bool:
         return True
     towards = np.array([math.cos(frames.yaw), math.sin(frames.yaw), 0.0])
     return bool(-normal @ towards > FACING)
+
+
+def _approach(frames: GraspFrames, normal: Array) -> Array:
+    """(3,) The direction in which the tool comes to a face: against its normal, or at the pitch that is asked for."""
+    if frames.pitch is None:
+        return -normal
+    level = -normal[:2]
+    if abs(normal[2]) >= 1.0 - LEVEL:  # a face on top has no side of its own
+        level = (frames.X_WO.p - frames.X_WB.p)[:2]
+        if frames.yaw is not None:
+            level = np.array([math.cos(frames.yaw), math.sin(frames.yaw)])
+    level = level / max(1e-9, float(np.linalg.norm(level)))
+    return np.array([*(math.cos(frames.pitch) * level), -math.sin(frames.pitch)])
 
 
 def _facing(frames: GraspFrames, normal: Array) -> Array:

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from manipcli.core.errors import Diagnostic
+from manipcli.core.text import digits
+from manipcli.description.lint.rigid import box_about, too_heavy
 from manipcli.model.collision import CollisionChecker, CollisionHit
 from manipcli.model.configuration import configuration
 from manipcli.model.kinematics import Kinematics
@@ -23,8 +25,9 @@ _EMPTY = Scene(bodies=(), frames=(), gravity=np.zeros(3))
 
 
 def robot_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagnostic]:
-    """Warnings about what engines with physics refuse and about poses in collision; notes about ignored pairs."""
+    """Warnings about what engines with physics refuse, heavy links and poses in collision; notes on ignored pairs."""
     yield from _refused(robot)
+    yield from _heavy(file, robot)
     yield from _poses(file, robot)
     yield from hand_findings(file, robot)
 
@@ -35,6 +38,19 @@ def _refused(robot: RobotModel) -> Iterator[Diagnostic]:
     found = dict.fromkeys(finding for each in refusals for finding, at in each if at == ("robot",))
     for finding in found:
         yield replace(finding, severity="warning")
+
+
+def _heavy(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagnostic]:
+    """A warning for every link that is too heavy for its size, as it is simulated."""
+    for link in robot.links:
+        shapes = link.collisions or link.visuals
+        why = "" if link.inertial is None else too_heavy(link.inertial.mass, box_about(shapes) if shapes else None)
+        if why and link.inertial is not None:
+            message = f"link '{link.name}' has mass {digits(link.inertial.mass)} kg: {why}"
+            hint = f"state its mass: `inertials: {{links: {{{link.name}: {{mass: ...}}}}}}`, or its density"
+            mended = any(row.link == link.name for row in robot.inertials)
+            place = file.place("inertials", "links", link.name) if mended else link.place
+            yield Diagnostic("ROBOT359", message, place or file.place("description"), hint, "warning")
 
 
 def _poses(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagnostic]:

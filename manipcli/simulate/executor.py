@@ -29,6 +29,10 @@ UNTIL_TICKS: Final = SLOW
 """Control ticks between two evaluations of an `until`."""
 ARRIVED: Final = {"revolute": 0.05, "continuous": 0.05, "prismatic": 0.005}
 """[rad or m] A joint further than this from the end of its motion has not arrived, whatever its controller says."""
+MOVED: Final = 0.5
+"""Nor has one that made less than this share of its displacement, if its controller has no tolerance for its end."""
+NEGLIGIBLE: Final = {"revolute": 5e-3, "continuous": 5e-3, "prismatic": 5e-4}
+"""[rad or m] A joint so near to the end has arrived, however short its motion."""
 REST: Final = 0.5
 """[s] Time that the robot holds still after a stop."""
 PATIENCE: Final = 30.0
@@ -99,6 +103,7 @@ class Executor:
             switch_text = _switch_text(switched)
             if not switched.ok:
                 return MotionEnd("failed", switch_text)
+        start = session.state.position.copy()
         handles = self._handles = self._send(motion)
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
@@ -123,7 +128,7 @@ class Executor:
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
                 return replace(DONE, text=f"stopped {when}: `until` held")
             if not busy and (awaited is None or holds):
-                far = self._far(motion, state)
+                far = self._far(motion, start, state)
                 if far:
                     return MotionEnd("failed", far)
                 return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
@@ -239,25 +244,37 @@ class Executor:
             widened(trajectory.velocities, rest), widened(trajectory.accelerations, rest),
         )  # fmt: skip
 
-    def _far(self, motion: Motion, state: WorldState) -> str:
+    def _far(self, motion: Motion, start: Array, state: WorldState) -> str:
         """Which joint did not arrive, although its controller has no goal tolerance that says so; "" if all did.
 
-        A robot that may touch something in this motion may press on it.
+        `start`: (n) measured when the motion began. A robot that may touch something in this motion may press on it.
         """
         trajectory, robot = motion.trajectory, self._session.robot
         if trajectory is None or motion.guarded or motion.allowed:
             return ""
-        away = trajectory.positions[-1] - state.position[robot.indices(trajectory.names)]
+        columns = robot.indices(trajectory.names)
         joints = [robot.joint(name) for name in trajectory.names]
-        errors = [
-            abs(float(wrapped(error)) if joint.type == "continuous" else float(error))
-            for joint, error in zip(joints, away, strict=True)
-        ]
-        far, joint = max(zip(errors, joints, strict=True), key=lambda pair: pair[0] / ARRIVED[pair[1].type])
-        if far <= ARRIVED[joint.type]:
-            return ""
-        limit = f"limit {ARRIVED[joint.type]:g} {joint.unit}; its controller has no closer goal tolerance"
-        return f"joint '{joint.name}' is {far:.3g} {joint.unit} from the end of this motion, {limit}"
+        turning = np.array([joint.type == "continuous" for joint in joints])
+
+        def difference(a: Array, b: Array) -> Array:
+            return np.where(turning, wrapped(a - b), a - b)
+
+        end = trajectory.positions[-1]
+        missed = np.abs(difference(end, state.position[columns]))
+        bound = np.array([ARRIVED[joint.type] for joint in joints])
+        k = int(np.argmax(missed / bound))
+        text = f"joint '{joints[k].name}' is {missed[k]:.3g} {joints[k].unit} from the end of this motion"
+        if missed[k] > bound[k]:
+            return f"{text}, limit {bound[k]:g} {joints[k].unit}; its controller has no closer goal tolerance"
+        bounded = frozenset[str]().union(*(handle.bounded for handle in self._handles))
+        first = trajectory.positions[0] if trajectory.times[0] == 0.0 else start[columns]
+        planned, made = difference(end, first), difference(state.position[columns], start[columns])
+        for joint, far, asked, moved in zip(joints, missed, planned, made, strict=True):
+            short = moved * np.sign(asked) < MOVED * abs(asked)
+            if short and far > NEGLIGIBLE[joint.type] and joint.name not in bounded:
+                moved_text = f"joint '{joint.name}' moved {moved * np.sign(asked):.3g} of {abs(asked):.3g} {joint.unit}"
+                return f"{moved_text} of this motion; its controller has no goal tolerance"
+        return ""
 
     def _furthest(self) -> str:
         """Text on the joint with an active goal that is furthest from its reference."""

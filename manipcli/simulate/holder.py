@@ -47,14 +47,15 @@ class Holder:
         self._loads: deque[Array] = deque(maxlen=max(1, round(MEAN / period)))
         self._wrench = np.zeros(6)
         self._mu = 0.0
+        self._links = {LINK + link for link in tool_links(robot)}
 
     def take(self, name: str, state: WorldState, contacts: Sequence[Contact]) -> str:
-        """Attach a movable body. Returns why it is not attached: the hand does not touch it; "" if it is."""
+        """Attach a movable body. Returns why it is not attached: the tool does not touch it; "" if it is."""
         self.let_go()
         body = self._scene.body(name)
         k = self._scene.movable.index(body)
         X_WO = Transform.of(xyz=state.body_position[k], quat_xyzw=state.body_quat_xyzw[k])
-        if self.holding.kind == "suction" or not pressing(contacts, name):
+        if self.holding.kind == "suction" or not self._touches(name, contacts):
             missed = self.holding.missed(surface(body, X_WO, self._pose(state)), name)
             if missed:
                 return missed
@@ -83,6 +84,12 @@ class Holder:
             self.broken = f"the {self.holding.kind} lost '{self.attached}' at {float(state.time):.3f} s: {load.text}"
             self._free()
 
+    def _touches(self, name: str, contacts: Sequence[Contact]) -> bool:
+        """Whether the tool presses on a body: the arm does not count, nor do contacts without a direction."""
+        own = [contact for contact in contacts if self._links & {contact.a, contact.b}]
+        sound = [each for each in own if all(np.isfinite(point.normal).all() for point in each.points)]
+        return bool(pressing(sound, name))
+
     def _free(self) -> None:
         if self.attached:
             self._engine.detach(self.attached)
@@ -106,3 +113,13 @@ class Holder:
     def _pose(self, state: WorldState) -> Transform:
         """X_WT."""
         return self._kinematics.forward(state.position, self._tool.link) @ self._tool.X_LT
+
+
+def tool_links(robot: RobotModel) -> frozenset[str]:
+    """The links with which the tool touches: below its link, or below what carries that if they have no shape."""
+    assert robot.tool is not None
+    above = {joint.child: joint for joint in robot.joints if not joint.moves}
+    link = robot.tool.link
+    while link in above and not any(robot.link(each).collisions for each in robot.descendants(link)):
+        link = above[link].parent
+    return robot.descendants(link)

@@ -13,6 +13,7 @@ from manipcli.core.text import number_of, shorten
 from manipcli.spec.base import Model, problem
 from manipcli.spec.holding import HoldingSpec
 from manipcli.spec.inertials import InertialsSpec
+from manipcli.spec.loops import LoopSpec
 from manipcli.spec.quantity import (
     JointAcceleration,
     JointEffort,
@@ -282,6 +283,9 @@ class RobotSpec(Model):
     )
     default_acceleration: Annotated[JointAcceleration, Field(gt=0)] = Field(
         10.0, description="Acceleration limit of joints without one [rad/s^2 or m/s^2], above 0. Default 10."
+    )
+    loops: tuple[LoopSpec, ...] = Field(
+        (), description="Pins that close loops of links, which a URDF cannot hold. Default: none."
     )
     collision_ignore: tuple[tuple[str, str], ...] = Field((), description="Pairs of links that may touch.")
     collision_parts: tuple[str, ...] = Field(

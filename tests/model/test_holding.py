@@ -57,3 +57,11 @@ def test_the_gap_is_the_distance_to_the_surface_and_its_direction_counts() -> No
     assert "tilted by 40 deg" in CUP.missed(tilted, "block")
     above = surface(block, block.X_WO, Transform.of(xyz=(0.5, 0.0, 0.121)))
     assert "tilted by 180 deg" in CUP.missed(above, "block")
+
+
+def test_a_tool_exactly_on_a_surface_has_its_direction() -> None:
+    block = body("block", Box((0.04, 0.04, 0.04)), (0.5, 0.0, 0.1))
+    for depth in (0.0, 1e-5, 2e-5):  # the probe inside, touching and outside
+        for rpy, facing in (((math.pi, 0.0, 0.0), 1.0), ((0.0, 0.0, 0.0), -1.0)):
+            seen = surface(block, block.X_WO, Transform.of(xyz=(0.5, 0.0, 0.12 + depth - 1e-5), rpy=rpy))
+            assert seen.facing == pytest.approx(facing, abs=1e-3)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import InvalidInput
-from manipcli.pipeline import run_task
+from manipcli.core.errors import InvalidInput, NotPlannable
+from manipcli.pipeline import load_task, plan_task, run_task
 from manipcli.record.read.reading import open_recording
 from manipcli.report.json import render_run
 from manipcli.report.junit import render_junit
@@ -57,3 +57,23 @@ def test_conditions_on_fingers_are_refused(tmp_path: Path) -> None:
             written(tmp_path, CUP, engine="pybullet", holding="weld", mass="1 kg", more=more), log=tmp_path / "cup.mcap"
         )
     assert "`grasped` needs two fingers that press: 'gantry' holds by weld" in str(refused.value)
+
+
+@pytest.mark.parametrize(("engine", "pitch"), [("pybullet", 75), ("mujoco", 90)])
+def test_a_cup_comes_at_the_pitch_that_is_asked_for(tmp_path: Path, engine: str, pitch: int) -> None:
+    """The gantry cannot tilt its cup: it can come at 90 deg only, and says so of any other pitch."""
+    file = written(tmp_path, CUP, engine=engine, holding="{suction: {force: 20 N}}", mass="1 kg")
+    file.write_text(file.read_text().replace("{from: top}", f"{{pitch: {pitch} deg}}"))
+    if pitch == 90:
+        assert run_task(file, log=tmp_path / "cup.mcap").verdict.verdict == "passed"
+    else:
+        with pytest.raises(NotPlannable):
+            plan_task(load_task(file))
+
+
+def test_a_pitch_far_from_all_faces_is_refused_by_name(tmp_path: Path) -> None:
+    file = written(tmp_path, CUP, engine="pybullet", holding="{suction: {force: 20 N}}", mass="1 kg")
+    file.write_text(file.read_text().replace("{from: top}", "{pitch: 45 deg}"))
+    with pytest.raises(NotPlannable, match=r"no face of 'block' is within 30 deg of an approach at 45 deg") as refused:
+        plan_task(load_task(file))
+    assert "approach: {pitch: ...}" in str(refused.value.hint)

@@ -1,4 +1,4 @@
-"""Hands of other kinds lift and place a block of 4 cm: one moving jaw, and a linkage of mimic joints of both signs."""
+"""Hands of other kinds lift and place a block of 4 cm: one moving jaw, linkages of mimic joints and of closed loops."""
 
 from __future__ import annotations
 
@@ -24,13 +24,16 @@ def turning(name: str, parent: str, child: str, at: str, axis: str, mimic: float
     )
 
 
-def finger(side: str, sign: int) -> str:
-    """A knuckle that turns outwards, and a tip that stays parallel to the palm's z."""
+def finger(side: str, sign: int, *, rocker: bool = False) -> str:
+    """A knuckle that turns outwards, and a tip that stays parallel to the palm's z: by a mimic joint or a rocker."""
+    beside = f'<link name="{side}_rocker">{mass(0.03, 1e-4)}</link>'
+    beside += turning(f"{side}_swing", "palm", f"{side}_rocker", f"0 {0.035 * sign} 0.03", "1 0 0")
     return (
         f'<link name="{side}_knuckle">{mass(0.05, 1e-4)}{box("0.015 0.01 0.05", "0 0 0.025")}</link>'
         f'<link name="{side}_tip">{mass(0.03, 1e-4)}{box("0.02 0.008 0.05", "0 0 0.025")}</link>'
         + turning(side, "palm", f"{side}_knuckle", f"0 {0.02 * sign} 0.03", "1 0 0", 0.0 if sign > 0 else -1.0)
-        + turning(f"{side}_tip", f"{side}_knuckle", f"{side}_tip", "0 0 0.055", "1 0 0", -sign)
+        + turning(f"{side}_tip", f"{side}_knuckle", f"{side}_tip", "0 0 0.055", "1 0 0", 0.0 if rocker else -sign)
+        + (beside if rocker else "")
     )
 
 
@@ -48,10 +51,23 @@ LINKAGE: dict[str, Any] = {
 }  # fmt: skip
 
 
+LOOPED = LINKAGE | {
+    "hand": f'<link name="palm">{mass(0.5, 2e-3)}{box("0.03 0.08 0.02", "0 0 0.01")}</link>'
+    + finger("left", 1, rocker=True) + finger("right", -1, rocker=True),
+}  # fmt: skip
+LOOPS = """loops:
+  - {between: [left_tip, left_rocker], at: [0, 0.015, 0], driven_by: left}
+  - {between: [right_tip, right_rocker], at: [0, -0.015, 0], driven_by: right}
+"""
+
+
 @pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
-@pytest.mark.parametrize("hand", [JAW, LINKAGE], ids=["jaw", "linkage"])
+@pytest.mark.parametrize("hand", [JAW, LINKAGE, LOOPED], ids=["jaw", "linkage", "loops"])
 def test_it_picks_and_places_by_friction_as_planned(tmp_path: Path, engine: str, hand: dict[str, Any]) -> None:
     file = written(tmp_path, engine=engine, mass="100 g, friction: 0.8", more=PLACE, **hand)
+    if hand is LOOPED:
+        with (tmp_path / "robot.yaml").open("a") as robot:
+            robot.write(LOOPS)
     run = run_task(file, log=tmp_path / "log.mcap")
     assert run.verdict.verdict == "passed", run.verdict.text
     assert run.verdict.holding == ()

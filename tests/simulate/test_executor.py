@@ -12,7 +12,7 @@ import pytest
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.model.state import Contact
-from manipcli.plan.motion import Grip, Motion
+from manipcli.plan.motion import GoalTolerances, Grip, JointTolerance, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate import executor as executor_module
 from manipcli.simulate.executor import REST, UNTIL_TICKS, Alarmed, Executor
@@ -183,6 +183,34 @@ def test_a_goal_that_is_not_reached_in_its_grace_fails_the_motion(session_of: Se
     assert end.outcome == "failed"
     assert session.time == pytest.approx(0.5 + 0.2, abs=0.01)
     assert "'slide'" in end.text
+
+
+@pytest.mark.parametrize(
+    ("to", "share", "arrives"),
+    [
+        (0.004, 0.0, False),  # far less than the 5 mm of a long motion
+        (-0.004, 0.0, False),
+        (0.004, 0.4, False),
+        (0.004, 0.6, True),
+        (0.004, -0.2, False),
+        (0.0004, 0.0, True),  # a controller leaves so much
+    ],
+)
+def test_a_joint_that_makes_less_than_half_of_a_short_motion_has_not_arrived(
+    session_of: SessionOf, scripted: Any, to: float, share: float, arrives: bool
+) -> None:
+    """Its controller has no goal tolerance; with one, the controller decides."""
+
+    def creep(engine: Any) -> None:
+        engine.state.position[0] = share * to * min(1.0, engine.tick / 400)
+
+    session = session_of(scripted(creep))
+    free = GoalTolerances((), (JointTolerance("slide", -1.0),), 0.0)
+    end = Executor(session).run(move(to, tolerances=free), until=None, deadline=None)
+    assert (end.outcome == "done") == arrives, end.text
+    assert arrives or re.search(r"joint 'slide' moved -?[\d.e-]+ of 0.004 m", end.text), end.text
+    lenient = Executor(session_of(scripted(creep))).run(move(to), until=None, deadline=None)
+    assert lenient.outcome == "done"
 
 
 def test_a_hand_that_closes_on_nothing_fails_where_it_must_hold(session_of: SessionOf) -> None:

@@ -11,9 +11,10 @@ import pytest
 from manipcli.core.geometry import Transform
 from manipcli.model.holding import Holding
 from manipcli.model.robot import RobotModel, Tool
-from manipcli.shapes.primitives import Box
+from manipcli.model.state import Contact, ContactPoint, WorldState
+from manipcli.shapes.primitives import Box, Geometry
 from manipcli.simulate.engine import EngineMember
-from manipcli.simulate.holder import Holder
+from manipcli.simulate.holder import Holder, tool_links
 from tests.contracts.test_engines import STEP, G, Opens, body, inertial, joint, opens, robot, scene, with_physics, write
 
 __all__ = ["opens"]  # a fixture
@@ -80,3 +81,46 @@ def test_nothing_is_attached_without_touch(member: EngineMember, opens: Opens, h
     assert (
         missed.broken == f"the surface of 'cube' is 4 mm from the tool frame, the reach is {holding.reach * 1e3:g} mm"
     )
+
+
+class Nothing:
+    """An engine in which an attachment weighs nothing."""
+
+    def attach(self, name: str) -> np.ndarray:
+        return np.zeros(6)
+
+    def detach(self, name: str) -> None:
+        pass
+
+
+def test_only_the_tool_and_what_it_carries_weld_and_only_by_contacts_with_a_direction() -> None:
+    box = Geometry(Transform.identity(), Box((0.1, 0.1, 0.1)))
+    bare = robot(
+        [
+            joint("slide", "arm", kind="prismatic", axis=(0.0, 0.0, 1.0)),
+            joint("mount", "hand", kind="fixed", parent="arm"),
+            joint("frame", "tcp", kind="fixed", parent="hand"),
+            joint("close", "finger", kind="prismatic", parent="hand"),
+        ],
+        [inertial(1.0) for _ in range(4)],
+    )
+    links = tuple(
+        replace(link, collisions=(box,)) if link.name in ("arm", "hand", "finger") else link for link in bare.links
+    )
+    model = replace(bare, links=links, tool=Tool("tcp", Transform.identity(), Holding("weld", 10.0, 1.0)))
+    assert tool_links(model) == {"hand", "tcp", "finger"}
+    world = scene(body("cube", Box((0.04, 0.04, 0.04)), (0.0, 0.0, 5.0), mass=1.0, moments=(0.001,) * 3))
+    state = WorldState.room(2, 1)
+    state.body_position[0], state.body_quat_xyzw[0, 3] = (0.0, 0.0, 5.0), 1.0
+    finite, nan = (0.0, 0.0, 1.0), (np.nan,) * 3
+    for link, normal, touches in (
+        ("arm", finite, False),
+        ("hand", finite, True),
+        ("finger", finite, True),
+        ("finger", nan, False),
+    ):
+        assert model.tool is not None and model.tool.holding is not None
+        holder = Holder(model, world, model.tool.holding, Nothing(), STEP)  # type: ignore[arg-type]
+        point = ContactPoint((0.0, 0.0, 0.0), normal, 1.0, (0.0, 0.0, 0.0))
+        missed = holder.take("cube", state, [Contact("cube", f"robot/{link}", 1.0, 0.0, (point,))])
+        assert (missed == "") == touches, (link, missed)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.text import digits
 from manipcli.description.elements import Joint, Link
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.urdf import Parts
@@ -16,6 +18,10 @@ from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape
 
 LARGEST = 1e9
 """[m]: larger shapes are not measured."""
+HEAVIEST: Final = 10_000.0
+"""[kg]"""
+DENSEST: Final = 30_000.0
+"""[kg/m3]: osmium has 22590; collision shapes may be somewhat smaller than the part."""
 
 
 def moved_bodies(parts: Parts) -> Iterator[tuple[Joint, tuple[str, ...]]]:
@@ -51,6 +57,15 @@ def extent(link: Link, element: Element) -> tuple[Array, Array] | None:
             box = box_about(shapes) if len(shapes) >= written else None
             return box if box is not None and max(map(abs, (*box[0], *box[1]))) < LARGEST else None
     return None
+
+
+def too_heavy(mass: float, box: tuple[Array, Array] | None) -> str:
+    """Why a mass [kg] is too large for the box about the shapes of its link, or for any link; "" if it is not."""
+    # The box is larger than the shapes, so the density is at least the reported one.
+    volume = float(np.prod(box[1] - box[0])) if box is not None else 0.0
+    if volume > 0.0 and mass > DENSEST * volume:
+        return f"a density of at least {digits(mass / volume)} kg/m3 in the box about its shapes; steel has 7850"
+    return f"more than {HEAVIEST:g} kg" if mass > HEAVIEST else ""
 
 
 @np.errstate(all="ignore")

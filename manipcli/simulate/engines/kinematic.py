@@ -33,7 +33,7 @@ class KinematicEngine:
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
         n, m = len(robot.joint_names), len(scene.movable)
         self._followers = [
-            (k, robot.joint_names.index(joint.mimic.joint), joint.mimic.multiplier, joint.mimic.offset)
+            (k, robot.joint_names.index(joint.mimic.joint), joint.mimic)
             for k, joint in enumerate(robot.moving_joints)
             if joint.mimic is not None
         ]
@@ -66,9 +66,9 @@ class KinematicEngine:
 
     def _follow(self) -> None:
         position, velocity = self._state.position, self._state.velocity
-        for follower, driver, multiplier, offset in self._followers:
-            position[follower] = multiplier * position[driver] + offset
-            velocity[follower] = multiplier * velocity[driver]
+        for follower, driver, mimic in self._followers:
+            position[follower] = mimic.follow(position[driver])
+            velocity[follower] = mimic.ratio(position[driver]) * velocity[driver]
 
     def sense_wrench(self, joint: str) -> Array:
         return np.zeros(6)

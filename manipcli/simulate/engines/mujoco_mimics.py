@@ -19,7 +19,8 @@ class Mimics:
     def __init__(self, data: Any, robot: RobotModel) -> None:
         n = len(robot.joint_names)
         self._position, self._velocity = data.qpos[:n], data.qvel[:n]
-        mimics = [(k, joint.mimic) for k, joint in enumerate(robot.moving_joints) if joint.mimic is not None]
+        moving = enumerate(robot.moving_joints)
+        mimics = [(k, joint.mimic) for k, joint in moving if joint.mimic is not None and joint.mimic.curve is None]
         self._followers = np.array([k for k, _ in mimics], dtype=np.intp)
         self._drivers = np.array([robot.joint_names.index(mimic.joint) for _, mimic in mimics], dtype=np.intp)
         self._multipliers = np.array([mimic.multiplier for _, mimic in mimics])

@@ -51,7 +51,7 @@ class Motors:
         self._limits = np.clip(motor_effort_limits(robot), LEAST_EFFORT, UNLIMITED_EFFORT)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._speeds = np.array([math.inf if limit is None else limit for limit in limits])
-        self._mimics = self._rows = sum(joint.mimic is not None for joint in robot.moving_joints)
+        self._mimics = self._rows = sum(bool(joint.mimic and not joint.mimic.curve) for joint in robot.moving_joints)
         self._compliance = np.full(self._mimics + n, MOTOR_COMPLIANCE)
         self._compliance[: self._mimics] = MIMIC_COMPLIANCE
         self._version = -1

@@ -24,6 +24,8 @@ from manipcli.simulate.engines.mujoco_attachment import add_welds
 from manipcli.simulate.engines.mujoco_friction import friction_pairs, towards_robot
 from manipcli.simulate.engines.mujoco_shapes import Shapes, wxyz
 
+PIN_TIME: Final = (0.002, 1.0)
+"""[s], damping ratio: how quickly a pin of a closed loop is pulled together; MuJoCo takes two steps at least."""
 HARD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Impedance of motors, mimic joints and joint limits: the largest that MuJoCo supports."""
 ROBOT, SCENE = 1, 2
@@ -188,7 +190,7 @@ def _add_robot(
         for geometry in link.collisions:
             shapes.add(made, geometry, Transform.identity(), **contact)
     for joint in robot.moving_joints:
-        if joint.mimic is not None:
+        if joint.mimic is not None and joint.mimic.curve is None:
             coupling = spec.add_equality(
                 type=mujoco.mjtEq.mjEQ_JOINT,
                 objtype=mujoco.mjtObj.mjOBJ_JOINT,
@@ -198,6 +200,18 @@ def _add_robot(
             )
             coupling.data[:] = 0.0  # coefficients of a polynomial
             coupling.data[:2] = joint.mimic.offset, joint.mimic.multiplier
+    for k, pin in enumerate(robot.pins):
+        sites = [f"pin{k}{side}" for side in "ab"]
+        for site, name, point in zip(sites, pin.links, pin.points, strict=True):
+            bodies[name].add_site(name=site, pos=point)
+        spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=sites[0],
+            name2=sites[1],
+            solimp=HARD,
+            solref=PIN_TIME,
+        )
     return bodies
 
 

@@ -32,7 +32,7 @@ from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
 from manipcli.simulate.engines.pybullet_solver import iterations
-from manipcli.simulate.engines.pybullet_world import add_body, centre, collide_only, couple_mimics
+from manipcli.simulate.engines.pybullet_world import add_body, centre, close_loops, collide_only, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 from manipcli.spec.base import Model
@@ -144,6 +144,7 @@ class PybulletEngine:
         if settings.twists is not None:
             self._move_bodies(settings.twists)
         couple_mimics(p, client, robot, self._robot, self._joints)
+        close_loops(p, client, robot, self._robot, {name: k for k, name in self._links.items()})
         add_rotor_inertia(p, client, robot, self._robot, self._joints, step=settings.step)
         self._motors = Motors(p, client, self._robot, self._joints, robot, settings.step)
 

@@ -24,6 +24,9 @@ from manipcli.simulate.engines.pybullet_readback import body_differences
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
 """[N m or N] Effort limit of a mimic coupling."""
+PIN_ERP: Final = 0.2
+PIN_FORCE: Final = 1e4
+"""[N] Largest force of a pin of a closed loop."""
 MAX_SHAPES: Final = 16
 """Maximum size of an array of shapes: Bullet silently drops further ones."""
 
@@ -142,9 +145,31 @@ def collide_only(
 def couple_mimics(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int]) -> None:
     """Couple the mimic joints of `body`; `joints`: Bullet's indices of the robot's moving joints."""
     for joint, index in zip(robot.moving_joints, joints, strict=True):
-        if joint.mimic is not None:
+        if joint.mimic is not None and joint.mimic.curve is None:
             driver = joints[robot.joint_names.index(joint.mimic.joint)]
             _couple(p, client, body, index, driver, joint.axis.tolist(), joint.mimic)
+
+
+def close_loops(p: ModuleType, client: int, robot: RobotModel, body: int, links: Mapping[str, int]) -> None:
+    """Pin the links of closed loops of `body` to each other; `links`: Bullet's indices by name."""
+    for pin in robot.pins:
+        pivots = []
+        for name, point in zip(pin.links, pin.points, strict=True):
+            info = p.getDynamicsInfo(body, links[name], physicsClientId=client)
+            X_LI = Transform.of(xyz=info[3], quat_xyzw=info[4])  # Bullet's frame of a link is that of its inertia
+            pivots.append(X_LI.inverse().apply(point).tolist())
+        constraint = p.createConstraint(
+            body,
+            links[pin.links[0]],
+            body,
+            links[pin.links[1]],
+            jointType=p.JOINT_POINT2POINT,
+            jointAxis=[0, 0, 0],
+            parentFramePosition=pivots[0],
+            childFramePosition=pivots[1],
+            physicsClientId=client,
+        )
+        p.changeConstraint(constraint, erp=PIN_ERP, maxForce=PIN_FORCE, physicsClientId=client)
 
 
 def _couple(p: ModuleType, client: int, body: int, follower: int, driver: int, axis: list[float], mimic: Mimic) -> None:

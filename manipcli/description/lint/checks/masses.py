@@ -9,7 +9,7 @@ import numpy as np
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.description.lint.check import Subject, check
-from manipcli.description.lint.rigid import elements_by_name, extent, moved_bodies
+from manipcli.description.lint.rigid import elements_by_name, extent, moved_bodies, too_heavy
 from manipcli.description.lint.samples import CUBE, INERTIAL, one_joint
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.numbers import finite
@@ -22,10 +22,6 @@ OUTSIDE: Final = 0.5
 """Distance of the centre of mass outside the box about the shapes, as a share of the box's diagonal."""
 LEAST_OUTSIDE: Final = 0.01
 """[m]: smaller distances are accepted, for small links."""
-HEAVIEST: Final = 10_000.0
-"""[kg]"""
-DENSEST: Final = 30_000.0
-"""[kg/m3]: osmium has 22590; collision shapes may be somewhat smaller than the part."""
 
 
 @check("URDF100", "massless-joint", "physics", "warning", bad=one_joint(tip=CUBE))
@@ -182,21 +178,14 @@ def _heavy_link(subject: Subject) -> Iterator[Diagnostic]:
     The usual cause is a mass in grams, or a mesh in the wrong unit. No motor moves such a link, and next to light
     links it makes the simulation stiff or unstable.
     """
-    # The box about all shapes is larger than the shapes, so the density is at least the reported one.
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
         if link.inertial is None:
             continue
-        mass = link.inertial.mass
-        box = extent(link, links[link.name])
-        volume = float(np.prod(box[1] - box[0])) if box is not None else 0.0
-        if volume > 0.0 and mass > DENSEST * volume:
-            why = f"a density of at least {digits(mass / volume)} kg/m3 in the box about its shapes; steel has 7850"
-        elif mass > HEAVIEST:
-            why = f"more than {HEAVIEST:g} kg"
-        else:
+        why = too_heavy(link.inertial.mass, extent(link, links[link.name]))
+        if not why:
             continue
         element = links[link.name].first("inertial") or links[link.name]
         place = (element.first("mass") or element).place
-        message = f"link '{link.name}' has mass {digits(mass)} kg: {why}"
+        message = f"link '{link.name}' has mass {digits(link.inertial.mass)} kg: {why}"
         yield Diagnostic("URDF112", message, place, "use kg and m", "warning")
