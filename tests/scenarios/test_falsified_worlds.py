@@ -200,7 +200,7 @@ def test_ten_worlds_refuse_each_verb() -> None:
 
 @pytest.mark.parametrize(
     "world",
-    [world for world in WORLDS if not world.when and world.verb in ("pick", "place")],
+    [each for each in WORLDS if not each.when and each.verb in ("pick", "place") and "sheet" not in each.name],
     ids=lambda world: f"{world.verb}: {world.name}",
 )
 def test_a_world_that_refuses_from_the_start_does_in_pybullet_too(
