@@ -122,7 +122,7 @@ def bare_robot(parts: Parts) -> RobotModel:
 
 def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     """The robot of welded descriptions and a robot file."""
-    joints = with_limits(reporter, spec, passive_joints(reporter, spec.loops, body.ordered()))
+    joints = with_limits(reporter, spec, passive_joints(reporter, spec.loops or (), body.ordered()))
     pins: tuple[Pin, ...] = ()
     if spec.loops:
         reporter.stop()

@@ -111,9 +111,9 @@ class InverseKinematics:
         adjacent = self.columns == tuple(range(first, first + len(self.columns)))
         # A slice of adjacent joints costs a fraction of an array of their indices.
         self._columns = slice(first, first + len(self.columns)) if adjacent else np.array(self.columns, dtype=np.intp)
-        # Joints of the chain that mimic the solver's: index among all joints, leader, multiplier, offset.
+        # Joints of the chain that mimic the solver's: index among all joints, index of the leader, and how.
         self._followers = tuple(
-            (k, self.joints.index(joint.mimic.joint), joint.mimic.multiplier, joint.mimic.offset)
+            (k, self.joints.index(joint.mimic.joint), joint.mimic)
             for k, joint in enumerate(robot.moving_joints)
             if joint.mimic is not None and joint.mimic.joint in self.joints and link in robot.descendants(joint.child)
         )
@@ -347,20 +347,21 @@ class InverseKinematics:
 
     def least_singular_value(self, q: npt.ArrayLike) -> float:
         """Of the tool's Jacobian over the solver's joints at `q` (n); metres and radians weighed alike."""
-        J = self._own(self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT))
+        q = np.asarray(q, dtype=np.float64)
+        J = self._own(self._kinematics.jacobian(q, self.link, self._X_LT), q)
         return float(np.linalg.svd(J, compute_uv=False)[-1])
 
     def _put(self, q: Array, values: Array) -> None:
         """Write the solver's joints (m), and those that mimic them, into q (n)."""
         q[self._columns] = values
-        for k, leader, multiplier, offset in self._followers:
-            q[k] = multiplier * values[leader] + offset
+        for k, leader, mimic in self._followers:
+            q[k] = mimic.follow(values[leader])
 
-    def _own(self, whole: Array) -> Array:
-        """(6, m) The Jacobian over the solver's joints, with what mimics them, of that over all joints (6, n)."""
+    def _own(self, whole: Array, q: Array) -> Array:
+        """(6, m) The Jacobian over the solver's joints, with what mimics them, of that over all joints (6, n) at q."""
         J = np.asfortranarray(whole[:, self._columns])
-        for k, leader, multiplier, _ in self._followers:
-            J[:, leader] += multiplier * whole[:, k]
+        for k, leader, mimic in self._followers:
+            J[:, leader] += mimic.ratio(q[self._columns][leader]) * whole[:, k]
         return J
 
     def _solution(self, q: Array, position_error: float, angle_error: float) -> Solution:
@@ -382,7 +383,7 @@ class InverseKinematics:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
         error, free, angle = pose_error(X_WT, R, p, self._open, self._tolerance)
-        J = self._own(whole)
+        J = self._own(whole, q)
         if free is not None:
             J[3:] -= np.outer(free, free @ J[3:])
         elif self._open == "rotation":

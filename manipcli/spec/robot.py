@@ -284,8 +284,8 @@ class RobotSpec(Model):
     default_acceleration: Annotated[JointAcceleration, Field(gt=0)] = Field(
         10.0, description="Acceleration limit of joints without one [rad/s^2 or m/s^2], above 0. Default 10."
     )
-    loops: tuple[LoopSpec, ...] = Field(
-        (), description="Pins that close loops of links, which a URDF cannot hold. Default: none."
+    loops: tuple[LoopSpec, ...] | None = Field(
+        None, description="Pins that close loops of links, which a URDF cannot hold. Default: none."
     )
     collision_ignore: tuple[tuple[str, str], ...] = Field((), description="Pairs of links that may touch.")
     collision_parts: tuple[str, ...] = Field(

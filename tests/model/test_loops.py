@@ -14,6 +14,7 @@ from manipcli.model.configuration import configuration, with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.pipeline import run_task
+from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.record.read.reading import open_recording
 from manipcli.spec.robot import RobotSpec
 
@@ -94,6 +95,15 @@ def test_the_pin_is_where_it_is_at_zero_unless_stated(tmp_path: Path) -> None:
     robot, _ = built(tmp_path, urdf, at_other=None)
     q = with_mimics(robot, configuration(robot) * 0.0 + 0.8)
     assert dict(zip(robot.joint_names, q, strict=True)) == pytest.approx({"drive": 0.8, "elbow": -0.8, "swing": 0.8})
+
+
+def test_inverse_kinematics_reaches_poses_of_a_link_that_the_loop_moves(tmp_path: Path) -> None:
+    robot, _ = built(tmp_path, four_bar())
+    solver = InverseKinematics(Kinematics(robot), ("drive",), "coupler")
+    goal = solver.forward(with_mimics(robot, np.full(3, 0.9)))
+    found = solver.track(goal, with_mimics(robot, np.full(3, 1.9)))
+    assert found.converged
+    assert found.q[robot.joint_names.index("drive")] == pytest.approx(0.9, abs=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,19 @@ def gripper(palm: str, *, reversed_: bool = False, names: Sequence[str] = ("left
     return found
 
 
+def curling(palm: str) -> list[str]:
+    """Two fingers of 8 cm along x of the palm that turn about z, from 0.9 rad outwards to 0.9 rad inwards."""
+    found = []
+    for name, side in (("left", 1.0), ("right", -1.0)):
+        found.append(_link(name, "0.04 0 0", "0.08 0.004 0.02", True))
+        found.append(
+            f'<joint name="curl_{name}" type="revolute"><parent link="{palm}"/><child link="{name}"/>'
+            f'<origin xyz="0.02 {side * 0.05} 0"/><axis xyz="0 0 {-side}"/>'
+            '<limit lower="-0.9" upper="0.9" velocity="2" effort="3"/></joint>'
+        )
+    return found
+
+
 def one_jaw(palm: str) -> list[str]:
     """A fixed jaw along x of the link `palm`, which it is, and one that turns about z away from it."""
     return [

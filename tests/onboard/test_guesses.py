@@ -87,6 +87,14 @@ def test_the_tool_is_between_the_tips_along_the_closing_direction(tmp_path: Path
     assert (frame.widest, frame.narrowest) == pytest.approx((small.OPENING, 0.0), abs=1e-3)
 
 
+def test_curling_fingers_stay_off_what_the_object_stands_on(tmp_path: Path) -> None:
+    """Their tips go along circles: 7 mm further out on the way than around a block of 4 cm."""
+    frame = tool_of(built(tmp_path, small.robot(small.palm("p"), small.curling("p"))))
+    furthest = 0.02 + 0.08  # the fingers stretched, along x
+    assert furthest - INSIDE - 1e-3 < frame.X_PT.p[0] < furthest - INSIDE + 2e-3
+    assert frame.X_PT.p[1:] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
 @pytest.mark.parametrize("reversed_", [False, True])
 def test_open_is_where_the_fingers_are_apart(tmp_path: Path, reversed_: bool) -> None:
     robot = built(tmp_path, small.robot(small.palm("p"), small.gripper("p", reversed_=reversed_)))

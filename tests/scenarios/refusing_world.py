@@ -173,7 +173,8 @@ def run(world: World, text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
         other = load_task(file, overrides=[each for each in world.true if isinstance(each, str)])
         task = replace(task, truth=GroundTruth(other.robot, other.scene, other.controllers_file))
     refuser = Refuser(task, world.when, world.change)
-    monkeypatch.setattr(execute, "ENGINES", {"mujoco": replace(ENGINES["mujoco"], open=refuser.opened)})
+    changed = {"mujoco": replace(ENGINES["mujoco"], open=refuser.opened)}
+    monkeypatch.setattr(execute, "ENGINES", {each.name: each for each in ENGINES} | changed)
     prepared: Any = Prepared(task, plan)
     report = pipeline.run_task(file, log=folder / "log.mcap", prepared=prepared, progress=refuser)
     return report.verdict, read_recording(folder / "log.mcap"), task
