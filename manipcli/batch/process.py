@@ -14,15 +14,15 @@ from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
-from typing import BinaryIO, TypeAlias
+from typing import TypeAlias
 
 from manipcli.batch.forks import ONE_THREAD, Forked, ForkPool
 from manipcli.batch.job import Beat, End, Job, Message
+from manipcli.batch.run_files import locked, remove
 from manipcli.core.errors import ExitCode
-from manipcli.core.lock import Taken, lock
+from manipcli.core.lock import Taken
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
 from manipcli.report.suite.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of, warnings_of
@@ -154,12 +154,12 @@ class Process:
         """
         self.job = job
         job.output.parent.mkdir(parents=True, exist_ok=True)
-        self._output = _locked(job.output)
+        self._output = locked(job.output)
         self.activity = Beat("starting")
         self._end: End | None = None
         self._judged: float | None = None
         self._began = self._heard = time.monotonic()
-        _remove(job.log, job.partial, job.picture, job.page)
+        remove(job.log, job.partial, job.picture, job.page)
         self.connection: Child
         self._process: subprocess.Popen[bytes] | Forked
         try:
@@ -167,7 +167,7 @@ class Process:
             self._note = pool.take_note() if pool is not None else ""
             self.connection, self._process = forked or self._new(command)
         except BaseException:  # an interrupt, too
-            _remove(job.output)
+            remove(job.output)
             self._output.close()
             raise
         with socket(fileno=os.dup(self.connection.fileno())) as duplicate:
@@ -254,7 +254,7 @@ class Process:
     def forget(self) -> None:
         """Kills the process, and removes its files."""
         self.end()
-        _remove(self.job.log, self.job.partial, self.job.picture, self.job.output, self.job.page)
+        remove(self.job.log, self.job.partial, self.job.picture, self.job.output, self.job.page)
         self._output.close()
 
     def _gone(self) -> CaseReport:
@@ -372,31 +372,3 @@ def _unreadable(job: Job) -> CaseReport:
         page=None if job.page is None or notes else str(job.page),
         notes=notes,
     )
-
-
-def _locked(path: Path) -> BinaryIO:
-    """Opens the file, empty and locked, as long as this process or a child that writes to it has it open.
-
-    Raises:
-        Taken: another process has locked it.
-        OSError: it cannot be written.
-    """
-    while True:
-        file = path.open("ab")
-        try:
-            lock(file.fileno())
-            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                file.truncate(0)
-                return file
-        except FileNotFoundError:
-            pass
-        except (Taken, OSError):
-            file.close()
-            raise
-        file.close()  # its previous owner has removed it meanwhile
-
-
-def _remove(*files: Path | None) -> None:
-    for file in files:
-        if file is not None:
-            file.unlink(missing_ok=True)

@@ -35,6 +35,7 @@ from manipcli.description.xacro.values import (
     size_of,
     too_large,
 )
+from manipcli.description.xacro.words import tokenize, typed
 from manipcli.description.xacro.yaml_data import Mistyped, load_yaml
 
 _loading = threading.Lock()
@@ -320,8 +321,8 @@ class _Expansion:
             return str(self._folder())
         if command == "eval":
             names: dict[str, object] = {**math_symbols(), **python_symbols(), "true": True, "false": False}
-            names |= {name: _typed(value) for name, value in self._arguments().items()}
-            names["arg"] = lambda name: _typed(self._argument(name))
+            names |= {name: typed(value) for name, value in self._arguments().items()}
+            names["arg"] = lambda name: typed(self._argument(name))
             names["find"] = lambda name: str(self._packages.root(name))
             return str(self._evaluate(rest, names))
         if command in {"env", "optenv"}:
@@ -396,21 +397,5 @@ class _Expansion:
         return everything | {
             "python": namespace(plain),
             "math": namespace(math_symbols()),
-            "xacro": namespace({**own, **messages, "tokenize": _tokenize, "arg": self._argument}),
+            "xacro": namespace({**own, **messages, "tokenize": tokenize, "arg": self._argument}),
         }
-
-
-def _typed(text: str) -> object:
-    """An argument as `$(eval)` sees it: a number or boolean if it is one, else text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False}.get(text.lower(), text)
-
-
-def _tokenize(text: str, sep: str = ",; ", skip_empty: bool = True) -> list[str]:
-    for character in sep:
-        text = text.replace(character, "\0")
-    return [token for token in text.split("\0") if token or not skip_empty]

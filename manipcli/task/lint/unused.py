@@ -36,6 +36,8 @@ def unused(task: Task) -> Iterator[Diagnostic]:
 
 def _params(task: Task, root: MappingNode) -> Iterator[Diagnostic]:
     used = {name for _, node in _scalars(root) for name in _PARAM.findall(node.written or "")}
+    scope = task.file.source.structure.scope
+    used |= scope.used if scope is not None else set()
     for name in task.spec.params:
         if name not in used:
             message = f"the parameter '{escape(name)}' is not used"
