@@ -56,7 +56,9 @@ def left_out(recording: Recording) -> str:
     return "" if begun is None else f"the end of step '{begun.id}' is missing, though the run finished"
 
 
-def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool) -> StepOutcome:
+def _outcome(
+    step_id: str, verb: str, duration: float | None, events: Iterable[TaskEvent], interrupted: bool
+) -> StepOutcome:
     mine = [event for event in events if event.step == step_id]
     attempts = tuple(_attempts(mine, interrupted))
     last = attempts[-1] if attempts else None

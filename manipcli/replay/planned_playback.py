@@ -15,7 +15,8 @@ from manipcli.plan.motion import Motion
 from manipcli.plan.planned_states import PlannedStates, planned_states
 from manipcli.replay.ghost import Ghost, ghost_of
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
-from manipcli.task.plan_task import Plan, PlannedStep, spans
+from manipcli.task.plan_steps import PlannedStep
+from manipcli.task.plan_task import Plan, spans
 
 MOST_GHOSTS: Final = 8
 """Ghosts of a page; it has eight colours, and more hide the motion."""

@@ -12,7 +12,8 @@ from manipcli.plan.motion_margins import MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import stage_of
 from manipcli.report.json import Json, dumps, picked, plain
-from manipcli.task.plan_task import Plan, PlannedMotion, PlannedStep
+from manipcli.task.plan_steps import PlannedStep
+from manipcli.task.plan_task import Plan, PlannedMotion
 
 
 def render_json(task: str, plan: Plan) -> str:

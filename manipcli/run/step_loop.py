@@ -31,7 +31,8 @@ from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
-from manipcli.task.plan_task import Plan, PlannedStep
+from manipcli.task.plan_steps import PlannedStep
+from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 DEFAULT_UNTIL_TIME: Final = 30.0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,49 +14,21 @@ from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
-from manipcli.plan.candidates import Candidates, Dropped, first
+from manipcli.plan.block_tree import Item, Outcomes, Unit, block_tree, named
+from manipcli.plan.branches import Solved, plan_branches
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.clearance import least_clearance
-from manipcli.plan.cost import step_cost
 from manipcli.plan.grasp_margin import GraspMargin, grasp_margin
 from manipcli.plan.hand import SPEED, closing_speed
-from manipcli.plan.motion import Motion, PlanningState, StepPlan
+from manipcli.plan.motion import Motion, PlanningState
 from manipcli.plan.motion_margins import MotionMargins, motion_margins
-from manipcli.plan.outline import PlanOutline, StepOutline
+from manipcli.plan.outline import BlockOutline, PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
-from manipcli.plan.steps import STEPS
-from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.plan.why_not import explained
-from manipcli.spec.keep import KeepSpec
-from manipcli.spec.step import StepSpec
+from manipcli.task.plan_steps import PlannedStep, plan_units
 from manipcli.task.task import Task
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedStep:
-    """A step and its plan.
-
-    Attributes:
-        id, verb: of the step.
-        plan: of its candidate.
-        place: file:line:column.
-        grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
-        candidate: name of the candidate; "" for the only way.
-        dropped: the candidates that were tried before it.
-        keep: of the step.
-    """
-
-    id: str
-    verb: str
-    plan: StepPlan
-    place: str
-    grasps: tuple[Array, ...] = ()
-    candidate: str = ""
-    dropped: tuple[Dropped, ...] = ()
-    keep: tuple[KeepSpec, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +44,49 @@ class PlannedMotion:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The plan of a task. `planner` re-plans steps from measured states; `judged`: places of expectations and watches,
-    for the log."""
+    """The plan of a task.
+
+    Attributes:
+        steps: in order, with `then` at every choice, up to the first that is planned during the run.
+        start: the state before them.
+        planner: re-plans steps from measured states.
+        judged: places of expectations and watches, for the log.
+        branches: the steps of every stretch that is planned before the run, by the outcomes of the choices before it.
+        items: the steps and blocks of the task.
+        listed: every step of the task for the log, in the order of the file.
+        blocks: the same for blocks.
+    """
 
     steps: tuple[PlannedStep, ...]
     start: PlanningState
     planner: Planner
     judged: tuple[str, ...] = ()
+    branches: Mapping[Outcomes, tuple[PlannedStep, ...]] = field(default_factory=dict)
+    items: tuple[Item, ...] = ()
+    listed: tuple[StepOutline, ...] = ()
+    blocks: tuple[BlockOutline, ...] = ()
+
+    @property
+    def every(self) -> tuple[PlannedStep, ...]:
+        """Every planned step once, in the order of the file: on the first path on which it is done."""
+        found: dict[int, PlannedStep] = {}
+        for steps in (self.steps, *(self.branches[key] for key in sorted(self.branches, reverse=True))):
+            found = {step.index: step for step in steps} | found
+        return tuple(found[k] for k in sorted(found))
+
+    @property
+    def duration(self) -> float:
+        """Planned duration [s] of `steps`."""
+        total = last = 0.0
+        for step in self.steps:
+            total += max(0.0, step.plan.duration - last) if step.beside else step.plan.duration
+            last = step.plan.duration
+        return total
+
+    def along(self, outcomes: Outcomes) -> Plan:
+        """The same plan with the path of these outcomes as its `steps`, as far as it is planned."""
+        keys = [outcomes[:k] for k in range(len(outcomes) + 1)]
+        return replace(self, steps=tuple(step for key in keys for step in self.branches.get(key, ())))
 
     @property
     def motions(self) -> tuple[PlannedMotion, ...]:
@@ -94,7 +102,7 @@ class Plan:
         found: list[tuple[Motion, PlanningState, PlanningState]] = []
         before = self.start
         for step in self.steps:
-            found += spans(step.plan.motions, before, step.plan.end)
+            found += spans(step.plan.motions, step.start or before, step.plan.end)
             before = step.plan.end
         return tuple(found)
 
@@ -122,13 +130,7 @@ class Plan:
     @property
     def outline(self) -> PlanOutline:
         """The plan as the log stores it."""
-        return PlanOutline(
-            tuple(
-                StepOutline(step.id, step.verb, step.place, step.plan.duration, step.plan.motions)
-                for step in self.steps
-            ),
-            self.judged,
-        )
+        return PlanOutline(self.listed, self.judged, self.blocks)
 
 
 def unplanned(task: Task) -> Plan:
@@ -151,7 +153,40 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     planner = _planner(task)
     start = _start(task)
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
-    return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
+    spec = task.spec
+    items = block_tree(len(spec.steps), spec.blocks)
+
+    def solve(units: Sequence[Unit], before: PlanningState, outcomes: Outcomes) -> Solved[PlannedStep]:
+        own = planner
+        if not all(outcomes):  # other branches draw for themselves, so that they change nothing on the first path
+            own = planner.keeping(())
+            own.rng = np.random.default_rng(spec.simulation.seed)
+        return plan_units(task, own, units, before, on_progress=on_progress, branch=named(items, outcomes))
+
+    branches = plan_branches(items, start, solve)
+    plan = Plan((), start, planner, judged, branches, items)
+    plan = plan.along(max(branches, key=lambda outcomes: (all(outcomes), len(outcomes))))
+    return replace(plan, listed=_listed(task, plan), blocks=_blocks(task))
+
+
+def _listed(task: Task, plan: Plan) -> tuple[StepOutline, ...]:
+    planned = {step.index: step for step in plan.every}
+    return tuple(
+        StepOutline(one.id, one.verb, one.place, one.plan.duration, one.plan.motions)
+        if (one := planned.get(k)) is not None
+        else StepOutline(str(step.id), step.verb, task.log_place("steps", k), None)
+        for k, step in enumerate(task.spec.steps)
+    )
+
+
+def _blocks(task: Task) -> tuple[BlockOutline, ...]:
+    return tuple(
+        BlockOutline(
+            block.id, block.kind, block.word, block.first, block.last, block.split, block.parent,
+            task.log_place("blocks", k),
+        )
+        for k, block in enumerate(task.spec.blocks)
+    )  # fmt: skip
 
 
 def spans(
@@ -196,26 +231,6 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
     )
 
 
-def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
-    """Plans one step, excluding `grasps`.
-
-    Raises:
-        NotPlannable: with the id of the step.
-    """
-    try:
-        return first(_candidates(planner, step, state), exclude=grasps)
-    except NotPlannable as refusal:
-        raise refusal.but(step=step.id) from refusal
-
-
-def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
-    planner = planner.keeping(step.keep)
-    if state.at_start:
-        planner.outside(state)
-    allowed = expanded_pairs(planner.robot, planner.scene, step.allow)
-    return STEPS[step.verb].ways(step.body, planner, state, allowed)
-
-
 def start_position(task: Task) -> Array:
     """Start configuration (n,) [rad or m]: the task's `start` pose, else `home`, else zero clamped to the limits."""
     return configuration(task.robot, task.spec.start)
@@ -223,53 +238,6 @@ def start_position(task: Task) -> Array:
 
 def _start(task: Task) -> PlanningState:
     return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
-
-
-def _steps(
-    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None]
-) -> tuple[PlannedStep, ...]:
-    """Plans all steps; see `task_search`."""
-    steps = task.spec.steps
-
-    def located(k: int, refusal: NotPlannable) -> NotPlannable:
-        at = task.file.place("steps", k, *((steps[k].verb, *refusal.loc) if refusal.loc else ()))
-        return refusal.but(step=steps[k].id, place=at)
-
-    def placed(k: int, candidates: Candidates) -> Candidates:
-        def further() -> Candidates | None:
-            more = candidates.further()
-            return None if more is None else placed(k, more)
-
-        return replace(candidates, explain=lambda why: located(k, candidates.explain(why)), further=further)
-
-    def opens(k: int, state: PlanningState) -> Candidates:
-        try:
-            return placed(k, _candidates(planner, steps[k], state))
-        except NotPlannable as refusal:
-            raise located(k, refusal) from refusal
-
-    def on_step(k: int, again: bool) -> None:
-        on_progress(f"planning step {k + 1} of {len(steps)}, '{steps[k].id}'{', with another candidate' * again}")
-
-    def explain(refusal: NotPlannable, refused: Sequence[tuple[int, Dropped]]) -> NotPlannable:
-        return explained(refusal, [(str(steps[k].id), one) for k, one in refused])
-
-    solved = search_task(
-        opens,
-        len(steps),
-        start,
-        on_step=on_step,
-        explain=explain,
-        optimise=task.spec.plan.optimise,
-        cost=lambda plan: step_cost(planner, plan).total,
-    )
-    return tuple(
-        PlannedStep(
-            str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps,
-            one.chosen.candidate.name, one.dropped, step.keep,
-        )
-        for k, (step, one) in enumerate(zip(steps, solved, strict=True))
-    )  # fmt: skip
 
 
 def _planner(task: Task) -> Planner:

@@ -49,4 +49,5 @@ MEMBER = StepMember(
     check=check,
     uncommanded=uncommanded,
     moves=False,
+    part=lambda *_: "hand",
 )
