@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.state_window import ROUNDING
@@ -11,7 +12,7 @@ from manipcli.core.text import listed
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.evaluate import examine
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
+from manipcli.judge.steps import ENDED, RunStatus, block_outcomes, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import Recording
@@ -28,8 +29,9 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
     """Judge a recording against the expectations of its task.
 
     In this order: a run that was interrupted or did not finish, or whose log is incomplete, is an `error`; a step that
-    is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`); an expectation that fails or is
-    not evaluated makes it `failed`. Without expectations only the steps count, and the text says so.
+    is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`) or its branch was not taken; so
+    does a block that times out. An expectation that fails or is not evaluated makes it `failed`; one that is asked only
+    of skipped steps does not. Without expectations only the steps count, and the text says so.
 
     Args:
         recording: the log.
@@ -52,22 +54,23 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
     outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes)
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
-    word, text = _verdict(errors, cause, steps, outcomes)
-    return Verdict(
+    found = Verdict(
         task=run.get("task", ""),
-        verdict=word,
+        verdict="error",
         seed=int(run["seed"]) if run.get("seed", "").isdecimal() else 0,
         engine=run.get("engine", ""),
         simulated_time=examined.end,
         steps=steps,
         expectations=outcomes,
         errors=errors,
-        text=text,
         drawn=_drawn(recording),
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
         holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
+        blocks=block_outcomes(recording, interrupted=bool(errors)),
     )
+    word, text = _verdict(found, cause)
+    return replace(found, verdict=word, text=text)
 
 
 def _broken_after_all(recording: Recording) -> str:
@@ -122,18 +125,19 @@ def _cut_short(recording: Recording, end: float) -> tuple[Diagnostic, ...]:
     return ()
 
 
-def _verdict(
-    errors: tuple[Diagnostic, ...],
-    cause: str,
-    steps: tuple[StepOutcome, ...],
-    expectations: tuple[ExpectationOutcome, ...],
-) -> tuple[VerdictWord, str]:
+def _verdict(found: Verdict, cause: str) -> tuple[VerdictWord, str]:
     """The verdict, and its reason in one line. `cause`: what ended the simulation early; "" if nothing did."""
-    if errors:
-        return "error", errors[0].message
+    steps, expectations = found.steps, found.expectations
+    if found.errors:
+        return "error", found.errors[0].message
     if cause and not any(step.went_wrong for step in steps):
         return "failed", cause
-    undone = next((step for step in steps if step.outcome != "done" and not step.tolerated), None)
+    undone = next((step for step in steps if step.outcome not in ("done", "skipped") and not step.tolerated), None)
+    at_fault = found.blocks_at_fault
+    if at_fault and (undone is None or undone.outcome == "not_run"):
+        block = at_fault[0]
+        why = f": {block.text}" if block.text else ""
+        return "failed", f"{block.label} {'timed out' if block.outcome == 'timeout' else block.outcome}{why}"
     if undone is not None:
         why = f": {undone.text}" if undone.text else ""
         first = undone.attempts[0].text if undone.attempts else ""
@@ -142,15 +146,28 @@ def _verdict(
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
     if not steps:
         return "failed", "the recording has no steps"
-    unmet = next((expectation for expectation in expectations if expectation.outcome != "passed"), None)
+    unmet = next((one for one in expectations if one.outcome not in ("passed", "skipped")), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
-    done = f"all {len(steps)} steps done" if len(steps) > 1 else "1 step done"
-    failed = [step.id for step in steps if step.tolerated]
-    if failed:
-        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, failure of {listed(failed)} tolerated"
+    return "passed", f"{_done(steps)}{', ' if expectations else '; '}{_met(expectations)}"
+
+
+def _done(steps: Sequence[StepOutcome]) -> str:
+    failed = [step.id for step in steps if step.tolerated and step.outcome != "not_run"]
+    others = [(word, sum(step.outcome == word for step in steps)) for word in ("skipped", "not_run")]
+    others = [(word, count) for word, count in others if count]
+    if not failed and not others:
+        return f"all {len(steps)} steps done" if len(steps) > 1 else "1 step done"
+    done = f"{sum(step.outcome == 'done' for step in steps)} of {len(steps)} steps done"
+    done += "".join(f", {count} {word.replace('_', ' ')}" for word, count in others)
+    return f"{done}, failure of {listed(failed)} tolerated" if failed else done
+
+
+def _met(expectations: Sequence[ExpectationOutcome]) -> str:
     if not expectations:
-        return "passed", f"{done}; the task has no expectations"
-    met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "1 expectation met"
-    return "passed", f"{done}, {met}"
+        return "the task has no expectations"
+    skipped = sum(one.outcome == "skipped" for one in expectations)
+    if skipped:
+        return f"{len(expectations) - skipped} of {len(expectations)} expectations met, {skipped} skipped"
+    return f"all {len(expectations)} expectations met" if len(expectations) > 1 else "1 expectation met"
