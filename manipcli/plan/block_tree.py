@@ -72,6 +72,11 @@ def steps_of(items: Sequence[Item]) -> tuple[int, ...]:
     return tuple(k for item in items for k in ((item,) if isinstance(item, int) else steps_of(item.all)))
 
 
+def blocks_of(items: Sequence[Item]) -> tuple[Group, ...]:
+    """All blocks, each before its parts."""
+    return tuple(block for item in items if not isinstance(item, int) for block in (item, *blocks_of(item.all)))
+
+
 def stretch(items: Sequence[Item], outcomes: Outcomes) -> Stretch:
     """The stretch after these outcomes."""
     left = [*outcomes]

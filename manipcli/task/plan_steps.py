@@ -31,12 +31,12 @@ class PlannedStep:
         id, verb: of the step.
         plan: of its candidate.
         place: file:line:column.
+        start: the state that it is planned from.
+        index: in the task.
         grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
         candidate: name of the candidate; "" for the only way.
         dropped: the candidates that were tried before it.
         keep: of the step.
-        index: in the task.
-        start: the state that it is planned from; that of the task for a plan without steps.
         beside: it is done at the same time as the step before.
     """
 
@@ -44,12 +44,12 @@ class PlannedStep:
     verb: str
     plan: StepPlan
     place: str
+    start: PlanningState
+    index: int
     grasps: tuple[Array, ...] = ()
     candidate: str = ""
     dropped: tuple[Dropped, ...] = ()
     keep: tuple[KeepSpec, ...] = ()
-    index: int = 0
-    start: PlanningState | None = None
     beside: bool = False
 
 
@@ -155,13 +155,13 @@ def plan_units(
         found.append(
             tuple(
                 PlannedStep(
-                    str(steps[k].id), steps[k].verb, plan, task.log_place("steps", k), one.grasps,
-                    one.chosen.candidate.name, one.dropped, steps[k].keep, k, before, k != unit[0],
+                    str(steps[k].id), steps[k].verb, plan, task.log_place("steps", k), before, k, one.grasps,
+                    one.chosen.candidate.name, one.dropped, steps[k].keep, k != unit[0],
                 )
                 if k != hand
                 else PlannedStep(
                     str(steps[k].id), steps[k].verb, replace(plan_of(k, before), end=plan.end),
-                    task.log_place("steps", k), index=k, start=before, beside=k != unit[0],
+                    task.log_place("steps", k), before, k, beside=k != unit[0],
                 )
                 for k in unit
             )

@@ -100,10 +100,8 @@ class Plan:
     def spans(self) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:
         """Each motion with the states before and after it."""
         found: list[tuple[Motion, PlanningState, PlanningState]] = []
-        before = self.start
         for step in self.steps:
-            found += spans(step.plan.motions, step.start or before, step.plan.end)
-            before = step.plan.end
+            found += spans(step.plan.motions, step.start, step.plan.end)
         return tuple(found)
 
     def clearances(self) -> tuple[CollisionHit | None, ...]:
