@@ -21,6 +21,8 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import Time
 
 ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+STEP_ID = re.compile(rf"(?:{ID.pattern}(?:\[\d+\])?/)*{ID.pattern}")
+"""Id of a step with the blocks around it: `stack[2]/pick_1`."""
 ID_HINT = "use letters, digits, '_' and '-'; begin with a letter or '_'"
 COMBINATIONS = {
     "all": "All of these conditions hold.",

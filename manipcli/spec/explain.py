@@ -26,14 +26,14 @@ A code is the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from manipcli.core.errors import Diagnostic, Loc
+from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.core.units import ANGLE, readable
 from manipcli.spec import hints
@@ -89,14 +89,38 @@ class _Complaint:
 _WHOLE = frozenset({"literal_error", "quantity_type", "unit"})
 
 
-def explain(error: ValidationError, root: Node, model: type[BaseModel], area: str) -> tuple[Diagnostic, ...]:
-    """All errors as diagnostics, in the order of the file."""
+def explain(
+    error: ValidationError,
+    root: Node,
+    model: type[BaseModel],
+    area: str,
+    *,
+    in_file: Callable[[Loc], Loc] = lambda path: path,
+) -> tuple[Diagnostic, ...]:
+    """All errors as diagnostics, in the order of the file; `in_file` gives a path of the tree as it is in the file."""
     complaints = [_locate(details, root) for details in error.errors(include_url=False)]
     findings: list[Diagnostic] = []
     for complaint in _decide(_without_renamed(_counted(complaints), root), root):
-        findings.append(_finding(complaint[0], complaint, root, model, area))
-    unique = dict.fromkeys(findings)
-    return tuple(sorted(unique, key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0)))
+        findings.append(_finding(complaint[0], complaint, root, model, area, in_file))
+    return tuple(
+        sorted(distinct(findings), key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0))
+    )
+
+
+def distinct(findings: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """The findings without those that repeat code, place and message, as in the rounds of a `repeat`."""
+    first: dict[tuple[str, Place | None, str], Diagnostic] = {}
+    for finding in findings:
+        first.setdefault((finding.code, finding.place, finding.message), finding)
+    return tuple(first.values())
+
+
+def with_origin(hint: str | None, node: Node) -> str | None:
+    """The hint, and where the value of a local parameter in this scalar is given."""
+    if not isinstance(node, ScalarNode) or node.given is None:
+        return hint
+    origin = f"the value comes from '{node.written}'; it is given at {node.given}"
+    return f"{hint}; {origin}" if hint else origin
 
 
 def _locate(error: ErrorDetails, root: Node) -> _Complaint:
@@ -193,7 +217,12 @@ def _badness(branch: Sequence[_Complaint]) -> tuple[int, int]:
 
 
 def _finding(
-    first: _Complaint, branches: Sequence[_Complaint], root: Node, model: type[BaseModel], area: str
+    first: _Complaint,
+    branches: Sequence[_Complaint],
+    root: Node,
+    model: type[BaseModel],
+    area: str,
+    in_file: Callable[[Loc], Loc],
 ) -> Diagnostic:
     kind, path = first.error["type"], first.path
     node = node_at(root, path)
@@ -205,13 +234,15 @@ def _finding(
     elif hint is None:
         hint = origin
     place = key_place_at(root, path) if at_key else node.place
-    where = dotted(path[:-1] if kind in ("extra_forbidden", "missing") or at_key else path)
+    where = dotted(in_file(path[:-1] if kind in ("extra_forbidden", "missing") or at_key else path))
     code = f"{area}{_MISTAKES.get(kind, 205)}"
     return Diagnostic(code, f"{where}: {what}" if where else what, place, hint=hint)
 
 
 def _origin(node: Node, root: Node) -> str | None:
     """The parameter that a value comes from, and its place."""
+    if isinstance(node, ScalarNode) and node.given is not None:
+        return with_origin(None, node)
     written = node.written if isinstance(node, ScalarNode) else None
     for name in re.findall(r"\$\{?(\w+)", written or ""):
         declared = child(child(root, "params") or root, name)

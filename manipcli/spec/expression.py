@@ -16,7 +16,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.text import did_you_mean, escape, shorten
@@ -29,7 +30,7 @@ from manipcli.core.units import (
     format_quantity,
     parse_quantity,
 )
-from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, dotted, mapped
+from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, dotted, mapped, shown
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
 NAME = re.compile(r"[A-Za-z_]\w*")
@@ -40,6 +41,8 @@ _TOKEN = re.compile(
     rf"\s*(?:(?P<name>\$[A-Za-z_]\w*)|(?P<quantity>{NUMBER_PATTERN}(?:\s*{UNIT_PATTERN})?)|(?P<sign>[-+*/()]))"
 )
 _DEEPEST = 50
+INDEX: Final = "index"
+"""Parameter of the number of a round, from 0."""
 
 Params = Mapping[str, Scalar]
 
@@ -197,66 +200,124 @@ class _Parser:
         return Quantity(float(value), NUMBER)
 
 
-def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Diagnostic], frozenset[Place]]:
-    """The task with all expressions computed, the diagnostics, and the places of values that stay unknown.
+def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, Scope]:
+    """The task with all expressions computed outside of `steps:` and `blocks:`, and the scope of its parameters.
 
     A parameter may use the parameters above it in `params:`. `refused`: places of invalid values.
     """
-    work = _Substitution(refused)
+    scope = Scope(refused)
     if not isinstance(root, MappingNode):
-        return root, [], frozenset()
+        return root, scope
     block = root.get("params")
     if isinstance(block, MappingNode):
+        scope.below = list(block.entries)
         entries: dict[str, Entry] = {}
-        work.declared = list(block.entries)
-        work.below = list(block.entries)
         for name, entry in block.entries.items():
-            node = mapped(entry.node, work.computed, ("params", name))
-            work.below.remove(name)
+            node = mapped(entry.node, scope.computed, ("params", name))
+            scope.below.remove(name)
             entries[name] = Entry(entry.key_place, node)
-            if isinstance(node, ScalarNode) and node.place not in work.refused:
-                work.params[name] = node.value
-            else:
-                work.lost.add(name)
+            scope.declare(name, node)
         root = root.with_entry("params", Entry(root.entries["params"].key_place, MappingNode(entries, block.place)))
     done = {
-        key: entry if key == "params" else Entry(entry.key_place, mapped(entry.node, work.computed, (key,)))
+        key: entry
+        if key in ("params", "steps", "blocks")
+        else Entry(entry.key_place, mapped(entry.node, scope.computed, (key,)))
         for key, entry in root.entries.items()
     }
-    return MappingNode(done, root.place), work.findings, frozenset(work.unknown)
+    return MappingNode(done, root.place), scope
 
 
-class _Substitution:
-    """`params`: computed parameters; `lost`: parameters without a value, already reported; `below`: not computed yet,
-    beginning with the current one."""
+class Scope:
+    """The parameters at one place of a task, and what was found while computing with them.
 
-    def __init__(self, refused: Iterable[Place]) -> None:
-        self.params: dict[str, Scalar] = {}
-        self.lost: set[str] = set()
-        self.declared: list[str] = []
+    Attributes:
+        nodes: values of the parameters: scalars, lists or mappings.
+        isolated: whether it holds only what a sub-task declares.
+        local: names whose values are given in `each:` or `with:`, not in the task's `params:`.
+        lost: parameters without a value, already reported.
+        below: names that are not computed yet, beginning with the current one.
+        used: names of the task's parameters that were used; shared with inner scopes, as the next three are.
+        findings: errors of expressions.
+        refused: places of invalid values.
+        unknown: places of values that stay unknown.
+    """
+
+    def __init__(self, refused: Iterable[Place] = ()) -> None:
+        self.nodes: dict[str, Node] = {}
+        self.isolated = False
+        self.local: frozenset[str] = frozenset()
+        self.lost: frozenset[str] = frozenset()
         self.below: list[str] = []
+        self.used: set[str] = set()
         self.findings: list[Diagnostic] = []
         self.refused = set(refused)
         self.unknown: set[Place] = set()
 
-    def computed(self, node: ScalarNode, path: Loc) -> ScalarNode:
+    def declare(self, name: str, node: Node) -> None:
+        """Adds a computed parameter; a list or a mapping in `params:` was refused."""
+        if isinstance(node, ScalarNode) and node.place not in self.refused:
+            self.nodes[name] = node
+        else:
+            self.lost |= {name}
+
+    def inner(
+        self, given: Mapping[str, Node], *, lost: Iterable[str] = (), isolated: bool = False, below: Iterable[str] = ()
+    ) -> Scope:
+        """A scope with more parameters; with `isolated`, with no others."""
+        scope = Scope()
+        scope.isolated = isolated or self.isolated
+        scope.nodes = {**given} if isolated else {**self.nodes, **given}
+        scope.local = frozenset(given) if isolated else self.local.union(given)
+        scope.lost = frozenset(lost) if isolated else self.lost.difference(given).union(lost)
+        scope.below = list(below)
+        scope.used, scope.findings = self.used, self.findings
+        scope.refused, scope.unknown = self.refused, self.unknown
+        return scope
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that are known here."""
+        return tuple(dict.fromkeys((*self.nodes, *self.below, *sorted(self.lost))))
+
+    def computed(self, node: ScalarNode, path: Loc) -> Node:
+        """The value of a scalar; with a finding, the scalar unchanged."""
         if not isinstance(node.value, str) or "$" not in node.value:
             return node
         if not is_expression(node.value):
-            return ScalarNode(node.value.replace("$$", "$"), node.place)
+            return replace(node, value=node.value.replace("$$", "$"))
         names = _NAMES.findall(node.value)
+        self.used.update(name for name in names if name not in self.local)
         if self.lost.intersection(names):
             self.refused.add(node.place)
             self.unknown.add(node.place)
             return node
         try:
             self.in_order(names)
-            return ScalarNode(evaluate(node.value, self.params), node.place, written=node.value)
+            alone = _ALONE.fullmatch(node.value)
+            found = self.nodes[alone.group(1)] if alone is not None else None
+            if found is not None and not isinstance(found, ScalarNode):
+                return found
+            given = next((self.nodes[name].place for name in names if name in self.local), None)
+            return ScalarNode(evaluate(node.value, self.scalars(names)), node.place, written=node.value, given=given)
         except ExpressionError as error:
             code = "TASK203" if error.unknown else "TASK211"
             self.findings.append(Diagnostic(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
             self.refused.add(node.place)
             return node
+
+    def scalars(self, names: Iterable[str]) -> dict[str, Scalar]:
+        """The values of these parameters.
+
+        Raises:
+            ExpressionError: one of them is a list or a mapping.
+        """
+        values: dict[str, Scalar] = {}
+        for name in names:
+            node = self.nodes[name]
+            if not isinstance(node, ScalarNode):
+                raise ExpressionError(f"the parameter '${name}' is {shown(node)}", f"use ${name} alone, not in a sum")
+            values[name] = node.value
+        return values
 
     def in_order(self, names: Sequence[str]) -> None:
         """Checks that all names are parameters; inside `params:`, that they are defined above."""
@@ -266,10 +327,25 @@ class _Substitution:
             if name in self.below:
                 cause = f"the parameter '${name}' is used before it is defined"
                 raise ExpressionError(cause, f"move '{escape(name)}' above '{escape(self.below[0])}'", unknown=True)
-            if name not in self.params:
-                known = [param for param in self.declared if param not in self.below[:1]]
-                hint = did_you_mean(name, known, kind="params") if self.declared else no_params(name)
+            if name not in self.nodes:
+                known = [param for param in self.names if param not in self.below[:1]]
+                hint = did_you_mean(name, known, kind="params") if self.names else no_params(name)
+                if name == INDEX:
+                    hint = f"`${INDEX}` counts the rounds of a `repeat`: it is known only inside its `steps`"
                 raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
+
+
+def names_used(node: Node) -> frozenset[str]:
+    """Names of the parameters in the expressions of a tree that is not computed yet."""
+    found: set[str] = set()
+
+    def note(scalar: ScalarNode, _: Loc) -> Node:
+        if isinstance(scalar.value, str) and "$" in scalar.value:
+            found.update(_NAMES.findall(scalar.value))
+        return scalar
+
+    mapped(node, note)
+    return frozenset(found)
 
 
 def no_params(name: str) -> str:

@@ -13,6 +13,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import any_of, escape, listed, nearest_file
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.explain import distinct
 from manipcli.spec.expression import substitute
 from manipcli.spec.kind import names_controllers, refuse_description, refuse_other_kind
 from manipcli.spec.located import Area, Located, Source, validate
@@ -25,6 +26,7 @@ from manipcli.spec.ros import rewrite
 from manipcli.spec.ros.substitutions import open_substitutions, substituted
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.source.yaml import MAX_BYTES, parse
+from manipcli.spec.structure.flatten import flattened
 from manipcli.spec.task import TaskSpec
 
 FileKind = Literal["task", "robot", "controllers"]
@@ -149,9 +151,11 @@ def _task_source(
     written, in_text = _source(text, name, "TASK", "task")
     source, findings = _changed(written, wanted, model)
     refused = {finding.place for finding in in_text if finding.place is not None}
-    root, more, unknown = substitute(source.root, refused=refused)
-    source = Source(name, root, "TASK", unknown=unknown)
-    return source, [*in_text, *findings, *more, *_duplicate_ids(source)]
+    root, scope = substitute(source.root, refused=refused)
+    root, structure, of_structure = flattened(root, scope, model.verbs)
+    source = Source(name, root, "TASK", unknown=frozenset(scope.unknown), structure=structure)
+    found = [*in_text, *findings, *scope.findings, *of_structure, *_duplicate_ids(source)]
+    return source, [*distinct(found)]
 
 
 def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
@@ -163,7 +167,7 @@ def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
         ("expect", "ids name expectations", judged),
         ("watch", "expectations and watches share their ids", judged),
     ):
-        items = child(source.root, key)
+        items = None if key == "steps" and source.structure.steps else child(source.root, key)
         for k, item in enumerate(items.items if isinstance(items, SequenceNode) else ()):
             own = child(item, "id")
             if not isinstance(own, ScalarNode) or not isinstance(own.value, str):

@@ -14,7 +14,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place, Severity
 from manipcli.core.text import listed, shorten
 from manipcli.core.version import __version__
 from manipcli.spec.base import Model
-from manipcli.spec.explain import explain
+from manipcli.spec.explain import explain, with_origin
 from manipcli.spec.source.tree import (
     MappingNode,
     Node,
@@ -27,6 +27,7 @@ from manipcli.spec.source.tree import (
     plain,
     shown,
 )
+from manipcli.spec.structure.structure import Structure
 
 M = TypeVar("M", bound=Model)
 
@@ -51,6 +52,7 @@ class Source:
         kept: indices in the file of the items that remain, by list; only for lists with removed items.
         whole: the tree before values were removed or replaced; None if none were.
         unknown: places of values that cannot be computed, because their inputs were refused.
+        structure: of a task: where its steps and blocks are written, and the parameters there.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Source:
     kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     whole: Node | None = None
     unknown: frozenset[Place] = frozenset()
+    structure: Structure = field(default_factory=Structure)
 
     def plain(self) -> Plain:
         """The plain data, without places."""
@@ -92,13 +95,16 @@ class Source:
     ) -> Diagnostic:
         """A diagnostic at the value (with `key`: at the key) at `path`; the code is the file's area and `number`."""
         place = self.key_place(*path) if key else self.place(*path)
-        where = f"{dotted(self._in_file(path))}: " if path else ""
+        if not key:
+            hint = with_origin(hint, node_at(self.root, path))
+        where = f"{dotted(self.in_file(path))}: " if path else ""
         return Diagnostic(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
 
-    def _in_file(self, path: Loc) -> Loc:
+    def in_file(self, path: Loc) -> Loc:
+        """A path in this tree as it is in the file."""
         if len(path) > 1 and isinstance(path[0], str) and isinstance(path[1], int) and path[0] in self.kept:
-            return (path[0], self.kept[path[0]][path[1]], *path[2:])
-        return path
+            path = (path[0], self.kept[path[0]][path[1]], *path[2:])
+        return self.structure.written(path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +140,9 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Diagnostic]) 
     except ValidationError as error:
         # A failed expression stays in the tree as text: pydantic's error at its place is redundant.
         places = {finding.place for finding in earlier if finding.severity == "error"} | source.unknown
-        more = [f for f in explain(error, source.root, model, source.area) if f.place not in places]
+        more = [
+            f for f in explain(error, source.root, model, source.area, in_file=source.in_file) if f.place not in places
+        ]
         raise InvalidInput([*earlier, *more]) from None
     except RecursionError:
         raise InvalidInput([*earlier, source.finding(205, (), "nested too deeply")]) from None

@@ -18,9 +18,9 @@ from manipcli.core.text import did_you_mean, escape, listed, number_of, shorten
 from manipcli.spec.base import Model
 from manipcli.spec.located import Area
 from manipcli.spec.source import shape
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, dotted, shown
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, shown
 from manipcli.spec.source.yaml import parse
-from manipcli.spec.step import StepSpec
+from manipcli.spec.structure.ids import step_ids
 
 _FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
 
@@ -171,21 +171,3 @@ def _index(node: SequenceNode, override: Override, done: Loc, part: str) -> int:
 
 def _nowhere(override: Override, message: str, hint: str | None) -> InvalidInput:
     return InvalidInput([Diagnostic(f"{override.area}212", message, override.place, hint=hint)])
-
-
-def step_ids(steps: SequenceNode) -> tuple[str, ...]:
-    """The ids of the steps, given or generated."""
-    given = {node.value for item in steps.items if isinstance(node := child(item, "id"), ScalarNode)}
-    counts: dict[str, int] = {}
-    ids: list[str] = []
-    for item in steps.items:
-        own = child(item, "id")
-        keys = item.entries if isinstance(item, MappingNode) else ()
-        verb = next((key for key in keys if key not in StepSpec.model_fields), "")
-        number = counts.get(verb, 0) + 1
-        is_named = isinstance(own, ScalarNode) and isinstance(own.value, str)
-        while not is_named and f"{verb}_{number}" in given:
-            number += 1
-        counts[verb] = number
-        ids.append(str(own.value) if isinstance(own, ScalarNode) and is_named else f"{verb}_{number}")
-    return tuple(ids)

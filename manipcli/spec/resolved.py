@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from manipcli.core.errors import Loc
 from manipcli.spec.expression import escaped
 from manipcli.spec.source.tree import Plain
+from manipcli.spec.structure.nest import Nesting
 from manipcli.spec.task import TaskSpec
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
@@ -21,17 +22,24 @@ _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 _WIDTH = 100
 
 
-def resolved(spec: BaseModel, expressions: Mapping[Loc, str] | None = None) -> str:
+def resolved(
+    spec: BaseModel, expressions: Mapping[Loc, str] | None = None, params: Mapping[int, Plain] | None = None
+) -> str:
     """The YAML text, with keys in the order of the model and of the file.
 
     Args:
         spec: the spec to write.
         expressions: expressions with `$name` to write instead of their values, by path.
+        params: values of parameters to write at blocks of a task, by index.
     """
     data = _data(spec, escape=isinstance(spec, TaskSpec))
     for path, text in (expressions or {}).items():
         data = _with(data, path, text)
     assert isinstance(data, dict)
+    if isinstance(spec, TaskSpec):
+        steps, blocks = data["steps"], data.pop("blocks", [])
+        if spec.blocks and isinstance(steps, list) and isinstance(blocks, list):
+            data["steps"] = Nesting(steps, spec.blocks, blocks, params or {}).items()
     return yaml_text(data)
 
 

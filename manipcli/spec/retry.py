@@ -8,8 +8,9 @@ from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
 from manipcli.spec.located import Located, validate
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, child, mapped, node_at
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, mapped, node_at
 from manipcli.spec.step import StepSpec
+from manipcli.spec.structure.structure import Structure
 from manipcli.spec.task import TaskSpec
 
 
@@ -23,6 +24,8 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
     changed = node_at(source.root, ("steps", index, "on_fail", "with"))
     if step.retry is None or not step.retry.with_ or not isinstance(changed, MappingNode):
         return step
+    if source.structure.steps:
+        return _in_structure(file, index, changed)
     root = mapped(source.root, _written)
     assert isinstance(root, MappingNode)
     params = child(root, "params")
@@ -36,9 +39,40 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
         entries[name] = Entry(entry.key_place, mapped(entry.node, _escaped))
     block = Entry(changed.place, MappingNode(entries, changed.place))
     changed_root = MappingNode({"params": block, **root.without("params").entries}, root.place)
-    substituted, findings, unknown = substitute(changed_root)
-    tree = replace(source, root=substituted, unknown=unknown)
-    return validate(tree, type(file.spec), findings=[*unknown_params, *findings]).spec.steps[index]
+    substituted, scope = substitute(changed_root)
+    assert isinstance(substituted, MappingNode)
+    steps = mapped(node_at(substituted, ("steps",)), scope.computed, ("steps",))
+    tree = replace(source, root=substituted.with_node("steps", steps), unknown=frozenset(scope.unknown))
+    return validate(tree, type(file.spec), findings=[*unknown_params, *scope.findings]).spec.steps[index]
+
+
+def _in_structure(file: Located[TaskSpec], index: int, changed: MappingNode) -> StepSpec:
+    """As `retried`, of a step of a structured task: parameters of its round or sub-task, or of the task."""
+    source, step = file.source, file.source.structure.steps[index]
+    path = ("steps", index, "on_fail", "with")
+    unknown = [
+        source.finding(203, (*path, name), f"unknown parameter '{name}'", key=True,
+                       hint=did_you_mean(name, step.scope.names, kind="params") or no_params(name))
+        for name in changed.entries
+        if name not in step.scope.names
+    ]  # fmt: skip
+    params = mapped(child(source.root, "params") or MappingNode({}, changed.place), _written)
+    for name, entry in changed.entries.items():
+        if name not in step.scope.local and isinstance(params, MappingNode):
+            params = params.with_node(name, mapped(entry.node, _escaped))
+    _, scope = substitute(MappingNode({"params": Entry(changed.place, params)}, changed.place))
+    local = {name: changed.get(name) or step.scope.nodes[name] for name in step.scope.local}
+    step = replace(step, scope=scope.inner(local, isolated=step.scope.isolated))
+    steps = SequenceNode((step.node(),), changed.place)
+    root = source.root
+    assert isinstance(root, MappingNode)
+    tree = replace(
+        source,
+        root=root.with_node("steps", steps).without("blocks"),
+        unknown=frozenset(scope.unknown),
+        structure=Structure((step,)),
+    )
+    return validate(tree, type(file.spec), findings=[*unknown, *scope.findings]).spec.steps[0]
 
 
 def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:

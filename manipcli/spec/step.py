@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 
 from manipcli.spec.base import problem
 from manipcli.spec.clearance import PartPair
-from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, KeyedSpec
+from manipcli.spec.condition import ID_HINT, STEP_ID, ConditionSpec, KeyedSpec
 from manipcli.spec.keep import Keeps
 from manipcli.spec.quantity import Pause
 from manipcli.spec.reactions import OnFail, RetrySpec
@@ -60,6 +60,6 @@ class StepSpec(KeyedSpec):
     @field_validator("id", mode="after")
     @classmethod
     def _id(cls, own: str | None) -> str | None:
-        if own is not None and not ID.fullmatch(own):
+        if own is not None and not STEP_ID.fullmatch(own):
             raise problem("conflict", f"'{own}' is not a valid id", hint=ID_HINT)
         return own

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -46,6 +46,9 @@ ParamName = Annotated[str, AfterValidator(_usable)]
 
 class TaskSpec(Model):
     """A task: robot, controllers, scene, steps and expectations."""
+
+    verbs: ClassVar[tuple[str, ...]] = ()
+    """Words of the members of `steps`; set by `unions.task_model`."""
 
     # `unions.task_model` replaces `steps`, `expect` and `watch` by unions of the registered members.
     task: str = Field(description="The name of the task and of its log.", min_length=1)
@@ -85,7 +88,7 @@ class TaskSpec(Model):
     plan: PlanSpec = Field(PlanSpec(), description="How the plan is chosen.")
     agree: AgreeSpec = Field(AgreeSpec(), description="Allowed differences between the runs of several engines.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")
-    blocks: tuple[BlockSpec, ...] = Field((), description="Groups of `steps`; written by the loader.")
+    blocks: tuple[BlockSpec, ...] = Field((), exclude=True, description="Groups of `steps`; written by the loader.")
     expect: tuple[ExpectationSpec, ...] = Field(
         (), description="What must hold: at the end, at all times, or in a step."
     )

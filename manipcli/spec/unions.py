@@ -20,6 +20,7 @@ from typing_extensions import TypeAliasType
 from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean, escape, listed
 from manipcli.spec.base import Model, about, problem
+from manipcli.spec.block import BlockSpec
 from manipcli.spec.condition import (
     COMBINATIONS,
     QUANTIFIERS,
@@ -85,6 +86,8 @@ def _task_model(steps: Members, conditions: Members, engines: Members, planners:
     condition = _conditions(conditions)
     expectation = _expectations(conditions, condition)
     until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`object` has no operator `|`)
+    asked = {name: (Optional[condition], BlockSpec.model_fields[name]) for name in ("condition", "until")}  # noqa: UP045
+    block = create_model("BlockSpec", __base__=BlockSpec, __doc__=BlockSpec.__doc__, **asked)  # type: ignore[call-overload]
     steps_of = [_wrapped(StepSpec, name, spec, {"until": until}) for name, spec in steps]
     step = _union("verb", steps_of, common=_STEP)
     simulation = simulation_model(engines)
@@ -102,9 +105,11 @@ def _task_model(steps: Members, conditions: Members, engines: Members, planners:
             ),
         ),
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
+        blocks=(tuple[block, ...], TaskSpec.model_fields["blocks"]),
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
         watch=(tuple[_watches([name for name, _ in conditions], condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
     )
+    model.verbs = tuple(name for name, _ in steps)
     return cast(type[TaskSpec], model)
 
 

@@ -11,7 +11,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.judge.drawn import Number
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.located import Area, Located, Source, validate
+from manipcli.spec.located import Area, Located, validate
 from manipcli.spec.override import Override, apply
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode
@@ -103,9 +103,7 @@ def _changed(file: Located[M], overrides: Iterable[Override]) -> Located[M]:
     if not mine:
         return file
     root, findings = apply(source.root, mine, type(file.spec), source.area)
-    return validate(
-        Source(source.name, root, source.area, source.kept), type(file.spec), findings=[*file.findings, *findings]
-    )
+    return validate(replace(source, root=root), type(file.spec), findings=[*file.findings, *findings])
 
 
 def _node(value: Number, place: Place) -> Node:

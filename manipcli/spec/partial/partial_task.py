@@ -14,9 +14,9 @@ from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import nearest
 from manipcli.spec.explain import explain
 from manipcli.spec.located import Located, Source
-from manipcli.spec.override import step_ids
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at, without
 from manipcli.spec.step import StepSpec
+from manipcli.spec.structure.ids import step_ids
 from manipcli.spec.task import TaskSpec
 
 LISTS = ("steps", "expect", "watch")
@@ -52,7 +52,7 @@ def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
         except ValidationError as error:
             faults = [fault["loc"] for fault in error.errors(include_url=False)]
             if number and faults == [()] and left.untouched("simulation", "control_period"):
-                late += explain(error, root, model, source.area)
+                late += explain(error, root, model, source.area, in_file=left.in_file)
             faults, root = (faults, root) if number else _without_fields(root, faults)
             root = _without(root, faults, kept)
     return None

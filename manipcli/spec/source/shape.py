@@ -48,6 +48,7 @@ def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
         for kind in kinds
         if isinstance(kind, type) and issubclass(kind, BaseModel)
         for name, field in kind.model_fields.items()
+        if not field.exclude
     }
     items = [item for kind in kinds if _is_list(kind) for item, _ in alternatives(get_args(kind)[0])]
     return own or (keys_of(items) if items else {})

@@ -14,11 +14,17 @@ Plain = Scalar | list["Plain"] | dict[str, "Plain"]
 
 @dataclass(frozen=True, slots=True)
 class ScalarNode:
-    """A string, number, boolean or null. `written`: the expression that it was computed from."""
+    """A string, number, boolean or null.
+
+    Attributes:
+        written: the expression that it was computed from.
+        given: place of the value of a local parameter in that expression, as in `each:` or `with:`.
+    """
 
     value: Scalar
     place: Place
     written: str | None = None
+    given: Place | None = None
 
 
 @dataclass(frozen=True, slots=True)
