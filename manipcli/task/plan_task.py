@@ -110,7 +110,7 @@ class Plan:
 
     def grasps(self) -> tuple[tuple[str, GraspMargin], ...]:
         """Id of each step that ends with an object in the closed hand, and the margin of its grasp."""
-        found = ((step.id, grasp_margin(self.planner, step.plan)) for step in self.steps)
+        found = ((step.id, grasp_margin(self.planner, step.plan)) for step in self.every)
         return tuple((id_, margin) for id_, margin in found if margin is not None)
 
     def margins(self) -> tuple[MotionMargins, ...]:

@@ -13,7 +13,8 @@ from manipcli.preflight.preflight import Check, Subject
 def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Steps whose `timeout` is shorter than their motions."""
     task, plan = subject.task, subject.plan
-    for k, (step, planned) in enumerate(zip(task.spec.steps, plan.steps, strict=True)):
+    for planned in plan.every:
+        k, step = planned.index, task.spec.steps[planned.index]
         least = sum(_least(motion) for motion in planned.plan.motions)
         if step.timeout is not None and least > step.timeout:
             takes, given = distinguished(least, step.timeout, form=".3g")
