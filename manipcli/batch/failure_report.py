@@ -18,6 +18,7 @@ from manipcli.pipeline import load_task
 from manipcli.replay.frames import Frames
 from manipcli.replay.renderer import png_bytes
 from manipcli.report.html.render_page import render_page
+from manipcli.report.nesting import block_line
 from manipcli.report.run_page import Cause, RunPage, Written
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite.suite import Trouble
@@ -41,11 +42,12 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
         for k, step in enumerate(verdict.steps)
         if step.went_wrong
     ]
+    steps += [Trouble(block_line(block), None, block.ended) for block in verdict.blocks_at_fault]
     refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
     unmet = [
         Trouble(describe_expectation(expectation), _place(job, task, *key), expectation.at)
         for key, expectation in zip(task.spec.judged_at, verdict.expectations, strict=False)
-        if expectation.outcome != "passed" and not refused
+        if expectation.outcome not in ("passed", "skipped") and not refused
     ]
     if verdict.verdict == "error" or verdict.ended_between:
         errors = [Trouble(finding.message, finding.place) for finding in verdict.errors]

@@ -13,7 +13,7 @@ from dataclasses import fields, is_dataclass
 
 from manipcli.core.errors import Diagnostic
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
+from manipcli.judge.verdict import BlockOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
 
 Json = None | bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"]
@@ -90,6 +90,8 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
             picked(expectation, "name outcome margin unit at text") for expectation in judged.expectations
         ]
         found["candidates"] = plain(judged.candidates)
+        if judged.blocks:
+            found["blocks"] = [block_object(judged, block) for block in judged.blocks]
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
     return {**found, **known, "errors": plain(errors)}
@@ -110,6 +112,15 @@ def _counted(counts: Mapping[str, int]) -> dict[str, Json]:
 
 def step_object(step: StepOutcome) -> dict[str, Json]:
     return picked(step, "id verb outcome started ended planned_duration text tolerated attempts replanned")
+
+
+def block_object(judged: Verdict, block: BlockOutcome) -> dict[str, Json]:
+    """A block with the ids of its steps and of the block around it."""
+    return {
+        **picked(block, "id word outcome taken started ended attempts text tolerated"),
+        "parent": None if block.parent is None else judged.blocks[block.parent].id,
+        "steps": [step.id for step in judged.steps[block.first : block.last]],
+    }
 
 
 def finding_object(finding: Diagnostic) -> dict[str, Json]:

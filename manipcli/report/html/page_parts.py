@@ -86,9 +86,9 @@ def image(picture: Picture, label: str) -> Markup:
 
 
 def mark(good: bool, word: str) -> Markup:
-    """`✓ done`, `✗ failed`, `– not run`."""
-    if word == "not_run":
-        return element("span", "– not run", class_="idle")
+    """`✓ done`, `✗ failed`, `– not run`, `– skipped`."""
+    if word in ("not_run", "skipped"):
+        return element("span", f"– {word.replace('_', ' ')}", class_="idle")
     return element("span", f"{'✓' if good else '✗'} {word.replace('_', ' ')}", class_="yes" if good else "no")
 
 
