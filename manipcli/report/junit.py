@@ -26,8 +26,8 @@ def render_junit(
     """The file of one run.
 
     A block of steps is a case, too: it fails if it timed out though its steps were done. The additional case `run`
-    reports what belongs to no step or expectation, such as an interruption or an incomplete log. An expectation that was
-    not evaluated because a step failed before is skipped.
+    reports what belongs to no step or expectation, such as an interruption or an incomplete log. An expectation that
+    was not evaluated because a step failed before is skipped.
 
     Args:
         verdict: the verdict.

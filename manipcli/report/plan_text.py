@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
+from manipcli.plan.block_tree import choices
 from manipcli.plan.motion_margins import Binding, MotionMargins
 from manipcli.plan.why_not import by_stage
 from manipcli.report.table import table
@@ -14,14 +15,28 @@ from manipcli.task.plan_task import Plan
 
 def render_text(task: str, plan: Plan) -> str:
     """Tables with one row per motion (the step's name only at its first), per margin, and per stage of candidates."""
-    margins = plan.margins()
-    parts = [_motions(plan, margins), _margins(plan, margins)]
+    parts = []
+    for part in plan.stretches if len(plan.branches) > 1 else (plan,):
+        if part.branch:
+            parts.append(f"branch {part.branch}:")
+        if part.steps:
+            margins = part.margins()
+            parts += [_motions(part, margins), _margins(part, margins)]
     parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
-    chosen = [step for step in plan.steps if step.dropped and step.candidate]
+    chosen = [step for step in plan.every if step.dropped and step.candidate]
     parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
-    parts.append(render_refused(by_stage([(step.id, one) for step in plan.steps for one in step.dropped])))
-    total = sum(motion.duration for motion in plan.motions)
-    parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {total:.2f} s")
+    parts.append(render_refused(by_stage([(step.id, one) for step in plan.every for one in step.dropped])))
+    beyond = choices(plan.items).beyond
+    if beyond is not None:
+        parts.append(f"the steps after '{beyond.spec.id}' are planned during the run")
+    ways = plan.combinations
+    if len(ways) > 1:
+        rows = [(way.branch, str(len(way.steps)), f"{way.duration:.2f} s") for way in ways]
+        parts.append(table(("branch", "steps", "duration"), rows, right=("steps", "duration")))
+        shortest, longest = (of(way.duration for way in ways) for of in (min, max))
+        parts.append(f"✓ {task} planned: {len(ways)} branches, {shortest:.2f} to {longest:.2f} s")
+    else:
+        parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {plan.duration:.2f} s")
     return "\n\n".join(part for part in parts if part)
 
 
@@ -38,7 +53,7 @@ def _motions(plan: Plan, found: Sequence[MotionMargins]) -> str:
         bound, dexterity = margins.binding, margins.manipulability
         rows.append(
             (
-                motion.step_id if motion.step_id != previous else "",
+                f"{'+ ' * motion.beside}{motion.step_id}" if motion.step_id != previous else "",
                 motion.verb if motion.step_id != previous else "",
                 motion.label,
                 kind or "-",

@@ -33,13 +33,16 @@ from manipcli.task.task import Task
 
 @dataclass(frozen=True, slots=True)
 class PlannedMotion:
-    """One motion of one step, for tables and files."""
+    """One motion of one step, for tables and files; `branch`: the outcomes before it, `if_1: else`; `beside`: its step
+    is done at the same time as the one before."""
 
     step_id: str
     verb: str
     label: str
     trajectory: JointTrajectory | None
     duration: float
+    branch: str = ""
+    beside: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,7 @@ class Plan:
         judged: places of expectations and watches, for the log.
         branches: the steps of every stretch that is planned before the run, by the outcomes of the choices before it.
         items: the steps and blocks of the task.
+        branch: the outcomes that lead to `steps`, in words; "" for the path with `then` at every choice.
         listed: every step of the task for the log, in the order of the file.
         blocks: the same for blocks.
     """
@@ -63,6 +67,7 @@ class Plan:
     judged: tuple[str, ...] = ()
     branches: Mapping[Outcomes, tuple[PlannedStep, ...]] = field(default_factory=dict)
     items: tuple[Item, ...] = ()
+    branch: str = ""
     listed: tuple[StepOutline, ...] = ()
     blocks: tuple[BlockOutline, ...] = ()
 
@@ -90,12 +95,48 @@ class Plan:
 
     @property
     def motions(self) -> tuple[PlannedMotion, ...]:
-        """All motions in order."""
+        """All motions of `steps` in order."""
         return tuple(
-            PlannedMotion(step.id, step.verb, motion.label, motion.trajectory, motion.duration)
+            PlannedMotion(
+                step.id, step.verb, motion.label, motion.trajectory, motion.duration, self.branch, step.beside
+            )
             for step in self.steps
             for motion in step.plan.motions
         )
+
+    @property
+    def stretches(self) -> tuple[Plan, ...]:
+        """A plan for the steps of each stretch, in the order of their outcomes, `then` first; one without choices."""
+        keys = sorted(self.branches, key=lambda key: [not outcome for outcome in key])
+        return tuple(replace(self, steps=self.branches[key], branch=named(self.items, key)) for key in keys)
+
+    @property
+    def combinations(self) -> tuple[Plan, ...]:
+        """A plan with the steps of each combination of outcomes, as far as it is planned."""
+        inner = {key[:-1] for key in self.branches if key}
+        keys = sorted((key for key in self.branches if key not in inner), key=lambda key: [not one for one in key])
+        return tuple(replace(self.along(key), branch=named(self.items, key)) for key in keys)
+
+    @property
+    def merged(self) -> Plan:
+        """The same plan with steps at the same time as one step, whose first motion also moves the hand."""
+        found: list[PlannedStep] = []
+        for step in self.steps:
+            if not step.beside:
+                found.append(step)
+                continue
+            arm, hand = sorted((found.pop(), step), key=lambda one: all(m.trajectory is None for m in one.plan.motions))
+            (grip, *_), (first, *rest) = hand.plan.motions, arm.plan.motions
+            both = replace(
+                first,
+                grip=grip.grip,
+                duration=max(first.duration, grip.duration),
+                lets_go=grip.lets_go,
+                label=f"{first.label}, {grip.label}",
+            )
+            plan = replace(arm.plan, motions=(both, *rest))
+            found.append(replace(arm, id=f"{arm.id}, {hand.id}", plan=plan, beside=False))
+        return replace(self, steps=tuple(found))
 
     def spans(self) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:
         """Each motion with the states before and after it."""
