@@ -20,7 +20,7 @@ from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
 S = TypeVar("S", bound=Model)
-Part = Literal["arm", "hand", "both"]
+Part = Literal["arm", "hand", "both", "nothing"]
 """What a step moves."""
 
 

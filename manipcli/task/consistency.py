@@ -32,6 +32,7 @@ from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.agree_limits import unusable_limits
+from manipcli.task.block_checks import block_problems, planned_in_the_run
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged
 
@@ -73,7 +74,7 @@ def disagreements(
     if controllers and controllers.source.untouched() and not misclaimed:
         claims = Claims.of(controllers.spec, controllers.place)
     found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
-    warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task))
+    warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task), *planned_in_the_run(task))
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
@@ -90,7 +91,8 @@ def not_there(
     ids = intended_ids(task.source, STEPS.names) if kept else known
     context = CheckContext(robot, scene, ids, in_order=not kept, self_collision=spec.simulation.self_collision)
     of_steps = [*_of_steps(spec, context, claims)]
-    for number, loc, p in (*of_steps, *_of_expectations(spec, context)):
+    of_blocks = () if kept or of_steps else block_problems(spec, context, claims)
+    for number, loc, p in (*of_steps, *of_blocks, *_of_expectations(spec, context)):
         yield task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
     for k in range(0 if kept else len(spec.steps)):
         reported = {p.message for number, loc, p in of_steps if number == ABSENT and loc[1] == k}
