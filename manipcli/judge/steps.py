@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from enum import StrEnum
 from itertools import pairwise
 from typing import get_args
@@ -98,6 +99,10 @@ def _outcome(
     mine = [event for event in events if event.step == step_id]
     attempts = tuple(_attempts(mine, interrupted))
     last = attempts[-1] if attempts else None
+    for event in mine:  # in this branch, or during the run
+        if event.kind == "step_planned":
+            with suppress(ValueError):
+                duration = float(event.text)
     if mine and mine[-1].kind == "step_skipped":
         return StepOutcome(step_id, verb, "skipped", None, None, duration, mine[-1].text, attempts)
     return StepOutcome(

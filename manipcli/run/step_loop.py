@@ -219,6 +219,8 @@ class StepLoop(StepAttempt):
         self._at = planned
         self._live.step_started(planned.id)
         self._monitors.step_started(planned.id)
+        if planned.plan.duration != self._plan.listed[planned.index].planned_duration:
+            self._event("step_planned", planned, "", repr(planned.plan.duration))
 
     def _ended(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
         """The end of an attempt, recorded; with the joints that lack effort, if it failed."""

@@ -15,8 +15,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.motion import Motion
 from manipcli.record.read.reading import read_recording
-from manipcli.run import observer
-from manipcli.run import step_attempt
+from manipcli.run import observer, step_attempt
 from manipcli.run import step_loop as steps_run
 
 ROOT = Path(__file__).parents[2]
