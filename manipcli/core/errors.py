@@ -36,22 +36,24 @@ class Place:
     Line 0 means an argument instead of a file; `file` quotes it (`--set scene.cup.mass=80`).
 
     Attributes:
-        calls: places of the macro calls that produced the value, outermost first; ignored in comparisons.
+        calls: places of the macro calls that produced the value, or of the uses of its file, outermost first.
+        how: how messages name them: `expanded from`, `used at`. Both are ignored in comparisons.
     """
 
     file: str
     line: int
     column: int
     calls: tuple[Place, ...] = field(default=(), compare=False, repr=False)
+    how: str = field(default=EXPANDED, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}" if self.line > 0 else self.file
 
     @property
     def expanded(self) -> str:
-        """`expanded from OUTERMOST, then from INNERMOST`; "" without macro calls."""
-        inner = f", then from {self.calls[-1]}" if len(self.calls) > 1 else ""
-        return f"{EXPANDED} {self.calls[0]}{inner}" if self.calls else ""
+        """`expanded from OUTERMOST, then from INNERMOST`, or `used at ...`; "" without calls."""
+        inner = f", then {self.how.rpartition(' ')[2]} {self.calls[-1]}" if len(self.calls) > 1 else ""
+        return f"{self.how} {self.calls[0]}{inner}" if self.calls else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +68,7 @@ class Diagnostic:
 
     def __post_init__(self) -> None:
         calls = self.place.expanded if self.place is not None else ""
-        if calls and EXPANDED not in (self.hint or ""):
+        if self.place is not None and calls and self.place.how not in (self.hint or ""):
             object.__setattr__(self, "hint", f"{self.hint}; {calls}" if self.hint else calls)
 
     def __str__(self) -> str:

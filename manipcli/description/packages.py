@@ -58,17 +58,17 @@ class RemoteFile(NotFound):
 def own_root(description: Path) -> Path | None:
     """Root of the folder tree of a description: its ROS package, else the folder above `urdf/`, else its own folder.
 
-    None for a shared folder, see `_is_shared`.
+    None for a shared folder, see `is_shared`.
     """
     folder = Path(os.path.realpath(description)).parent
     for ancestor in (folder, *list(folder.parents)[:LEVELS_ABOVE]):
-        if (ancestor / "package.xml").is_file() and not _is_shared(ancestor):
+        if (ancestor / "package.xml").is_file() and not is_shared(ancestor):
             return ancestor
     above = [folder.parent] if folder.name in SUBFOLDERS else []
-    return next((candidate for candidate in (*above, folder) if not _is_shared(candidate)), None)
+    return next((candidate for candidate in (*above, folder) if not is_shared(candidate)), None)
 
 
-def _is_shared(folder: Path) -> bool:
+def is_shared(folder: Path) -> bool:
     """Whether a folder holds unrelated files: the home folder or one above it, `/`, or one like /tmp."""
     home = _home()
     if folder == folder.parent or (home is not None and home.is_relative_to(folder)):
@@ -267,7 +267,7 @@ class Packages:
             if root is not None and path.is_relative_to(root):
                 return _uri(root, path)
         for above in self._own.parents if self._own is not None else ():
-            if _is_shared(above):
+            if is_shared(above):
                 break
             if path.is_relative_to(above):
                 return _uri(above / path.relative_to(above).parts[0], path)

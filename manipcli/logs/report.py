@@ -35,6 +35,7 @@ from manipcli.spec.load import load_task as load_spec
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.task import Task
+from manipcli.task.task_files import finder
 from manipcli.task.vocabulary import task_spec
 
 PICTURE = (640, 480)
@@ -167,7 +168,7 @@ def file_places(path: Path, overrides: Sequence[str]) -> Places:
     Raises:
         InvalidInput: the file is invalid.
     """
-    return task_places(load_spec(path, model=task_spec(), overrides=overrides))
+    return task_places(load_spec(path, model=task_spec(), overrides=overrides, find=finder(path, allow_outside=True)))
 
 
 def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from manipcli.core.errors import Diagnostic, Loc, Place
-from manipcli.core.text import did_you_mean, escape, shorten
+from manipcli.core.text import did_you_mean, escape, nearest, shorten
 from manipcli.core.units import (
     NUMBER,
     NUMBER_PATTERN,
@@ -330,6 +330,9 @@ class Scope:
             if name not in self.nodes:
                 known = [param for param in self.names if param not in self.below[:1]]
                 hint = did_you_mean(name, known, kind="params") if self.names else no_params(name)
+                if self.isolated:
+                    known_here = f"a sub-task knows only its own `params`: declare '{name}' there, give it under `with`"
+                    hint = did_you_mean(name, known, kind="params") if nearest(name, known) else known_here
                 if name == INDEX:
                     hint = f"`${INDEX}` counts the rounds of a `repeat`: it is known only inside its `steps`"
                 raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)

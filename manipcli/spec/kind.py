@@ -28,6 +28,9 @@ def refuse_other_kind(root: Node, name: str, wanted: str) -> None:
         InvalidInput: USE105 the file is of another kind.
     """
     found = _certain_kind(root) if isinstance(root, MappingNode) else None
+    if wanted == "task" and isinstance(root, MappingNode) and _is_sub_task(root):
+        hint = "check a task that uses it: `do: " + name.rpartition("/")[2] + "`"
+        raise _refusal(name, "a sub-task", wanted, hint=hint)
     if found is not None and found != wanted:
         raise _refusal(name, f"a {found} file", wanted)
 
@@ -58,6 +61,15 @@ def _certain_kind(root: MappingNode) -> str | None:
     if entries.keys() <= {"version", "controllers"} and "controllers" in entries.keys() - texts:
         return "controllers"
     return None
+
+
+def _is_sub_task(root: MappingNode) -> bool:
+    """Whether the file has no robot, and declares the types of its params."""
+    params = root.get("params")
+    declares = isinstance(params, MappingNode) and any(
+        isinstance(entry.node, MappingNode) and "type" in entry.node.entries for entry in params.entries.values()
+    )
+    return declares and root.entries.keys().isdisjoint(("task", "robot", "controllers"))
 
 
 def _refusal(name: str, found: str, wanted: str, *, hint: str | None = None) -> InvalidInput:

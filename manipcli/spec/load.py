@@ -6,18 +6,21 @@ import errno
 import os
 import stat
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import any_of, escape, listed, nearest_file
 from manipcli.spec.base import Model
+from manipcli.spec.condition import ID_HINT
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.dropped import faults
 from manipcli.spec.explain import distinct
 from manipcli.spec.expression import substitute
 from manipcli.spec.kind import names_controllers, refuse_description, refuse_other_kind
 from manipcli.spec.located import Area, Located, Source, validate
-from manipcli.spec.override import Override, apply, read_overrides, seed_override
+from manipcli.spec.override import Override, apply, apply_to_steps, of_structure, read_overrides, seed_override
 from manipcli.spec.partial.partial_controllers import salvage_controllers
 from manipcli.spec.partial.partial_robot import salvage_robot
 from manipcli.spec.partial.partial_task import salvage
@@ -26,7 +29,12 @@ from manipcli.spec.ros import rewrite
 from manipcli.spec.ros.substitutions import open_substitutions, substituted
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.source.yaml import MAX_BYTES, parse
+from manipcli.spec.structure.draft import FlatStep
+from manipcli.spec.structure.expand import Expansion
+from manipcli.spec.structure.files import Files, Find, TaskFile, no_files, within
 from manipcli.spec.structure.flatten import flattened
+from manipcli.spec.structure.include import included
+from manipcli.spec.structure.reports import Reports
 from manipcli.spec.task import TaskSpec
 
 FileKind = Literal["task", "robot", "controllers"]
@@ -100,6 +108,7 @@ def load_task(
     model: type[TaskSpec],
     overrides: Sequence[str] = (),
     seed: int | None = None,
+    find: Find | None = None,
 ) -> Located[TaskSpec]:
     """Loads a task file.
 
@@ -108,11 +117,13 @@ def load_task(
         model: the result of `unions.task_model`, with all verbs, conditions and expectations.
         overrides: values of `--set` for all three files; those of the other two are only parsed.
         seed: replaces `simulation.seed`.
+        find: finds the sub-tasks and fragments that it names. Default: in the folder of the task and below.
 
     Raises:
         InvalidInput: every finding of the file and of the overrides.
     """
-    return load_task_text(read_bytes(path), str(path), model=model, overrides=overrides, seed=seed)
+    find = find or within(path.parent)
+    return load_task_text(read_bytes(path), str(path), model=model, overrides=overrides, seed=seed, find=find)
 
 
 def load_task_text(
@@ -122,9 +133,10 @@ def load_task_text(
     model: type[TaskSpec],
     overrides: Sequence[str] = (),
     seed: int | None = None,
+    find: Find = no_files,
 ) -> Located[TaskSpec]:
-    """As `load_task`, from text; places call it `name`."""
-    source, findings = _task_source(text, name, model, overrides, seed)
+    """As `load_task`, from text; places call it `name`. By default, it cannot name sub-tasks and fragments."""
+    source, findings = _task_source(text, name, model, overrides, seed, find)
     return validate(source, model, findings=findings)
 
 
@@ -134,28 +146,48 @@ def salvage_task(
     model: type[TaskSpec],
     overrides: Sequence[str],
     seed: int | None,
+    find: Find | None = None,
 ) -> Located[TaskSpec] | None:
     """The valid part of a task file that `load_task` refused, for further checks; None if too little is left."""
     try:
-        source, _ = _task_source(read_bytes(path), str(path), model, overrides, seed)
+        source, _ = _task_source(read_bytes(path), str(path), model, overrides, seed, find or within(path.parent))
     except InvalidInput:
         return None
     return salvage(source, model)
 
 
 def _task_source(
-    text: str | bytes, name: str, model: type[TaskSpec], overrides: Sequence[str], seed: int | None
+    text: str | bytes, name: str, model: type[TaskSpec], overrides: Sequence[str], seed: int | None, find: Find
 ) -> tuple[Source, list[Diagnostic]]:
     """The tree of a task after overrides and parameters, and their diagnostics."""
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
     written, in_text = _source(text, name, "TASK", "task")
-    source, findings = _changed(written, wanted, model)
+    of_files, others, late = of_structure(wanted)
+    source, findings = _changed(written, of_files, model)
+    reports, task = Reports(), TaskFile(Path(name), name)
+    files = Files(find, _tree, reports)
+    source, more = _changed(replace(source, root=included(source.root, files, task)), others, model)
+    findings += more
     refused = {finding.place for finding in in_text if finding.place is not None}
     root, scope = substitute(source.root, refused=refused)
-    root, structure, of_structure = flattened(root, scope, model.verbs)
+    scene = child(root, "scene")
+    bodies = tuple(scene.entries) if isinstance(scene, MappingNode) else ()
+
+    def change(steps: Sequence[FlatStep]) -> tuple[FlatStep, ...]:
+        changed, wrong = apply_to_steps(steps, late, model)
+        findings.extend(wrong)
+        return changed
+
+    root, structure = flattened(root, scope, Expansion(model.verbs, reports, files, bodies, task), change)
     source = Source(name, root, "TASK", unknown=frozenset(scope.unknown), structure=structure)
-    found = [*in_text, *findings, *scope.findings, *of_structure, *_duplicate_ids(source)]
+    found = [*in_text, *findings, *scope.findings, *reports.findings, *_duplicate_ids(source), *faults(source, model)]
     return source, [*distinct(found)]
+
+
+def _tree(path: Path, name: str) -> tuple[Node | None, list[Diagnostic]]:
+    """The tree of a sub-task or fragment, and the findings on its text."""
+    findings: list[Diagnostic] = []
+    return parse(read_bytes(path), name, reported=findings), findings
 
 
 def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
@@ -172,6 +204,8 @@ def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
             own = child(item, "id")
             if not isinstance(own, ScalarNode) or not isinstance(own.value, str):
                 continue
+            if key == "steps" and "/" in own.value:
+                yield source.finding(208, (key, k, "id"), f"'{escape(own.value)}' is not a valid id", hint=ID_HINT)
             if own.value in first:
                 message = f"duplicate id '{escape(own.value)}': {first[own.value]} has it already"
                 yield source.finding(210, (key, k, "id"), message, hint=f"choose another: {why}")

@@ -3,14 +3,15 @@
 PATH is dotted. Paths that begin with `robot.` or `controllers.` address those files
 (`controllers.arm_controller.gains.joint_1.p`, also for ROS files: overrides apply after these are rewritten);
 all other paths address the task. List items are addressed by index from 0, steps also by id
-(`steps.0.pour.tilt`, `steps.pour_1.pour.tilt`). User-defined keys (bodies, joints, poses, parameters) must exist,
-unless they end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`; `null` restores a default.
+(`steps.0.pour.tilt`, `steps.pour_1.pour.tilt`), steps in blocks by their whole id
+(`steps.stack[2]/pick_1.pick.object`). User-defined keys (bodies, joints, poses, parameters) must exist, unless they
+end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`; `null` restores a default.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import NoneType
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
@@ -20,7 +21,9 @@ from manipcli.spec.located import Area
 from manipcli.spec.source import shape
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, shown
 from manipcli.spec.source.yaml import parse
+from manipcli.spec.structure.draft import FlatStep
 from manipcli.spec.structure.ids import step_ids
+from manipcli.spec.structure.words import LISTS
 
 _FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
 
@@ -97,6 +100,35 @@ def apply(root: Node, overrides: Sequence[Override], model: type[Model], area: A
     return root, findings
 
 
+def of_structure(
+    overrides: Sequence[Override],
+) -> tuple[tuple[Override, ...], tuple[Override, ...], tuple[Override, ...]]:
+    """The overrides of `include:`, which come first; all others; and those of one expanded step: `stack[2]/pick_1`."""
+    files = tuple(o for o in overrides if o.area == "TASK" and o.path[-1] == "include")
+    late = tuple(o for o in overrides if o.area == "TASK" and o.path[0] == "steps" and "/" in "".join(o.path[1:2]))
+    return files, tuple(o for o in overrides if o not in files and o not in late), late
+
+
+def apply_to_steps(
+    steps: Sequence[FlatStep], overrides: Sequence[Override], model: type[Model]
+) -> tuple[tuple[FlatStep, ...], list[Diagnostic]]:
+    """The expanded steps with the overrides of single steps, and the diagnostics of invalid paths."""
+    changed, findings = list(steps), list[Diagnostic]()
+    ids = [step.id for step in steps]
+    for override in overrides:
+        own, *rest = override.path[1:]
+        try:
+            if own not in ids:
+                message = f"there is no step '{escape(own)}'"
+                raise _nowhere(override, message, did_you_mean(own, ids, kind="steps"))
+            k = ids.index(own)
+            item = _set(changed[k].item, override, ("steps", k), tuple(rest), model)
+            changed[k] = replace(changed[k], item=item)
+        except InvalidInput as error:
+            findings.extend(error.findings)
+    return tuple(changed), findings
+
+
 def _moved(node: Node, place: Place) -> Node:
     if isinstance(node, MappingNode):
         return MappingNode({key: Entry(place, _moved(entry.node, place)) for key, entry in node.entries.items()}, place)
@@ -157,7 +189,7 @@ def _may_be_added(node: MappingNode, override: Override, done: Loc, part: str, m
 
 
 def _index(node: SequenceNode, override: Override, done: Loc, part: str) -> int:
-    ids = step_ids(node) if done == ("steps",) else ()
+    ids = step_ids(node) if done[0] == "steps" and done[-1] in ("steps", *LISTS) else ()
     if part in ids:
         return ids.index(part)
     if part.isascii() and part.isdecimal() and len(part) < 7 and int(part) < len(node.items):

@@ -22,24 +22,26 @@ _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 _WIDTH = 100
 
 
-def resolved(
-    spec: BaseModel, expressions: Mapping[Loc, str] | None = None, params: Mapping[int, Plain] | None = None
-) -> str:
+def resolved(spec: BaseModel, expressions: Mapping[Loc, Plain] | None = None) -> str:
     """The YAML text, with keys in the order of the model and of the file.
 
     Args:
         spec: the spec to write.
-        expressions: expressions with `$name` to write instead of their values, by path.
-        params: values of parameters to write at blocks of a task, by index.
+        expressions: expressions with `$name` to write instead of their values, by path; and the parameters of blocks of
+            a task, see `retry.expressions`.
     """
     data = _data(spec, escape=isinstance(spec, TaskSpec))
+    params: dict[int, Plain] = {}
     for path, text in (expressions or {}).items():
-        data = _with(data, path, text)
+        if path[0] == "blocks" and isinstance(path[1], int):
+            params[path[1]] = text
+        else:
+            data = _with(data, path, text)
     assert isinstance(data, dict)
     if isinstance(spec, TaskSpec):
         steps, blocks = data["steps"], data.pop("blocks", [])
         if spec.blocks and isinstance(steps, list) and isinstance(blocks, list):
-            data["steps"] = Nesting(steps, spec.blocks, blocks, params or {}).items()
+            data["steps"] = Nesting(steps, spec.blocks, blocks, params).items()
     return yaml_text(data)
 
 
@@ -84,7 +86,7 @@ def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
     raise TypeError(f"a spec cannot hold {type(value).__name__}")
 
 
-def _with(data: Plain, path: Loc, text: str) -> Plain:
+def _with(data: Plain, path: Loc, text: Plain) -> Plain:
     """The data with `text` instead of the value at `path`, or of the block it abbreviates."""
     if not path:
         return text

@@ -8,7 +8,18 @@ from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
 from manipcli.spec.located import Located, validate
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, mapped, node_at
+from manipcli.spec.source.tree import (
+    Entry,
+    MappingNode,
+    Node,
+    Plain,
+    ScalarNode,
+    SequenceNode,
+    child,
+    mapped,
+    node_at,
+    plain,
+)
 from manipcli.spec.step import StepSpec
 from manipcli.spec.structure.structure import Structure
 from manipcli.spec.task import TaskSpec
@@ -75,10 +86,14 @@ def _in_structure(file: Located[TaskSpec], index: int, changed: MappingNode) -> 
     return validate(tree, type(file.spec), findings=[*unknown, *scope.findings]).spec.steps[0]
 
 
-def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:
-    """The expressions, by path, of steps with other parameters in a retry, and of `params:`."""
+def expressions(file: Located[TaskSpec]) -> dict[Loc, Plain]:
+    """What `resolved` writes of a task for `retried`, by path.
+
+    The expressions of steps with other parameters in a retry, and of `params:`; at `("blocks", j, "params")` the
+    parameters of the round or sub-task around such a step.
+    """
     steps = [k for k, step in enumerate(file.spec.steps) if step.retry is not None and step.retry.with_]
-    found: dict[Loc, str] = {}
+    found: dict[Loc, Plain] = {}
 
     def note(node: ScalarNode, path: Loc) -> Node:
         if node.written is not None and path[2:3] != ("on_fail",):
@@ -91,6 +106,9 @@ def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:
         mapped(params, note, ("params",))
     for k in steps:
         mapped(node_at(root, ("steps", k)), note, ("steps", k))
+    for j, block in enumerate(file.source.structure.blocks):
+        if block.given and any(block.first <= k < block.last for k in steps):
+            found["blocks", j, "params"] = {name: plain(mapped(node, _escaped)) for name, node in block.given.items()}
     return found
 
 

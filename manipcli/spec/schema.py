@@ -9,17 +9,20 @@ from pydantic import BaseModel
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Plain
+from manipcli.spec.structure.json_schema import add_structure
 from manipcli.spec.task import TaskSpec
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _REFERENCE = r"\$[A-Za-z_]"
+_LIST = r"^\s*\$[A-Za-z_]\w*\s*$"
 
 
 def task_schema(model: type[TaskSpec]) -> str:
     """Schema of a task file (`unions.task_model`): verbs are `oneOf`; any number may be an expression with `$name`."""
     schema = _schema(model, "manipcli task")
     _allow_expressions(schema)
+    add_structure(schema)
     return _dump(schema)
 
 
@@ -70,6 +73,8 @@ def _allow_expressions(node: Plain) -> None:
     kind = node.get("type")
     if kind in ("number", "integer", "boolean"):
         node["type"], node["pattern"] = [kind, "string"], _REFERENCE
+    if kind == "array":
+        node["type"], node["pattern"] = [kind, "string"], _LIST
     if isinstance(node.get("enum"), list) and kind == "string":
         node["anyOf"] = [{"enum": node.pop("enum")}, {"pattern": _REFERENCE}]
     for key, value in node.items():

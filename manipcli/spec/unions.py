@@ -34,6 +34,7 @@ from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.spec.step import StepSpec
+from manipcli.spec.structure.words import WORDS
 from manipcli.spec.task import TaskSpec
 
 
@@ -283,7 +284,8 @@ def _check(
             message = f"{what} has exactly one {its}, not both '{found[0]}' and '{found[1]}'"
             raise problem("verb", message, at=(found[1],), key=True, hint=f"write a list item for each {kind}")
         if not found and others:
-            near = did_you_mean(others[0], (*names, *common), kind=kinds, most=3)
+            more = WORDS if kind == "verb" else ()
+            near = did_you_mean(others[0], (*names, *more, *common), kind=kinds, most=3)
             if others[0] in below:
                 near = " or ".join(f"`{name}: {{{others[0]}: ...}}`" for name in reversed(names))
                 near = f"write {near}"

@@ -1,15 +1,14 @@
-"""Checks of blocks against robot and scene: conditions, what may be done in parallel, and how much is planned."""
+"""Checks of blocks: what may be done in parallel, and which choices are planned before the run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.conditions.condition import CheckContext, Problem
-from manipcli.conditions.formula import problems
-from manipcli.conditions.members import CONDITIONS
+from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import number_of
+from manipcli.model.robot import RobotModel
 from manipcli.plan.block_tree import MOST, block_tree, blocks_of, choices
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.steps import STEPS
@@ -17,7 +16,6 @@ from manipcli.spec.block import BlockSpec
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
-ABSENT: Final = 230
 IN_THE_RUN: Final = 280
 UNLIKE_PARTS: Final = 281
 RETRIED_PART: Final = 282
@@ -30,22 +28,19 @@ MOVES: Final = {
 }
 
 
-def block_problems(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
-    """Number of the code, location and problem of each fault of the blocks."""
-    for k, block in enumerate(spec.blocks):
-        for key, condition in (("condition", block.condition), ("until", block.until)):
-            if condition is not None:
-                yield from ((ABSENT, ("blocks", k, key), p) for p in problems(condition, context, CONDITIONS))
+def parallel_problems(spec: TaskSpec, robot: RobotModel, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
+    """Number of the code, location and problem of each part that cannot be done in parallel with the other."""
+    for block in spec.blocks:
         if block.kind == "parallel" and claims is not None:
-            yield from _parallel(spec, block, context, claims)
+            yield from _parallel(spec, block, robot, claims)
 
 
 def _parallel(
-    spec: TaskSpec, block: BlockSpec, context: CheckContext, claims: Claims
+    spec: TaskSpec, block: BlockSpec, robot: RobotModel, claims: Claims
 ) -> Iterator[tuple[int, Loc, Problem]]:
     """A part that cannot be done beside the other, or is retried alone."""
     indices = range(block.first, block.last)
-    parts = {k: STEPS[spec.steps[k].verb].part(spec.steps[k].body, context.robot, claims.hand) for k in indices}
+    parts = {k: STEPS[spec.steps[k].verb].part(spec.steps[k].body, robot, claims.hand) for k in indices}
     hint = "one part is a `move` of the arm or a `follow`; the other is a `release`, a `grasp` without an object, or a "
     hint += "`move` to a pose of the hand's joints"
     wrong = [k for k in indices if parts[k] in ("both", "nothing")]

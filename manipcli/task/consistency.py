@@ -26,13 +26,15 @@ from manipcli.scene.scene_names import RESERVED
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.dropped import but_computed, dropped_steps
+from manipcli.spec.explain import distinct
 from manipcli.spec.located import Located
 from manipcli.spec.partial.partial_task import intended_ids
 from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.agree_limits import unusable_limits
-from manipcli.task.block_checks import block_problems, planned_in_the_run
+from manipcli.task.block_checks import parallel_problems, planned_in_the_run
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged
 
@@ -78,7 +80,7 @@ def disagreements(
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
-    return (*found, *_refused(task, robot, scene), *claimed, *misread, *warned)
+    return distinct((*found, *_refused(task, robot, scene), *claimed, *misread, *warned))
 
 
 def not_there(
@@ -89,13 +91,22 @@ def not_there(
     spec, kept = task.spec, task.source.kept
     known = tuple(step.id for step in spec.steps if step.id is not None)
     ids = intended_ids(task.source, STEPS.names) if kept else known
-    context = CheckContext(robot, scene, ids, in_order=not kept, self_collision=spec.simulation.self_collision)
+    complete = task.source.structure.complete
+    context = CheckContext(
+        robot,
+        scene,
+        ids if complete else None,
+        in_order=not kept and complete,
+        self_collision=spec.simulation.self_collision,
+    )
     of_steps = [*_of_steps(spec, context, claims)]
-    of_blocks = () if kept or of_steps else block_problems(spec, context, claims)
-    for number, loc, p in (*of_steps, *of_blocks, *_of_expectations(spec, context)):
+    of_steps += _of_blocks(spec, context)
+    parallel = () if kept or of_steps else parallel_problems(spec, robot, claims)
+    for number, loc, p in (*of_steps, *parallel, *_of_expectations(spec, context)):
         yield task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
+    yield from _in_dropped(task, context)
     for k in range(0 if kept else len(spec.steps)):
-        reported = {p.message for number, loc, p in of_steps if number == ABSENT and loc[1] == k}
+        reported = {p.message for number, loc, p in of_steps if number == ABSENT and loc[:2] == ("steps", k)}
         yield from _in_retry(task, k, context, reported)
     for loc, p in _of_pairs(spec, context):
         yield task.source.finding(ABSENT, (*loc, *p.loc), p.message, hint=p.hint)
@@ -138,6 +149,27 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
                 )
         if member.guarded(step.body):
             yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
+
+
+def _of_blocks(spec: TaskSpec, context: CheckContext) -> Iterator[tuple[int, Loc, Problem]]:
+    """Problems of the conditions of blocks."""
+    for k, block in enumerate(spec.blocks):
+        for key, condition in (("condition", block.condition), ("until", block.until)):
+            if condition is not None:
+                yield from (
+                    (ABSENT, ("blocks", k, key), p) for p in until_problems(condition, None, context, CONDITIONS)
+                )
+
+
+def _in_dropped(task: Located[TaskSpec], context: CheckContext) -> Iterator[Diagnostic]:
+    """Errors for missing names in steps of branches that are never taken, but in values of parameters."""
+    dropped = dropped_steps(task)
+    if dropped is not None:
+        found = (
+            dropped.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
+            for number, loc, p in _of_steps(dropped.spec, replace(context, in_order=False), None)
+        )
+        yield from but_computed(found, dropped.source.root)
 
 
 def _of_pairs(spec: TaskSpec, context: CheckContext) -> Iterator[tuple[Loc, Problem]]:

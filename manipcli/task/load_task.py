@@ -19,6 +19,7 @@ from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample
 from manipcli.task.second_chances import every_finding
 from manipcli.task.task import Task
+from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
 from manipcli.task.vocabulary import controllers_spec, task_spec
 
@@ -125,7 +126,8 @@ def _as_written(
     Raises:
         InvalidInput: the errors of the first stage that has any.
     """
-    file = load_task_file(path, model=task_spec(), overrides=overrides, seed=seed)
+    find = finder(path, package_path=package_path, allow_outside=allow_outside)
+    file = load_task_file(path, model=task_spec(), overrides=overrides, seed=seed, find=find)
     robot_path, controllers_path = named_file(file, path, "robot"), named_file(file, path, "controllers")
     robot_file = load_robot(robot_path, overrides=overrides)
     robot, notes = build_robot(

@@ -27,6 +27,7 @@ from manipcli.task.changed_files import Files, out_of_range
 from manipcli.task.consistency import disagreements, not_there
 from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
+from manipcli.task.task_files import finder
 from manipcli.task.vary import bind
 from manipcli.task.vocabulary import controllers_spec, task_spec
 
@@ -51,8 +52,9 @@ def every_finding(
     """
     errors = _Errors()
     model = task_spec()
-    task = errors.of(lambda: load.load_task(path, model=model, overrides=overrides, seed=seed))
-    partial = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed)
+    find = finder(path, package_path=package_path, allow_outside=allow_outside)
+    task = errors.of(lambda: load.load_task(path, model=model, overrides=overrides, seed=seed, find=find))
+    partial = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed, find=find)
     if partial is None:
         return errors.refusal(first)
     errors.unknown = partial.source.unknown

@@ -82,6 +82,19 @@ def merged(a: MappingNode, b: MappingNode) -> MappingNode:
     return MappingNode(entries, a.place)
 
 
+def counted(node: Node, most: int) -> int:
+    """Number of values in a tree; counting stops beyond `most`."""
+    waiting, count = [node], 0
+    while waiting and count <= most:
+        last = waiting.pop()
+        count += 1
+        if isinstance(last, MappingNode):
+            waiting += [entry.node for entry in last.entries.values()]
+        elif isinstance(last, SequenceNode):
+            waiting += last.items
+    return count
+
+
 Clash = tuple[tuple[str, ...], Place, Place]
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from manipcli.core.errors import Loc
 from manipcli.spec.block import BlockKind
@@ -27,7 +28,8 @@ class FlatStep:
 
 @dataclass(slots=True)
 class BlockDraft:
-    """A block whose end is not known yet; see `BlockSpec`. `item` holds its `until`, `timeout` and `on_fail`."""
+    """A block whose end is not known yet; see `BlockSpec`. `item` holds its `until`, `timeout` and `on_fail`; `given`:
+    the parameters that it adds as a round or a sub-task."""
 
     id: str
     kind: BlockKind
@@ -41,6 +43,7 @@ class BlockDraft:
     split: int = -1
     condition: Node | None = None
     is_round: bool = False
+    given: Mapping[str, Node] = field(default_factory=dict)
 
     def node(self) -> Node:
         """The block for `BlockSpec`; a round has none of the keys of its `repeat`."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from manipcli.core.errors import Loc
 from manipcli.spec.expression import Scope
+from manipcli.spec.source.tree import SequenceNode
 from manipcli.spec.structure.draft import BlockDraft, FlatStep
 
 
@@ -16,11 +17,16 @@ class Structure:
     Attributes:
         steps, blocks: in the order of the tree; () for a task without structure.
         scope: the parameters of the task; None for other files.
+        dropped, left: the steps of branches that are never taken, and their computed nodes.
+        complete: whether no item was left out because of an error.
     """
 
     steps: tuple[FlatStep, ...] = ()
     blocks: tuple[BlockDraft, ...] = ()
     scope: Scope | None = None
+    dropped: tuple[FlatStep, ...] = ()
+    left: SequenceNode | None = None
+    complete: bool = True
 
     def written(self, path: Loc) -> Loc:
         """A path in the flat tree as it is in the file: `steps[0].repeat.steps[1].pick.object`."""

@@ -86,7 +86,7 @@ def misplaced(item: MappingNode, verbs: Collection[str]) -> Misplaced | None:
         if key == word or key in wanted:
             continue
         if key in WORDS or key in verbs:
-            hint = f"write a list item for each, or put the step into the list of `{word}`"
+            hint = f"write a list item for each, or put the step in the list of `{word}`"
             return Misplaced(260, key, f"an item has one verb or word, not both '{word}' and '{key}'", hint)
         if _OWNER.get(key) == word:
             return Misplaced(261, key, f"`{key}` belongs inside `{word}`", f"indent `{key}` below `{word}:`")
