@@ -79,7 +79,7 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
     """The object of `run` and `judge`, with all its keys in a fixed order."""
     empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
-    found |= {"self_contacts": [], "holding": [], "steps": [], "expectations": [], "candidates": []}
+    found |= {"self_contacts": [], "holding": [], "steps": [], "blocks": [], "expectations": [], "candidates": []}
     if judged is not None:
         found |= picked(judged, "task verdict text seed engine simulated_time")
         found["saturated"] = saturated_object(judged.saturations)
@@ -90,8 +90,7 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
             picked(expectation, "name outcome margin unit at text") for expectation in judged.expectations
         ]
         found["candidates"] = plain(judged.candidates)
-        if judged.blocks:
-            found["blocks"] = [block_object(judged, block) for block in judged.blocks]
+        found["blocks"] = [block_object(judged, block) for block in judged.blocks]
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
     return {**found, **known, "errors": plain(errors)}

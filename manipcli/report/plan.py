@@ -20,16 +20,13 @@ from manipcli.task.plan_task import Plan, PlannedMotion
 def render_json(task: str, plan: Plan) -> str:
     """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m."""
     beyond = choices(plan.items).beyond
-    branches: dict[str, Json] = {
-        "branches": [{"branch": part.branch, **_path(part)} for part in plan.stretches],
-        "planned_in_run": None if beyond is None else beyond.spec.id,
-    }
     return dumps(
         {
             "task": task,
             "verdict": "passed",
             **_path(plan),
-            **(branches if len(plan.branches) > 1 or beyond is not None else {}),
+            "branches": [{"branch": part.branch, **_path(part)} for part in plan.stretches if part.branch],
+            "planned_in_run": None if beyond is None else beyond.spec.id,
             "grasps": [
                 {
                     "step": step,
