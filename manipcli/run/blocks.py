@@ -127,6 +127,7 @@ class BlockLoop:
     def _again(self, group: Group, outcomes: Outcomes, before: dict[int, PlannedStep]) -> bool:
         """Prepare another attempt at a block: plan its steps from the measured state; whether they have a plan."""
         inside = steps_of((group,))
+        self._loop.begin_again(inside)
         self._last = {k: outcome for k, outcome in self._last.items() if k not in inside}
         self._outcomes, self._planned = outcomes, {k: step for k, step in before.items() if k not in inside}
         units = [unit for unit in stretch(self._plan.items, outcomes).units if unit[0] in inside]

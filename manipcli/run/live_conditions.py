@@ -133,13 +133,19 @@ class Live:
         self._contacts.append(Touching(self._time(tick), tuple(contacts)))
 
     def step_started(self, step: str) -> None:
-        """The next tick is the first of a step."""
-        if self._steps[step].started is None:
-            self._steps[step] = StepTime(step, self._time(self._next), None, "")
+        """The next tick is the first of a step, or of another attempt at it with the steps around it."""
+        before = self._steps[step]
+        if before.started is None or before.ended is not None:
+            began = self._time(self._next) if before.started is None else before.started
+            self._steps[step] = StepTime(step, began, None, "")
 
     def step_ended(self, step: str, outcome: str) -> None:
         """The last tick was the last of a step."""
         self._steps[step] = StepTime(step, self._steps[step].started, self._time(self._next), outcome)
+
+    def step_reset(self, step: str, *, skipped: bool) -> None:
+        """A step is to be done again, or its branch is not taken although it was done in an earlier attempt."""
+        self._steps[step] = StepTime(step, None if skipped else self._steps[step].started, None, "")
 
     def absent(self, spec: ConditionSpec) -> str | None:
         """Why a condition cannot be evaluated in this run, or None."""

@@ -74,7 +74,7 @@ class StepAttempt:
         self._executor = Executor(session, touch=self._physics, on_goal=on_goal, alarm=self._look)
         replan = task.spec.replan
         self._replans = replan is not False
-        self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
+        self._guards = any(motion.guarded for step in plan.every for motion in step.plan.motions)
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
         self._grasp_margin = GraspMargin(task.true.robot, task.true.scene)

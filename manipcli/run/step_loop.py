@@ -117,6 +117,7 @@ class StepLoop(StepAttempt):
             self._executor.hold(ASKED)
             return probe.holds, probe.found
         except Alarmed as alarm:
+            self._executor.stop()
             return MotionEnd("failed", f"stopped: {alarm}")
         finally:
             self._live.close(probe)
@@ -131,6 +132,7 @@ class StepLoop(StepAttempt):
             end = self._executor.wait(lambda _: probe.holds, deadline=deadline)
             return end if end.outcome == "done" else replace(end, text=end.text + missing(end, probe))
         except Alarmed as alarm:
+            self._executor.stop()
             return MotionEnd("failed", f"stopped: {alarm}")
         finally:
             self._live.close(probe)
@@ -156,6 +158,11 @@ class StepLoop(StepAttempt):
         self.failed = True
         self._executor.stop()
 
+    def begin_again(self, indices: Sequence[int]) -> None:
+        """These steps are not done yet in the next attempt at their block."""
+        for index in indices:
+            self._live.step_reset(str(self._task.spec.steps[index].id), skipped=False)
+
     def let_go(self) -> None:
         """The hand is not known to hold anything: a group that began with an empty hand is done again."""
         self._believed = replace(self._believed, carried=None)
@@ -177,6 +184,7 @@ class StepLoop(StepAttempt):
 
     def skipped(self, index: int, reason: str) -> StepOutcome:
         """A step of the branch that is not taken."""
+        self._live.step_reset(str(self._task.spec.steps[index].id), skipped=True)
         return self._unreached(index, "step_skipped", "skipped", reason)
 
     def tolerated(self, index: int, reason: str) -> None:

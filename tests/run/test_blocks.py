@@ -239,3 +239,86 @@ def test_all_reports_show_the_blocks(run: Run, tmp_path: Path) -> None:
     assert cases["if_1/else/move_1"].find("skipped") is not None
     assert "took then" in (cases["if_1"].findtext("system-out") or "")
     assert suite.get("failures") == "0"
+
+
+def test_a_watch_during_a_step_also_watches_its_second_attempt(run: Run) -> None:
+    """In the first attempt the step stops at 0.44 rad, in the second it passes 0.6 rad."""
+    text = "  - sequence:\n      - wait: 0.1 s\n      - move: {to: {pitch: 0.9}}\n        id: far\n"
+    text += "        timeout: 0.2 s\n"
+    watch = "watch:\n  - always: {at_pose: {pose: up, within: 0.7}}\n    during: sequence_1/far\n"
+    verdict = run(text + "    on_fail: {retry: 2}\n" + watch)
+    assert verdict.verdict == "failed"
+    assert [one.outcome for one in verdict.steps[1].attempts] == ["timeout", "failed"]
+    assert "stopped: 'watch_at_pose' is broken at " in verdict.text
+    assert verdict.expectations[0].outcome == "failed"
+
+
+def test_a_watch_that_breaks_while_a_choice_is_asked_ends_the_run(run: Run) -> None:
+    watch = "watch:\n  - always: {duration: {below: 0.3 s}}\n"
+    verdict = run(IF % 0.2 + watch)
+    assert verdict.verdict == "failed"
+    assert "stopped: 'watch_duration' is broken at t = 0.3" in verdict.text
+    assert list(outcomes(verdict).values()) == ["done", "not_run", "not_run", "not_run"]
+
+
+BLOCKS = f"""\
+task: cubes
+robot: {ROOT}/robots/panda/robot.yaml
+controllers: {ROOT}/controllers/panda.yaml
+params: {{at: -0.1}}
+scene:
+  table: {{box: {{size: [0.6, 0.8, 0.2]}}, pose: {{xyz: [0.55, 0, 0.1]}}, fixed: true}}
+  cube: {{box: {{size: [4 cm, 4 cm, 4 cm]}}, mass: 80 g, rests_on: table, at: [0.5, $at]}}
+"""
+TAKE = ["pick: {object: cube, approach: {from: top}}", "lift: {object: cube}"]
+HERE = [*TAKE, "place: {object: cube, at: [0.6, 0.2], onto: table}"]
+THERE = [*TAKE, "place: {object: cube, at: [0.45, 0.1], onto: table}"]
+AFTER = ["move: {to: home}", "move: {to: {panda_joint1: 0.3}}"]
+
+
+def listed(steps: list[str], indent: int) -> str:
+    return "".join(f"{' ' * indent}- {step}\n" for step in steps)
+
+
+CHOICE = (
+    f"  - if: {{near: {{object: cube, to: [0.5, -0.1, 0.22], within: 5 cm}}}}\n    then:\n{listed(HERE, 6)}"
+    f"    else:\n{listed(THERE, 6)}{listed(AFTER, 2)}"
+)
+
+
+def test_each_path_is_planned_as_the_flat_task(tmp_path: Path) -> None:
+    """Byte-equal motions: `then` and the steps behind it, and `else` and those; also in a sequence and a repeat."""
+
+    def planned(text: str) -> pipeline.Plan:
+        (tmp_path / "task.yaml").write_text(BLOCKS + "steps:\n" + text)
+        return pipeline.plan_task(pipeline.load_task(tmp_path / "task.yaml"))
+
+    def motions(plan: pipeline.Plan) -> list[bytes]:
+        return [motion.trajectory.positions.tobytes() for motion in plan.motions if motion.trajectory is not None]
+
+    branches = planned(CHOICE)
+    for outcome, steps in ((True, HERE), (False, THERE)):
+        flat = motions(planned(listed([*steps, *AFTER], 2)))
+        assert motions(branches.along((outcome,))) == flat
+    grouped = f"  - sequence:\n{listed(HERE, 6)}  - repeat:\n      times: 1\n      steps:\n{listed(AFTER, 8)}"
+    assert motions(planned(grouped)) == motions(branches)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("at", "where", "taken"), [(-0.1, [0.6, 0.2], "then"), (0.0, [0.45, 0.1], "else")])
+def test_both_branches_are_done_in_physics(run: Run, tmp_path: Path, at: float, where: list[float], taken: str) -> None:
+    expect = f"expect:\n  - near: {{object: cube, to: [{where[0]}, {where[1]}, 0.22], within: 5 mm}}\n"
+    verdict = run(CHOICE + expect, BLOCKS.replace("at: -0.1", f"at: {at}"))
+    assert verdict.verdict == "passed", verdict.text
+    assert by_id(verdict)["if_1"].taken == taken
+
+
+@pytest.mark.slow
+def test_an_object_in_the_closed_hand_is_picked_again_in_the_next_attempt(run: Run) -> None:
+    """The lift never has the time that it needs; the second attempt begins with the cube in the hand, in the air."""
+    steps = listed(["release: {}", *TAKE], 6)
+    group = f"  - sequence:\n{steps}        timeout: 0.45 s\n    on_fail: {{retry: 1}}\n"
+    verdict = run(group, BLOCKS)
+    assert [one.outcome for one in verdict.steps[1].attempts] == ["done", "done"]
+    assert [one.outcome for one in verdict.steps[2].attempts] == ["timeout", "timeout"]
+    assert verdict.steps[1].replanned  # from where the cube has fallen
