@@ -134,15 +134,22 @@ class BlockLoop:
         if not units:
             return True  # it begins with a choice
         first = before.get(units[0][0])
-        if first is not None and first.start.carried is None:
-            self._loop.let_go()
         try:
-            found = self._loop.planned(units)
+            found = self._planned_again(units, empty=first is not None and first.start.carried is None)
         except NotPlannable as refusal:
             self._loop.block_event("block_ended", group.index, "failed", f"no plan for another attempt: {refusal}")
             return False
         self._planned |= {step.index: step for step in found}
         return True
+
+    def _planned_again(self, units: Sequence[Unit], *, empty: bool) -> tuple[PlannedStep, ...]:
+        """Plans from the measured state; if that has no plan and the hand was `empty` before, as if it were again."""
+        try:
+            return self._loop.planned(units)
+        except NotPlannable:
+            if not (empty and self._loop.let_go()):
+                raise
+            return self._loop.planned(units)
 
     def _tolerate(self, group: Group) -> None:
         """Go on behind a block that failed: its failed steps, and those that were not reached, do not count."""

@@ -163,9 +163,11 @@ class StepLoop(StepAttempt):
         for index in indices:
             self._live.step_reset(str(self._task.spec.steps[index].id), skipped=False)
 
-    def let_go(self) -> None:
-        """The hand is not known to hold anything: a group that began with an empty hand is done again."""
+    def let_go(self) -> bool:
+        """Plan from now on as if the hand held nothing; whether it held something."""
+        held = self._believed.carried is not None
         self._believed = replace(self._believed, carried=None)
+        return held
 
     @property
     def time(self) -> float:
