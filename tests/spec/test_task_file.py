@@ -835,7 +835,7 @@ def test_the_schema_offers_each_verb_once_and_takes_expressions() -> None:
     text = task_schema(MODEL)
     assert text == task_schema(MODEL)
     schema = json.loads(text)
-    steps = schema["properties"]["steps"]["items"]["oneOf"]
+    steps = schema["$defs"]["Step"]["oneOf"]
     assert [option["$ref"] for option in steps] == ["#/$defs/MoveStep", "#/$defs/PourStep", "#/$defs/WaitStep"]
     pour = schema["$defs"]["PourStep"]
     assert pour["required"] == ["pour"]

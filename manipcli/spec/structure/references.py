@@ -7,18 +7,30 @@ from manipcli.spec.structure.structure import Structure
 
 
 def in_steps(root: MappingNode, structure: Structure) -> MappingNode:
-    """The tree with the blocks under `during` of expectations and watches replaced by their steps."""
+    """The tree with steps instead of the blocks that expectations and watches name.
+
+    Under `during` these are all steps of the block; under `at` its last one, unless that is in a branch.
+    """
     ids = [step.id for step in structure.steps]
     inside = {block.id: ids[block.first : block.last] for block in structure.blocks}
+    branching = [block for block in structure.blocks if block.kind == "if"]
+    ends = {
+        block.id: ids[block.last - 1]
+        for block in structure.blocks
+        if not any(block.first <= one.first and one.last == block.last for one in branching)
+    }
     for key in ("expect", "watch"):
         items = root.get(key)
         if isinstance(items, SequenceNode):
-            changed = tuple(_item(item, inside) for item in items.items)
+            changed = tuple(_item(item, inside, ends) for item in items.items)
             root = root.with_node(key, SequenceNode(changed, items.place))
     return root
 
 
-def _item(item: Node, inside: dict[str, list[str]]) -> Node:
+def _item(item: Node, inside: dict[str, list[str]], ends: dict[str, str]) -> Node:
+    at = item.get("at") if isinstance(item, MappingNode) else None
+    if isinstance(item, MappingNode) and isinstance(at, ScalarNode) and at.value in ends:
+        item = item.with_node("at", ScalarNode(ends[str(at.value)], at.place))
     during = item.get("during") if isinstance(item, MappingNode) else None
     if not isinstance(item, MappingNode) or during is None:
         return item
