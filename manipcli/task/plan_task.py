@@ -135,7 +135,7 @@ class Plan:
                 label=f"{first.label}, {grip.label}",
             )
             plan = replace(arm.plan, motions=(both, *rest))
-            found.append(replace(arm, id=f"{arm.id}, {hand.id}", plan=plan, beside=False))
+            found.append(replace(arm, id=f"{arm.id}+{hand.id}", plan=plan, beside=False))
         return replace(self, steps=tuple(found))
 
     def spans(self) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:

@@ -204,7 +204,7 @@ def test_two_steps_at_once_take_the_longer_of_their_times(run: Run, tmp_path: Pa
     assert a.ended != b.ended
     plan = pipeline.plan_task(pipeline.load_task(tmp_path / "small.yaml"))
     assert plan.duration == pytest.approx(longer + plan.steps[2].plan.duration)
-    assert set(plan.merged.steps[0].id.split(", ")) == {a.id, b.id}
+    assert set(plan.merged.steps[0].id.split("+")) == {a.id, b.id}
 
 
 def test_what_cannot_be_done_in_parallel_is_refused_at_its_place(tmp_path: Path) -> None:
