@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from manipcli.conditions.condition import Problem
@@ -26,6 +26,30 @@ MOVES: Final = {
     "both": "needs the arm and the hand",
     "nothing": "moves neither",
 }
+
+
+class BranchClaims:
+    """The claims of controllers along the branches: `else` begins with those at its `if`, as `then` does.
+
+    Behind an `if` they are those after `then`, the path that `Plan.steps` takes.
+    """
+
+    def __init__(self, blocks: Sequence[BlockSpec]) -> None:
+        self._choices = [block for block in blocks if block.kind == "if"]
+        self._at: dict[str, Claims | None] = {}
+        self._after_then: dict[str, Claims | None] = {}
+
+    def before(self, k: int, claims: Claims | None) -> Claims | None:
+        """The claims before step `k`; to be called for each step in turn, with those after the step before."""
+        for block in reversed(self._choices):  # inner ones end first
+            if block.id in self._at and block.split == k != block.last:
+                self._after_then[block.id], claims = claims, self._at[block.id]
+            if block.last == k and block.id in self._after_then:
+                claims = self._after_then[block.id]
+        for block in self._choices:
+            if block.first == k:
+                self._at[block.id] = claims
+        return claims
 
 
 def parallel_problems(spec: TaskSpec, robot: RobotModel, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:

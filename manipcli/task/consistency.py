@@ -34,7 +34,7 @@ from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.agree_limits import unusable_limits
-from manipcli.task.block_checks import parallel_problems, planned_in_the_run
+from manipcli.task.block_checks import BranchClaims, parallel_problems, planned_in_the_run
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged
 
@@ -121,9 +121,11 @@ def not_there(
 
 
 def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
-    """Problems of each step and its `until`; a switch of controllers changes the claims of later steps."""
+    """Problems of each step and its `until`; a switch of controllers changes the claims of later steps on its path."""
     robot = context.robot
+    branches = BranchClaims(spec.blocks)
     for k, step in enumerate(spec.steps):
+        claims = branches.before(k, claims)
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, context.scene)
         if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):
