@@ -204,7 +204,7 @@ class Expansion:
                     draft,
                     j,
                 ):
-                    draft.given = {name: scope.nodes[name] for name in scope.local - context.scope.local}
+                    draft.given = {name: scope.nodes[name] for name in sorted(scope.local - context.scope.local)}
                     self.list_of_steps(
                         steps, inner_at, context.inside(j, f"{own}[{k}]/", scope=scope), empty=inner_at[-3] == "rounds"
                     )
@@ -287,7 +287,7 @@ class Expansion:
             scope = arguments(item, found[1], at, context.scope, self.reports, self.bodies)
             steps = Inclusion(self.files, self.task).steps(steps, ("steps",), found[0])
         with self.block(own, "sequence", "do", at, item, context) as (draft, index):
-            draft.given = {name: scope.nodes[name] for name in scope.local}
+            draft.given = {name: scope.nodes[name] for name in sorted(scope.local)}
             self.list_of_steps(steps, inner_at, inner.inside(index, f"{own}/", scope=scope))
 
     def include(self, item: MappingNode, own: str, at: Loc, context: _Context) -> None:

@@ -1,4 +1,23 @@
-"""Findings of the structure of a task."""
+"""Findings of the structure of a task.
+
+| number | mistake |
+|---|---|
+| 260 | an item with a verb and a word of structure, or with two words |
+| 261 | a key without its word, next to another word, or inside instead of next to it |
+| 262 | a key is missing, or is no list of steps |
+| 263 | `repeat`: no or both of `times` and `each`; rounds or values that cannot be counted; lists of different lengths |
+| 264 | a file that is missing, must not be read, or uses itself |
+| 265 | a sub-task or a fragment with wrong or missing keys |
+| 266 | a faulty declaration in `params` of a sub-task |
+| 267 | `with`: an unknown or missing parameter |
+| 268 | `with`: a value of another type |
+| 269 | too many steps, blocks, files or values |
+| 270 | an `if` on parameters that cannot be decided |
+| 271 | a parameter of `each` that hides another (warning) |
+| 272 | a parameter of `each` or of a sub-task that nothing uses (warning) |
+| 273 | a body or frame that two files have |
+| 274 | `parallel` without exactly two steps |
+"""
 
 from __future__ import annotations
 

@@ -56,6 +56,8 @@ def test_a_log_holds_what_a_retry_in_a_sub_task_needs(tmp_path: Path) -> None:
     task = loaded(tmp_path, f"{SCENE}steps: [{{do: s.yaml, with: {{object: a}}}}]\n", s=STACK)
     log = load_task_text(resolved(task.spec, expressions(task)), "log", model=task_spec())
     assert log.spec == task.spec
+    assert resolved(log.spec, expressions(log)) == resolved(task.spec, expressions(task))
+    assert "params: {height: 5 cm, object: a}" in resolved(task.spec, expressions(task)).replace('"', "")
     assert retried(log, 1) == retried(task, 1)
     assert retried(log, 1).body.by[0] == pytest.approx(0.18)  # type: ignore[attr-defined]
 
