@@ -124,8 +124,11 @@ class Expansion:
     def with_id(self, item: Node, at: Loc, context: _Context) -> Node:
         """The item with its id computed; a faulty id is reported and removed."""
         own = child(item, "id")
-        if not isinstance(item, MappingNode) or not isinstance(own, ScalarNode) or not isinstance(own.value, str):
+        if not isinstance(item, MappingNode) or own is None or (isinstance(own, ScalarNode) and own.value is None):
             return item
+        if not isinstance(own, ScalarNode) or not isinstance(own.value, str):
+            self.reports.at(205, (*at, "id"), own, f"expected a string, not {shown(own)}", ID_HINT)
+            return item.without("id")
         computed = context.scope.computed(own, (*at, "id"))
         text = computed.value if isinstance(computed, ScalarNode) else None
         if computed is own and is_expression(own.value):
@@ -219,14 +222,16 @@ class Expansion:
             return
         condition = mapped(written, scope.computed, (*at, "if"))
         try:
-            holds = decided(condition)
+            holds = _is_refused(condition, scope) or decided(condition)
         except Undecidable as error:
-            if error.node.place not in scope.refused:
-                self.reports.at(270, (*at, "if"), error.node, error.message, error.hint)
+            self.reports.at(270, (*at, "if"), error.node, error.message, error.hint)
             holds = True
-        if isinstance(holds, ScalarNode) and holds.written is not None:
+        if isinstance(holds, ScalarNode | SequenceNode):
             message = f"expected a condition, or true or false, not {shown(holds)}"
-            self.reports.at(270, (*at, "if"), holds, message, f"compare it: `if: {{equal: [{holds.written}, ...]}}`")
+            hint = "write `if: {at_rest: {object: a}}`, or `if: {equal: [$color, red]}`"
+            if isinstance(holds, ScalarNode) and holds.written is not None:
+                hint = f"compare it: `if: {{equal: [{holds.written}, ...]}}`"
+            self.reports.at(270, (*at, "if"), holds, message, hint)
             return
         missing = "then" not in item.entries
         if missing and holds is not False:
@@ -304,6 +309,15 @@ _EXPANDERS: Final[Mapping[str, _Expander]] = {
     "include": Expansion.include,
 }
 _FEWER: Final = "split the task, or repeat fewer times"
+
+
+def _is_refused(node: Node, scope: Scope) -> bool:
+    """Whether a value in a computed tree was refused."""
+    if isinstance(node, MappingNode):
+        return any(_is_refused(entry.node, scope) for entry in node.entries.values())
+    if isinstance(node, SequenceNode):
+        return any(_is_refused(item, scope) for item in node.items)
+    return node.place in scope.refused
 
 
 def _id_of(item: Node) -> Node:

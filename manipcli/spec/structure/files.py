@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
-from manipcli.core.text import did_you_mean, escape
+from manipcli.core.text import did_you_mean, escape, shorten
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, counted, shown
 from manipcli.spec.structure.reports import Reports
 
@@ -116,6 +116,9 @@ class Files:
             path = self.find(named.value, user.path)
         except Refused as refused:
             self.reports.add(Diagnostic("TASK264", f"{at}: {refused.message}", place, refused.hint))
+            return None
+        except (OSError, ValueError, RuntimeError):
+            self.reports.add(Diagnostic("TASK264", f"{at}: '{shorten(named.value)}' is not a name of a file", place))
             return None
         chain = user.chain or (user.path.resolve(),)
         if path in chain:

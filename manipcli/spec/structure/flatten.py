@@ -49,6 +49,9 @@ def flattened(root: Node, scope: Scope, expansion: Expansion, change: Change) ->
     nodes = _computed(steps, expansion)
     dropped = _computed(expanded.dropped, expansion)
     place = entry.node.place
+    if not nodes and expanded.dropped:
+        message = "no step is left: all are in branches that are never taken"
+        expansion.reports.at(270, ("steps",), entry.node, message, "change the condition or the parameters")
     complete = _is_complete(scope, expansion)
     blocks = tuple(block.node() for block in expanded.blocks)
     flat = SequenceNode(tuple(nodes), place) if nodes or complete else _placeholder(place)

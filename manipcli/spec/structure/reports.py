@@ -5,7 +5,7 @@
 | 260 | an item with a verb and a word of structure, or with two words |
 | 261 | a key without its word, next to another word, or inside instead of next to it |
 | 262 | a key is missing, or is no list of steps |
-| 263 | `repeat`: no or both of `times` and `each`; rounds or values that cannot be counted; lists of different lengths |
+| 263 | `repeat`: no or both of `times` and `each`; faulty rounds or values; lists of different lengths |
 | 264 | a file that is missing, must not be read, or uses itself |
 | 265 | a sub-task or a fragment with wrong or missing keys |
 | 266 | a faulty declaration in `params` of a sub-task |

@@ -97,6 +97,10 @@ def _values(block: MappingNode, steps: Node, at: Loc, scope: Scope, reports: Rep
         elif not isinstance(values, SequenceNode) or not values.items:
             message = f"expected a list of values, one for each round, not {shown(values)}"
             reports.at(263, (*at, name), values, message, "write `[a, b, c]`")
+        elif (
+            empty := next((v for v in values.items if isinstance(v, ScalarNode) and v.value is None), None)
+        ) is not None:
+            reports.at(263, (*at, name), empty, "a value is missing", "write `[a, b, c]`")
         else:
             lists[name] = values.items
             _warn(name, each, at, scope, used, reports)

@@ -16,6 +16,10 @@ scene: {a: {box: {size: [1 cm, 1 cm, 1 cm]}, mass: 1, pose: {}}}
 """
 
 FAULTY = (
+    (270, "6:14", "not nothing", "[{if: null, then: [{wait: 1 s}]}]"),
+    (205, "6:39", "expected a string", "[{sequence: [{wait: 1 s}], id: 5}, {wait: 0}]"),
+    (263, "6:30", "a value is missing", "[{repeat: {each: {x: [null]}, steps: [{wait: $x}]}}]"),
+    (270, "6:8", "no step is left", "[{if: {equal: [1, 2]}, then: [{wait: 1 s}]}]"),
     (262, "6:10", "`then` is missing", "[{if: {equal: [$color, red]}, else: [{wait: 1 s}]}]"),
     (261, "6:21", "`then` belongs to `if`", "[{wait: 1 s, then: [{wait: 1 s}]}]"),
     (261, "6:10", "`then` without `if`", "[{then: [{wait: 1 s}]}]"),
