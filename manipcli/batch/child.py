@@ -18,7 +18,7 @@ from manipcli.report.suite.suite import Trouble, troubles_of
 
 if TYPE_CHECKING:
     from manipcli.run.prepared import Prepared
-    from manipcli.task.plan_task import PlannedStep
+    from manipcli.task.plan_steps import PlannedStep
 
 BEAT_PERIOD = 0.25
 """[s] of wall time between two heartbeats during the simulation."""

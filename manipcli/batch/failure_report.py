@@ -18,6 +18,7 @@ from manipcli.pipeline import load_task
 from manipcli.replay.frames import Frames
 from manipcli.replay.renderer import png_bytes
 from manipcli.report.html.render_page import render_page
+from manipcli.report.nesting import block_line
 from manipcli.report.run_page import Cause, RunPage, Written
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite.suite import Trouble
@@ -41,6 +42,7 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
         for k, step in enumerate(verdict.steps)
         if step.went_wrong
     ]
+    steps += [Trouble(block_line(block), None, block.ended) for block in verdict.blocks_at_fault]
     refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
     unmet = [
         Trouble(describe_expectation(expectation), _place(job, task, *key), expectation.at)

@@ -111,7 +111,7 @@ class StepProgress:
             return
         if self._live:
             console.redraw("")
-        console.talk(f"{self._head}: {text}")
+        console.talk(f"{self._head}: {text}" if self._head else text)
 
     def tick(self, simulated_time: float, wall: float) -> None:
         """Redraws the live line if that is due. Both times in s from the start."""

@@ -59,10 +59,14 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class NotEvaluated:
-    """Why something could not be evaluated; this never counts as a pass."""
+    """Why something could not be evaluated; this never counts as a pass.
+
+    `skipped`: it is asked only of steps in a branch that was not taken; this does not count as a failure either.
+    """
 
     reason: str
     unit: str = ""
+    skipped: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,9 +57,13 @@ def when(spec: ExpectationSpec, steps: Sequence[StepOutcome], seam: Seams) -> Wh
 def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | NotEvaluated:
     known = {step.id: step for step in steps}
     ran = {step.id for step in steps if step.started is not None}
-    intervals = []
+    intervals: list[tuple[float, float]] = []
+    skipped: list[StepOutcome] = []
     for name in spec.steps or (spec.at or "",):
         step = known.get(name)
+        if step is not None and step.outcome == "skipped":
+            skipped.append(step)
+            continue
         if step is None or step.started is None:
             if isinstance(spec, WatchSpec) and any(other in ran for other in spec.steps):
                 continue  # this watch may have ended the run before the step
@@ -68,6 +72,9 @@ def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | Not
             return NotEvaluated(f"step '{name}' never ended")
         end = np.inf if step.ended is None else step.ended - ROUNDING
         intervals.append((step.started - ROUNDING, end))
+    if skipped and not intervals:
+        first = skipped[0]
+        return NotEvaluated(f"step '{first.id}' was skipped: {first.text}", skipped=True)
     intervals.sort()
     names = " and ".join(f"'{name}'" for name in spec.steps or (spec.at,))
     words = f"at the end of {names}" if spec.at is not None else f"during {names}"
@@ -256,7 +263,12 @@ def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:
     """The outcome of expectation `name`: passed at a margin of 0 or more; a failed margin is at most -`EDGE`."""
     if isinstance(found, NotEvaluated):
         return ExpectationOutcome(
-            name=name, outcome="not_evaluated", margin=None, unit=found.unit, at=None, text=found.reason
+            name=name,
+            outcome="skipped" if found.skipped else "not_evaluated",
+            margin=None,
+            unit=found.unit,
+            at=None,
+            text=found.reason,
         )
     passed = found.margin >= 0.0
     return ExpectationOutcome(

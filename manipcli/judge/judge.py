@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.state_window import ROUNDING
@@ -13,7 +14,7 @@ from manipcli.judge.evaluate import examine
 from manipcli.judge.outside import not_asked, unless_outside
 from manipcli.judge.part import PART, RunPart
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
+from manipcli.judge.steps import ENDED, RunStatus, block_outcomes, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import Recording
@@ -37,9 +38,10 @@ def judge(
     """Judge a recording against the expectations of its task.
 
     In this order: a run that was interrupted or did not finish, or whose log is incomplete, is an `error`; a step that
-    is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`); an expectation that fails or is
-    not evaluated makes it `failed`. Of a part of a task, steps outside of it and expectations that concern them do not
-    count (see `judge/outside.py`). Without expectations only the steps count, and the text says so.
+    is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`) or its branch was not taken; so
+    does a block that times out. An expectation that fails or is not evaluated makes it `failed`; one that is asked only
+    of skipped steps does not. Of a part of a task, steps outside of it and expectations that concern them do not count
+    (see `judge/outside.py`). Without expectations only the steps count, and the text says so.
 
     Args:
         recording: the log.
@@ -72,13 +74,9 @@ def judge(
         )
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
-    asked = tuple(step for step in steps if not step.excused)
-    word, text = _verdict(errors, cause, asked, outcomes, unwritten)
-    if part is not None:
-        text = f"{text}; {part}"
-    return Verdict(
+    found = Verdict(
         task=run.get("task", ""),
-        verdict=word,
+        verdict="error",
         seed=int(run["seed"]) if run.get("seed", "").isdecimal() else 0,
         engine=run.get("engine", ""),
         simulated_time=examined.end,
@@ -86,13 +84,15 @@ def judge(
         expectations=outcomes,
         implied=unwritten,
         errors=errors,
-        text=text,
         drawn=_drawn(recording),
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
         holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
         part=part,
+        blocks=block_outcomes(recording, interrupted=bool(errors)),
     )
+    word, text = _verdict(found, cause)
+    return replace(found, verdict=word, text=text if part is None else f"{text}; {part}")
 
 
 def _broken_after_all(recording: Recording) -> str:
@@ -147,19 +147,19 @@ def _cut_short(recording: Recording, end: float) -> tuple[Diagnostic, ...]:
     return ()
 
 
-def _verdict(
-    errors: tuple[Diagnostic, ...],
-    cause: str,
-    steps: tuple[StepOutcome, ...],
-    expectations: tuple[ExpectationOutcome, ...],
-    implied: tuple[ExpectationOutcome, ...],
-) -> tuple[VerdictWord, str]:
+def _verdict(found: Verdict, cause: str) -> tuple[VerdictWord, str]:
     """The verdict, and its reason in one line. `cause`: what ended the simulation early; "" if nothing did."""
-    if errors:
-        return "error", errors[0].message
+    steps, expectations = tuple(step for step in found.steps if not step.excused), found.expectations
+    if found.errors:
+        return "error", found.errors[0].message
     if cause and not any(step.went_wrong for step in steps):
         return "failed", cause
-    undone = next((step for step in steps if step.outcome != "done" and not step.tolerated), None)
+    undone = next((step for step in steps if step.outcome not in ("done", "skipped") and not step.tolerated), None)
+    at_fault = found.blocks_at_fault
+    if at_fault and (undone is None or undone.outcome == "not_run"):
+        block = at_fault[0]
+        why = f": {block.text}" if block.text else ""
+        return "failed", f"{block.label} {'timed out' if block.outcome == 'timeout' else block.outcome}{why}"
     if undone is not None:
         why = f": {undone.text}" if undone.text else ""
         first = undone.attempts[0].text if undone.attempts else ""
@@ -168,20 +168,35 @@ def _verdict(
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
     if not steps:
         return "failed", "the recording has no steps"
-    asked = [expectation for expectation in (*expectations, *implied) if not expectation.excused]
+    asked = [expectation for expectation in (*expectations, *found.implied) if not expectation.excused]
     unmet = next((expectation for expectation in asked if expectation.missed), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
-    done = f"all {len(steps)} steps done" if len(steps) > 1 else "1 step done"
-    failed = [step.id for step in steps if step.tolerated]
-    if failed:
-        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, failure of {listed(failed)} tolerated"
+    return "passed", f"{_done(steps)}{', ' if expectations else '; '}{_met(expectations)}"
+
+
+def _done(steps: Sequence[StepOutcome]) -> str:
+    failed = [step.id for step in steps if step.tolerated and step.outcome != "not_run"]
+    others = [(word, sum(step.outcome == word for step in steps)) for word in ("skipped", "not_run")]
+    others = [(word, count) for word, count in others if count]
+    if not failed and not others:
+        return f"all {len(steps)} steps done" if len(steps) > 1 else "1 step done"
+    done = f"{sum(step.outcome == 'done' for step in steps)} of {len(steps)} steps done"
+    done += "".join(f", {count} {word.replace('_', ' ')}" for word, count in others)
+    return f"{done}, failure of {listed(failed)} tolerated" if failed else done
+
+
+def _met(expectations: Sequence[ExpectationOutcome]) -> str:
     if not expectations:
-        return "passed", f"{done}; the task has no expectations"
+        return "the task has no expectations"
+    asked = [one for one in expectations if one.outcome != "skipped" and not one.excused]
     if not asked:
-        return "passed", f"{done}, no expectation evaluated"
-    met = f"all {len(asked)} expectations met" if len(asked) > 1 else "1 expectation met"
-    if len(asked) < len(expectations):
-        met = f"{len(asked)} of {len(expectations)} expectations met, the others not evaluated"
-    return "passed", f"{done}, {met}"
+        return "no expectation evaluated"
+    if len(asked) == len(expectations):
+        return f"all {len(asked)} expectations met" if len(asked) > 1 else "1 expectation met"
+    skipped = sum(one.outcome == "skipped" for one in expectations)
+    others = f"{skipped} skipped" if skipped else ""
+    if len(asked) + skipped < len(expectations):
+        others = ", ".join(filter(None, (others, "the others not evaluated")))
+    return f"{len(asked)} of {len(expectations)} expectations met, {others}"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from enum import StrEnum
 from itertools import pairwise
 from typing import get_args
 
-from manipcli.judge.verdict import Attempt, StepOutcome, StepWord
-from manipcli.plan.outline import PLAN_FILE, PlanOutline
+from manipcli.judge.verdict import Attempt, BlockOutcome, StepOutcome, StepWord
+from manipcli.plan.outline import PLAN_FILE, BlockOutline, PlanOutline
 from manipcli.record.channels import EVENTS
 from manipcli.record.recording import Recording, TaskEvent
 
@@ -29,8 +30,8 @@ ENDED = (RunStatus.COMPLETE, RunStatus.FAILED)
 def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutcome, ...]:
     """The outcome of each step, in the order of the plan; without a plan in the log, in the order of their starts.
 
-    A step without an end is `interrupted` if the run was, else `failed`; a step without a start is `not_run`. The last
-    attempt counts.
+    A step without an end is `interrupted` if the run was, else `failed`; a step without a start is `not_run`, or
+    `skipped` if its branch was not taken. The last attempt counts.
     """
     plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
     planned = [(step.id, step.verb, step.planned_duration) for step in plan.steps]
@@ -41,6 +42,42 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
             planned.append((event.step, event.verb, 0.0))
     return tuple(
         _outcome(step_id, verb, duration, recording.events, interrupted) for step_id, verb, duration in planned
+    )
+
+
+def block_outcomes(recording: Recording, *, interrupted: bool) -> tuple[BlockOutcome, ...]:
+    """The outcome of each block, in the order of the plan; () without a plan in the log."""
+    plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
+    return tuple(_block(block, recording.events, interrupted) for block in plan.blocks)
+
+
+def _block(block: BlockOutline, events: Iterable[TaskEvent], interrupted: bool) -> BlockOutcome:
+    mine = [event for event in events if event.step == block.id]
+    starts = [event.time for event in mine if event.kind == "block_started"]
+    choice = next((event for event in reversed(mine) if event.kind == "branch"), None)
+    outcome, ended, text = "not_run", None, ""
+    if starts:
+        outcome = "interrupted" if interrupted else "failed"
+        for event in mine:
+            if event.kind == "block_started":
+                outcome, ended, text = "interrupted" if interrupted else "failed", None, ""
+            elif event.kind == "block_ended":
+                outcome, ended, text = event.outcome, event.time, event.text
+    if mine and mine[-1].kind == "block_skipped":
+        outcome, text = "skipped", mine[-1].text
+    return BlockOutcome(
+        id=block.id,
+        word=block.word,
+        first=block.first,
+        last=block.last,
+        parent=block.parent,
+        outcome=_word(outcome),
+        started=starts[0] if starts else None,
+        ended=ended,
+        attempts=len(starts),
+        taken="" if choice is None else choice.outcome,
+        text=text or ("" if choice is None else choice.text),
+        tolerated=any(event.kind == "block_tolerated" for event in mine[-1:]),
     )
 
 
@@ -56,10 +93,18 @@ def left_out(recording: Recording) -> str:
     return "" if begun is None else f"the end of step '{begun.id}' is missing, though the run finished"
 
 
-def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool) -> StepOutcome:
+def _outcome(
+    step_id: str, verb: str, duration: float | None, events: Iterable[TaskEvent], interrupted: bool
+) -> StepOutcome:
     mine = [event for event in events if event.step == step_id]
     attempts = tuple(_attempts(mine, interrupted))
     last = attempts[-1] if attempts else None
+    for event in mine:  # in this branch, or during the run
+        if event.kind == "step_planned":
+            with suppress(ValueError):
+                duration = float(event.text)
+    if mine and mine[-1].kind == "step_skipped":
+        return StepOutcome(step_id, verb, "skipped", None, None, duration, mine[-1].text, attempts)
     return StepOutcome(
         id=step_id,
         verb=verb,
@@ -67,7 +112,7 @@ def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEven
         started=None if last is None else attempts[0].started,
         ended=None if last is None else last.ended,
         planned_duration=duration,
-        text="" if last is None else last.text,
+        text=last.text if last is not None else mine[-1].text if mine else "",
         attempts=attempts,
         tolerated=bool(mine) and mine[-1].kind == "step_tolerated",
         replanned=tuple(event.text for event in mine if event.kind == "replanned"),

@@ -14,8 +14,8 @@ from manipcli.judge.saturations import Saturations
 from manipcli.judge.self_contacts import SelfContact
 
 VerdictWord = Literal["passed", "failed", "error"]
-ExpectationWord = Literal["passed", "failed", "not_evaluated"]
-StepWord = Literal["done", "failed", "timeout", "interrupted", "not_run"]
+ExpectationWord = Literal["passed", "failed", "not_evaluated", "skipped"]
+StepWord = Literal["done", "failed", "timeout", "interrupted", "not_run", "skipped"]
 
 INTERRUPTED = "RUN101"
 """Code of the error of a run that was interrupted by the user."""
@@ -42,11 +42,11 @@ class StepOutcome:
 
     Attributes:
         id, verb: of the step.
-        outcome, text: of its last attempt.
+        outcome, text: of its last attempt; `skipped`: its branch was not taken.
         started, ended: simulated time [s]; None if it never started or ended.
         planned_duration: [s]; None without a plan.
         attempts: in order.
-        tolerated: it failed, and the task tolerates that (`on_fail: continue`).
+        tolerated: it failed or was not reached, and the task tolerates that (`on_fail: continue`).
         replanned: the reason of each re-planning during the run.
         excused: the run was not asked to do it.
     """
@@ -71,7 +71,46 @@ class StepOutcome:
     @property
     def went_wrong(self) -> bool:
         """Whether it ran and was not done, and the task does not tolerate that."""
-        return self.outcome not in ("done", "not_run") and not self.tolerated
+        return self.outcome not in ("done", "not_run", "skipped") and not self.tolerated
+
+
+@dataclass(frozen=True, slots=True)
+class BlockOutcome:
+    """The outcome of a block of steps: `steps[first:last]`.
+
+    Attributes:
+        id, word: of the block; `word` is its key in the file.
+        first, last: indices of its steps.
+        parent: index of the enclosing block; None for an outermost one.
+        outcome, text: of its last attempt; the text of an `if` is the evaluation of its condition.
+        started, ended: simulated time [s]; None if it never started or ended.
+        attempts: number of attempts.
+        taken: `then` or `else` of an `if`; "" for other blocks, and before it is asked.
+        tolerated: it failed, and the task goes on behind it (`on_fail: continue`).
+    """
+
+    id: str
+    word: str
+    first: int
+    last: int
+    parent: int | None
+    outcome: StepWord
+    started: float | None
+    ended: float | None
+    attempts: int = 0
+    taken: str = ""
+    text: str = ""
+    tolerated: bool = False
+
+    @property
+    def went_wrong(self) -> bool:
+        """Whether it ran and was not done, and the task does not tolerate that."""
+        return self.outcome not in ("done", "not_run", "skipped") and not self.tolerated
+
+    @property
+    def label(self) -> str:
+        """Its key in the file and its id: `repeat 'stack'`."""
+        return f"{self.word} '{self.id}'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +119,7 @@ class ExpectationOutcome:
 
     Attributes:
         name: in reports.
-        outcome: `passed`, `failed` or `not_evaluated`.
+        outcome: `passed`, `failed`, `not_evaluated`, or `skipped` with the steps that it is asked of.
         margin: in `unit`, negative if it failed; None if not evaluated.
         unit: SI.
         at: [s] the time of the deciding tick.
@@ -101,7 +140,7 @@ class ExpectationOutcome:
     @property
     def missed(self) -> bool:
         """Whether it is not met, and the run was asked to do what it concerns."""
-        return self.outcome != "passed" and not self.excused
+        return self.outcome not in ("passed", "skipped") and not self.excused
 
     @property
     def distance(self) -> float:
@@ -125,6 +164,7 @@ class Verdict:
         candidates: the refused candidates of a task without a plan.
         implied: outcomes of the expectations that every task has unless it sets them otherwise (`saturation`).
         part: the part of the task that was run; None: all of it.
+        blocks: the groups of its steps; a block precedes its parts.
     """
 
     task: str
@@ -143,11 +183,23 @@ class Verdict:
     candidates: tuple[RefusedCandidates, ...] = ()
     implied: tuple[ExpectationOutcome, ...] = ()
     part: RunPart | None = None
+    blocks: tuple[BlockOutcome, ...] = ()
+
+    @property
+    def blocks_at_fault(self) -> tuple[BlockOutcome, ...]:
+        """The blocks that went wrong although none of their steps and blocks did."""
+        wrong = [block for block in self.blocks if block.went_wrong]
+        return tuple(
+            block
+            for block in wrong
+            if not any(step.went_wrong for step in self.steps[block.first : block.last])
+            and not any(other.parent is not None and self.blocks[other.parent] is block for other in wrong)
+        )
 
     @property
     def ended_between(self) -> bool:
         """Whether the run ended before its first step or after its last, so that no step or expectation shows why."""
-        if any(step.went_wrong for step in self.steps):
+        if any(step.went_wrong for step in self.steps) or self.blocks_at_fault:
             return False
         undone = any(step.outcome == "not_run" and not step.excused for step in self.steps)
         return undone or not any(expectation.missed for expectation in self.expectations)

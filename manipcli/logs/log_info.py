@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
-from manipcli.judge.verdict import StepOutcome
+from manipcli.judge.steps import ENDED, RunStatus, block_outcomes, left_out, step_outcomes
+from manipcli.judge.verdict import BlockOutcome, StepOutcome
 from manipcli.record import channels
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
@@ -28,6 +28,7 @@ def log_info(path: Path) -> LogInfo:
     ours = RECORD in found.metadata
     missing = list(found.faults)
     steps: tuple[StepOutcome, ...] = ()
+    blocks: tuple[BlockOutcome, ...] = ()
     if ours:
         try:
             recording = open_recording(path)
@@ -36,7 +37,9 @@ def log_info(path: Path) -> LogInfo:
         else:
             status = recording.metadata.get("run", {}).get("status", "")
             lacks = left_out(recording) if status == RunStatus.COMPLETE and recording.lost is None else ""
-            steps = step_outcomes(recording, interrupted=bool(lacks) or status not in ENDED)
+            interrupted = bool(lacks) or status not in ENDED
+            steps = step_outcomes(recording, interrupted=interrupted)
+            blocks = block_outcomes(recording, interrupted=interrupted)
             if recording.lost is not None:
                 missing = [recording.lost]
             missing += [lacks] if lacks else []
@@ -49,4 +52,4 @@ def log_info(path: Path) -> LogInfo:
         known = meant({name: topic.type for name, topic in found.all.items()})
         there = {known[name].usual for name, topic in found.all.items() if topic.count and name in known}
         missing += [f"the log has no {topic}" for topic in COMMON if topic not in there]
-    return LogInfo(found=found, ours=ours, steps=steps, missing=tuple(missing))
+    return LogInfo(found=found, ours=ours, steps=steps, missing=tuple(missing), blocks=blocks)

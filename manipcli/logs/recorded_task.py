@@ -131,10 +131,11 @@ def _drawn(recording: Recording, path: Path) -> Drawn | None:
 
 
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
-    """Where steps and expectations are written, from the plan in the log; {} without a plan."""
+    """Where steps, blocks and expectations are written, from the plan in the log; {} without a plan."""
     plan = PlanOutline.read(attached(recording, path, PLAN_FILE))
-    places = [*(step.place for step in plan.steps), *plan.judged]
-    keys = [*(("steps", k) for k in range(len(spec.steps))), *spec.judged_at]
+    places = [*(step.place for step in plan.steps), *(block.place for block in plan.blocks), *plan.judged]
+    keys: list[Loc] = [("steps", k) for k in range(len(spec.steps))]
+    keys += [*(("blocks", k) for k in range(len(spec.blocks))), *spec.judged_at]
     return dict(zip(keys, places, strict=True)) if len(places) == len(keys) and all(places) else {}
 
 

@@ -26,6 +26,7 @@ from manipcli.replay.playback import RATE, Playback
 from manipcli.report.display_quantity import quantity
 from manipcli.report.inertials import recorded_inertials
 from manipcli.report.logs.engine_choice import engine_choices
+from manipcli.report.nesting import block_line
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
 from manipcli.spec.base import Model
@@ -198,6 +199,7 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
             at = None if end is None else step.ended if step.ended is not None else end
             causes.append(Cause(how_wrong(step), step.text, at, written, hint))
             hint = ""
+    causes += [Cause(block_line(block), "", block.ended, None, hint) for block in verdict.blocks_at_fault]
     for expectation, written in zip(verdict.expectations, places[1], strict=False):
         if expectation.missed and end is not None:
             title = f"expectation '{expectation.name}' {_missed(expectation)}"

@@ -15,17 +15,19 @@ class SearchProgress:
     Args:
         report: receives each line.
         ids: of the steps.
+        branch: the outcomes of the choices before them, in words.
     """
 
-    def __init__(self, report: Callable[[str], None], ids: Sequence[str]) -> None:
+    def __init__(self, report: Callable[[str], None], ids: Sequence[str], branch: str = "") -> None:
         self._report = report
         self._ids = ids
+        self._where = f" ({branch})" if branch else ""
         self._step = ""
         self._details: tuple[str, ...] = ()
 
     def step(self, k: int, again: bool) -> None:
         """Step `k` is planned; `again`: with another candidate, as a later step has no plan with the last."""
-        self._step = f"planning step {k + 1} of {len(self._ids)}, '{self._ids[k]}'"
+        self._step = f"planning step {k + 1} of {len(self._ids)}, '{self._ids[k]}'{self._where}"
         self._details = ("another candidate",) if again else ()
         self._show()
 

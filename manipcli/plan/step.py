@@ -6,9 +6,9 @@ controller goals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, Literal, TypeVar
 
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import NotPlannable
@@ -22,6 +22,8 @@ from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
 S = TypeVar("S", bound=Model)
+Part = Literal["arm", "hand", "both", "nothing"]
+"""What a step moves."""
 
 
 def single(
@@ -47,6 +49,8 @@ class StepMember(Generic[S]):
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
         moves: whether it moves the arm, so that `keep` means something.
+        part: (spec, robot, joints of the hand) -> what it moves, for a `parallel`; `both` also for what needs the hand
+            at a place.
     """
 
     name: str
@@ -57,6 +61,7 @@ class StepMember(Generic[S]):
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
     moves: bool = True
+    part: Callable[[S, RobotModel, Sequence[str]], Part] = lambda *_: "both"
 
     def plan(self, spec: S, planner: Planner, state: PlanningState) -> StepPlan:
         """The plan of the first candidate that has one, with straight paths only.

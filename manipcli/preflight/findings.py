@@ -54,7 +54,7 @@ def preflight_findings(
 
 def _grasp_margins(task: Task, plan: Plan) -> Iterator[Diagnostic]:
     """What each grasp of the plan holds, at its step."""
-    numbers = {step.id: k for k, step in enumerate(plan.steps)}
+    numbers = {step.id: step.index for step in plan.every}
     for step, margin in plan.grasps():
         place = task.file.place("steps", numbers[step])
         if margin.attachment and margin.ratio < 1.0:

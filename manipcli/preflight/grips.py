@@ -49,10 +49,10 @@ def grasps(plan: Plan) -> Iterator[Grasp]:
     """All grasps of a plan that have a force; none where an attachment holds objects."""
     if plan.planner.robot.holding is not None:
         return
-    for k, step in enumerate(plan.steps):
+    for step in plan.every:
         for grip in (motion.grip for motion in step.plan.motions):
             if grip is not None and grip.force is not None:
-                yield Grasp(k, step.id, step.plan.end, grip.force, grip.joints, grip.target)
+                yield Grasp(step.index, step.id, step.plan.end, grip.force, grip.joints, grip.target)
 
 
 def largest_force(subject: Subject, name: str) -> float:

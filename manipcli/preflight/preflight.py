@@ -216,7 +216,8 @@ def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
     robot = task.robot
     here, still = np.array(plan.start.position), np.zeros(len(robot.joint_names))
     samples = [_Sample(0, here, still, still)]
-    for k, step in enumerate(plan.steps, 1):
+    for step in plan.every:
+        k, here = step.index + 1, np.array(step.start.position)
         for motion in step.plan.motions:
             if motion.trajectory is None:
                 continue

@@ -100,7 +100,7 @@ def _heading(pen: ImageDraw, playback: Playback, width: int, height: int, letter
 def _label(pen: ImageDraw, tile: Tile, number: int, box: tuple[int, int, int, int], letter: int) -> None:
     """Number, name and cause of failure at the left, outcome and time at the right."""
     left, top, width, height = box
-    colour = DONE if tile.outcome == "done" else QUIET if tile.outcome in ("", "not_run") else FAILED
+    colour = DONE if tile.outcome == "done" else QUIET if tile.outcome in ("", "not_run", "skipped") else FAILED
     time = [] if tile.time is None else [(f"{tile.time:.2f} s", QUIET)]
     why = f": {tile.text}" if tile.text and tile.outcome not in ("done", "") else ""
     write_line(

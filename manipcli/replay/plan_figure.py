@@ -77,6 +77,7 @@ def _panel(place: Axes, times: Array, values: Array, limits: tuple[float, float]
 
 def _values(plan: Plan) -> tuple[Array, dict[str, Array], list[float]]:
     """Times (T,), each quantity (T, n), and the start of each step."""
+    plan = plan.merged
     clock, times, starts = 0.0, [], []
     found: dict[str, list[Array]] = {quantity: [] for quantity in QUANTITIES}
     spans = iter(plan.spans())

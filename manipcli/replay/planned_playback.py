@@ -15,7 +15,8 @@ from manipcli.plan.motion import Motion
 from manipcli.plan.planned_states import PlannedStates, planned_states
 from manipcli.replay.ghost import Ghost, ghost_of
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
-from manipcli.task.plan_task import Plan, PlannedStep, spans
+from manipcli.task.plan_steps import PlannedStep
+from manipcli.task.plan_task import Plan, spans
 
 MOST_GHOSTS: Final = 8
 """Ghosts of a page; it has eight colours, and more hide the motion."""
@@ -25,17 +26,20 @@ NOTE: Final = "planned, not simulated: bodies are where the planner predicts the
 
 def planned_playback(plan: Plan, name: str, *, rate: float = RATE) -> Playback:
     """The plan sampled at `rate` [Hz]; torques are shown as efforts."""
+    notes = [NOTE]
+    if len(plan.combinations) > 1:
+        first = plan.combinations[0].branch
+        notes.append(f"this is the branch {first}, of {len(plan.combinations)} branches")
+    plan = plan.merged
     states, steps, clock = [], [], 0.0
-    before = plan.start
     for step in plan.steps:
         begins, phases = clock, []
-        for motion, start, end in spans(step.plan.motions, before, step.plan.end):
+        for motion, start, end in spans(step.plan.motions, step.start, step.plan.end):
             states.append((clock, planned_states(plan.planner, motion, end, begins=start, period=1.0 / rate)))
             phases.append(Phase(motion.label, clock, clock + motion.duration))
             clock += motion.duration
-        before = step.plan.end
         steps.append(PlaybackStep(step.id, step.verb, step.id, begins, clock, "done", phases=tuple(phases)))
-    return _playback(plan, name, states, tuple(steps))
+    return replace(_playback(plan, name, states, tuple(steps)), notes=tuple(notes))
 
 
 def refused_playback(plan: Plan, name: str, refusal: NotPlannable) -> tuple[Playback, tuple[Ghost, ...]]:
@@ -69,7 +73,7 @@ def planned_ghosts(plan: Plan, shown: Playback) -> tuple[tuple[Ghost, ...], int]
     found: list[Ghost] = []
     tried = [
         (step, at, one, motions)
-        for step, at in zip(plan.steps, shown.steps, strict=True)
+        for step, at in zip(plan.merged.steps, shown.steps, strict=True)
         for one in step.dropped
         if (motions := _motions(one))
     ]

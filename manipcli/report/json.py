@@ -13,7 +13,7 @@ from dataclasses import fields, is_dataclass
 
 from manipcli.core.errors import Diagnostic
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
+from manipcli.judge.verdict import BlockOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
 
 Json = None | bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"]
@@ -80,7 +80,8 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
     """The object of `run` and `judge`, with all its keys in a fixed order."""
     empty = "task verdict text seed engine sample part simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
-    found |= {"self_contacts": [], "holding": [], "steps": [], "expectations": [], "implied": [], "candidates": []}
+    found |= {"self_contacts": [], "holding": [], "steps": [], "blocks": [], "expectations": [], "implied": []}
+    found |= {"candidates": []}
     if judged is not None:
         found |= picked(judged, "task verdict text seed engine simulated_time")
         found["saturated"] = saturated_object(judged.saturations)
@@ -92,6 +93,7 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
         found["candidates"] = plain(judged.candidates)
         if judged.part is not None:
             found["part"] = plain(judged.part)
+        found["blocks"] = [block_object(judged, block) for block in judged.blocks]
         if judged.drawn is not None:
             found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
     return {**found, **known, "errors": plain(errors)}
@@ -112,6 +114,15 @@ def _counted(counts: Mapping[str, int]) -> dict[str, Json]:
 
 def step_object(step: StepOutcome) -> dict[str, Json]:
     return picked(step, "id verb outcome started ended planned_duration text tolerated attempts replanned")
+
+
+def block_object(judged: Verdict, block: BlockOutcome) -> dict[str, Json]:
+    """A block with the ids of its steps and of the block around it."""
+    return {
+        **picked(block, "id word outcome taken started ended attempts text tolerated"),
+        "parent": None if block.parent is None else judged.blocks[block.parent].id,
+        "steps": [step.id for step in judged.steps[block.first : block.last]],
+    }
 
 
 def finding_object(finding: Diagnostic) -> dict[str, Json]:

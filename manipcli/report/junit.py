@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from manipcli.core.text import escape
-from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import quantity
+from manipcli.report.nesting import block_line
 from manipcli.report.run_page import Written
 from manipcli.report.text import how_wrong
 
@@ -24,8 +25,9 @@ def render_junit(
 ) -> bytes:
     """The file of one run.
 
-    The additional case `run` reports what belongs to no step or expectation, such as an interruption or an incomplete
-    log. An expectation that was not evaluated because a step failed before is skipped.
+    A block of steps is a case, too: it fails if it timed out though its steps were done. The additional case `run`
+    reports what belongs to no step or expectation, such as an interruption or an incomplete log. An expectation that
+    was not evaluated because a step failed before is skipped.
 
     Args:
         verdict: the verdict.
@@ -37,6 +39,7 @@ def render_junit(
     cases += [
         _step(verdict, step, _attributes(written, file)) for step, written in zip(verdict.steps, steps, strict=True)
     ]
+    cases += [_block(verdict, block) for block in verdict.blocks]
     cases += [
         _expectation(verdict, outcome, _attributes(written, file))
         for outcome, written in zip(verdict.expectations, expectations, strict=True)
@@ -84,6 +87,8 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
     case = _case(verdict, "steps", step.id, took, attributes)
     if step.outcome == "not_run":
         _add(case, "skipped", f"not run: {step.text or 'the run ended before this step'}", "", [])
+    elif step.outcome == "skipped":
+        _add(case, "skipped", f"skipped: {step.text}", "", [])
     elif step.tolerated:
         SubElement(case, "system-out").text = safe(f"{step.outcome}, tolerated by the task: {step.text}")
     elif step.outcome != "done":
@@ -91,6 +96,18 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
         message = how_wrong(step) + (f": {step.text}" if step.text else "")
         hints = [f"hint: {finding.hint}" for finding in verdict.errors if finding.hint and verdict.verdict == "failed"]
         _add(case, "failure", message, step.outcome, [when, *hints])
+    return case
+
+
+def _block(verdict: Verdict, block: BlockOutcome) -> Element:
+    took = 0.0 if block.started is None or block.ended is None else block.ended - block.started
+    case = _case(verdict, "blocks", block.id, took, {})
+    if block.outcome in ("not_run", "skipped"):
+        _add(case, "skipped", f"{block.outcome.replace('_', ' ')}: {block.text}", "", [])
+    elif any(block is one for one in verdict.blocks_at_fault):
+        _add(case, "failure", block_line(block), block.outcome, [])
+    else:
+        SubElement(case, "system-out").text = safe(block_line(block))
     return case
 
 
@@ -107,6 +124,8 @@ def _expectation(verdict: Verdict, expectation: ExpectationOutcome, attributes: 
             "failed",
             [margin, when],
         )
+    elif expectation.outcome == "skipped":
+        _add(case, "skipped", f"expectation '{expectation.name}' was not asked: {expectation.text}", "", [])
     elif expectation.outcome == "not_evaluated":
         excused = expectation.excused or verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
         message = f"expectation '{expectation.name}' was never evaluated: {expectation.text}"

@@ -8,23 +8,25 @@ from typing import TextIO
 
 from manipcli.core.geometry import Array
 from manipcli.model.collision import CollisionHit
+from manipcli.plan.block_tree import choices
 from manipcli.plan.motion_margins import MotionMargins
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.why_not import stage_of
 from manipcli.report.json import Json, dumps, picked, plain
-from manipcli.task.plan_task import Plan, PlannedMotion, PlannedStep
+from manipcli.task.plan_steps import PlannedStep
+from manipcli.task.plan_task import Plan, PlannedMotion
 
 
 def render_json(task: str, plan: Plan) -> str:
     """The plan as one JSON object; durations in s, `used` as a fraction of the limit, clearances in m."""
-    motions = zip(plan.motions, plan.path_kinds(), plan.clearances(), plan.margins(), strict=True)
+    beyond = choices(plan.items).beyond
     return dumps(
         {
             "task": task,
             "verdict": "passed",
-            "duration": round(sum(motion.duration for motion in plan.motions), 9),
-            "motions": [_motion(motion, kind, near, margins) for motion, kind, near, margins in motions],
-            "steps": [_step(step) for step in plan.steps],
+            **_path(plan),
+            "branches": [{"branch": part.branch, **_path(part)} for part in plan.stretches if part.branch],
+            "planned_in_run": None if beyond is None else beyond.spec.id,
             "clearances": [
                 {"between": list(each.between), "stated": each.stated, "least": _nearest(each.nearest)}
                 for each in plan.stated_clearances()
@@ -42,6 +44,16 @@ def render_json(task: str, plan: Plan) -> str:
     )
 
 
+def _path(plan: Plan) -> dict[str, Json]:
+    """The steps of a plan."""
+    motions = zip(plan.motions, plan.path_kinds(), plan.clearances(), plan.margins(), strict=True)
+    return {
+        "duration": round(plan.duration, 9),
+        "motions": [_motion(motion, kind, near, margins) for motion, kind, near, margins in motions],
+        "steps": [_step(step) for step in plan.steps],
+    }
+
+
 def _step(step: PlannedStep) -> Json:
     return {
         "id": step.id,
@@ -57,12 +69,16 @@ def _step(step: PlannedStep) -> Json:
 def write_csv(motions: Sequence[PlannedMotion], stream: TextIO) -> None:
     """Write one row per trajectory point: `time` [s] from the start of its motion, positions in rad or m.
 
-    Columns of joints that a motion does not move, and missing velocities and accelerations, are empty.
+    Columns of joints that a motion does not move, and missing velocities and accelerations, are empty. The first column
+    is the branch of the motion, if the task has several.
     """
+    branches = any(motion.branch for motion in motions)
     joints = list(dict.fromkeys(name for motion in motions if motion.trajectory for name in motion.trajectory.names))
     kinds = ("position", "velocity", "acceleration")
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["step", "motion", "time", *(f"{joint}_{kind}" for kind in kinds for joint in joints)])
+    writer.writerow(
+        [*["branch"] * branches, "step", "motion", "time", *(f"{joint}_{kind}" for kind in kinds for joint in joints)]
+    )
     for motion in motions:
         trajectory = motion.trajectory
         if trajectory is None:
@@ -73,7 +89,7 @@ def write_csv(motions: Sequence[PlannedMotion], stream: TextIO) -> None:
             for joint in joints
         ]
         for time, *row in zip(trajectory.times, *columns, strict=True):
-            writer.writerow([motion.step_id, motion.label, f"{time:.6f}", *row])
+            writer.writerow([*[motion.branch] * branches, motion.step_id, motion.label, f"{time:.6f}", *row])
 
 
 def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> list[str]:

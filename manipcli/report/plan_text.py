@@ -7,6 +7,7 @@ from typing import Final
 
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
+from manipcli.plan.block_tree import choices
 from manipcli.plan.clearance import StatedClearance
 from manipcli.plan.motion_margins import Binding, MotionMargins
 from manipcli.plan.why_not import by_stage
@@ -22,16 +23,29 @@ def render_text(task: str, plan: Plan, *, every: bool = False) -> str:
 
     `every`: show all rows of refused candidates.
     """
-    margins = plan.margins()
-    parts = [_motions(plan, margins), _margins(plan, margins)]
+    parts = []
+    for part in plan.stretches if len(plan.branches) > 1 else (plan,):
+        if part.branch:
+            parts.append(f"branch {part.branch}:")
+        if part.steps:
+            margins = part.margins()
+            parts += [_motions(part, margins), _margins(part, margins)]
     parts.append("\n".join(_stated(plan, each) for each in plan.stated_clearances()))
     parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
-    chosen = [step for step in plan.steps if step.dropped and step.candidate]
+    chosen = [step for step in plan.every if step.dropped and step.candidate]
     parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
-    dropped = by_stage([(step.id, one) for step in plan.steps for one in step.dropped])
-    parts.append(render_refused(dropped, every=every))
-    total = sum(motion.duration for motion in plan.motions)
-    parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {total:.2f} s")
+    parts.append(render_refused(by_stage([(step.id, one) for step in plan.every for one in step.dropped]), every=every))
+    beyond = choices(plan.items).beyond
+    if beyond is not None:
+        parts.append(f"the steps after '{beyond.spec.id}' are planned during the run")
+    ways = plan.combinations
+    if len(ways) > 1:
+        rows = [(way.branch, str(len(way.steps)), f"{way.duration:.2f} s") for way in ways]
+        parts.append(table(("branch", "steps", "duration"), rows, right=("steps", "duration")))
+        shortest, longest = (of(way.duration for way in ways) for of in (min, max))
+        parts.append(f"✓ {task} planned: {len(ways)} branches, {shortest:.2f} to {longest:.2f} s")
+    else:
+        parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {plan.duration:.2f} s")
     return "\n\n".join(part for part in parts if part)
 
 
@@ -68,7 +82,7 @@ def _motions(plan: Plan, found: Sequence[MotionMargins]) -> str:
         bound, dexterity = margins.binding, margins.manipulability
         rows.append(
             (
-                motion.step_id if motion.step_id != previous else "",
+                f"{'+ ' * motion.beside}{motion.step_id}" if motion.step_id != previous else "",
                 motion.verb if motion.step_id != previous else "",
                 motion.label,
                 kind or "-",

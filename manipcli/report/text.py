@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, one_line
 from manipcli.judge.self_contacts import self_contact_line
-from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import quantity
+from manipcli.report.nesting import MARKS, block_line, nested
 from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 
@@ -77,7 +78,9 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
     if lines:
         lines.append("")
     if verdict.steps:
-        lines += [steps_table(verdict.steps), ""]
+        lines += [steps_table(verdict.steps, verdict.blocks), ""]
+        if choices := [block_line(block) for block in verdict.blocks if block.taken]:
+            lines += [*choices, ""]
     if verdict.expectations:
         lines += [_expectations(verdict.expectations), ""]
     mark = PASS if verdict.verdict == "passed" else FAIL
@@ -103,6 +106,7 @@ def _causes(verdict: Verdict) -> list[str]:
     causes += [
         f"{FAIL} {how_wrong(step)}{f': {step.text}' if step.text else ''}" for step in verdict.steps if step.went_wrong
     ]
+    causes += [f"{FAIL} {block_line(block)}" for block in verdict.blocks_at_fault]
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
         for expectation in (*verdict.expectations, *verdict.implied)
@@ -111,7 +115,19 @@ def _causes(verdict: Verdict) -> list[str]:
     return causes
 
 
-def _word(step: StepOutcome) -> str:
+def _marked(one: StepOutcome | BlockOutcome) -> str:
+    tries = one.attempts if isinstance(one, BlockOutcome) else len(one.attempts)
+    return f"{MARKS.get(one.outcome, FAIL)} {_word(one)}{f' at attempt {tries}' if tries > 1 else ''}"
+
+
+def _verb(one: StepOutcome | BlockOutcome) -> str:
+    """The verb of a step; the key of a block, with the branch that was taken."""
+    if isinstance(one, StepOutcome):
+        return one.verb
+    return f"{one.word}: {one.taken}" if one.taken else one.word
+
+
+def _word(step: StepOutcome | BlockOutcome) -> str:
     return f"{step.outcome.replace('_', ' ')}{', tolerated' if step.tolerated else ''}"
 
 
@@ -136,17 +152,12 @@ def _summary(verdict: Verdict) -> str:
     return f"{text}, {met} of {number_of(len(verdict.expectations), 'expectation')} met"
 
 
-def steps_table(steps: Sequence[StepOutcome]) -> str:
+def steps_table(steps: Sequence[StepOutcome], blocks: Sequence[BlockOutcome] = ()) -> str:
+    """A row for each step and block; what is in a block is indented."""
     rows = [
-        (
-            f"{PASS if step.outcome == 'done' else '-' if step.excused else FAIL} {_word(step)}{_tries(step)}",
-            step.id,
-            step.verb,
-            _seconds(step.started),
-            _seconds(step.ended),
-            _seconds(step.planned_duration),
-        )
-        for step in steps
+        (_marked(one), "  " * depth + one.id, _verb(one), _seconds(one.started), _seconds(one.ended), planned)
+        for depth, one in nested(steps, blocks)
+        for planned in (_seconds(one.planned_duration if isinstance(one, StepOutcome) else None),)
     ]
     return table(("step", "id", "verb", "started", "ended", "planned"), rows, right=("started", "ended", "planned"))
 
@@ -154,7 +165,7 @@ def steps_table(steps: Sequence[StepOutcome]) -> str:
 def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
     rows = [
         (
-            f"{PASS if expectation.outcome == 'passed' else '-' if not expectation.missed else FAIL} "
+            f"{PASS if expectation.outcome == 'passed' else FAIL if expectation.missed else '-'} "
             f"{expectation.outcome.replace('_', ' ')}",
             expectation.name,
             _margin(expectation),
@@ -169,6 +180,8 @@ def _margin(expectation: ExpectationOutcome) -> str:
     detail = f": {expectation.text}" if expectation.text else ""
     if expectation.outcome == "not_evaluated":
         return f"{'not evaluated' if expectation.excused else 'was never evaluated'}{detail}"
+    if expectation.outcome == "skipped":
+        return f"was not asked{detail}"
     passed = expectation.outcome == "passed"
     when = "" if expectation.at is None else f" ({'tightest' if passed else 'worst'} at {expectation.at:.2f} s)"
     if not expectation.distance:

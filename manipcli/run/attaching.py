@@ -7,7 +7,7 @@ from collections.abc import Callable
 from manipcli.model.holding import Holding
 from manipcli.plan.motion import Motion
 from manipcli.simulate.session import Session
-from manipcli.task.plan_task import PlannedStep
+from manipcli.task.plan_steps import PlannedStep
 
 Event = Callable[[str, PlannedStep, str, str], None]
 """Records an event: kind, step, outcome, text."""

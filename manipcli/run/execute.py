@@ -16,6 +16,7 @@ from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.from_motion import stopped
 from manipcli.record.write.recorder import Recorder
+from manipcli.run.blocks import BlockLoop
 from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
@@ -115,7 +116,7 @@ def _run_steps(
             session.restart_clock(observer)
             run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
             try:
-                run.steps()
+                BlockLoop(plan, run).run()
             finally:
                 for kind, counts in saturations_of(session).to_metadata().items():
                     recorder.metadata(kind, counts)
@@ -131,7 +132,7 @@ def _world(task: Task, plan: Plan, session: Session) -> World:
         start=session.engine.read().map(np.copy),
         physics=ENGINES[task.spec.simulation.engine].physics == "full",
         referenced=frozenset(name for c in session.manager.controllers if c.interfaces for name in c.joints),
-        steps=tuple(step.id for step in plan.steps),
+        steps=tuple(str(step.id) for step in task.spec.steps),
         period=task.spec.simulation.control_period,
     )
 

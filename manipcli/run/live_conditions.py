@@ -14,9 +14,10 @@ import numpy as np
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import absent, opened
 from manipcli.conditions.members import CONDITIONS
-from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.robustness import EDGE, Robustness
 from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
 from manipcli.control.controller import Controller, ControllerOutput
+from manipcli.core.units import readable
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
 from manipcli.run.run_log import recorded
@@ -63,6 +64,15 @@ class Probe:
             return self._word + self._last.idle
         found = self._last.found(len(self._last.margins) - 1)
         return f"it fails{found.lacking}: {self._word}{found.text}"
+
+    @property
+    def found(self) -> str:
+        """What was measured at the last tick: `it holds by 3 mm: near: 'cup' is ...`; `missing` if it fails."""
+        if not self.holds or self._last is None:
+            return self.missing
+        found = self._last.found(len(self._last.margins) - 1)
+        by = f" by {readable(found.margin, found.unit)}" if found.unit and found.margin > EDGE else ""
+        return f"it holds{by}: {self._word}{found.text}"
 
     def look(self, window: StateWindow, start: int) -> None:
         """Evaluate a window whose first tick has the number `start`, without ticks before the opening."""
@@ -123,13 +133,19 @@ class Live:
         self._contacts.append(Touching(self._time(tick), tuple(contacts)))
 
     def step_started(self, step: str) -> None:
-        """The next tick is the first of a step."""
-        if self._steps[step].started is None:
-            self._steps[step] = StepTime(step, self._time(self._next), None, "")
+        """The next tick is the first of a step, or of another attempt at it with the steps around it."""
+        before = self._steps[step]
+        if before.started is None or before.ended is not None:
+            began = self._time(self._next) if before.started is None else before.started
+            self._steps[step] = StepTime(step, began, None, "")
 
     def step_ended(self, step: str, outcome: str) -> None:
         """The last tick was the last of a step."""
         self._steps[step] = StepTime(step, self._steps[step].started, self._time(self._next), outcome)
+
+    def step_reset(self, step: str, *, skipped: bool) -> None:
+        """A step is to be done again, or its branch is not taken although it was done in an earlier attempt."""
+        self._steps[step] = StepTime(step, None if skipped else self._steps[step].started, None, "")
 
     def absent(self, spec: ConditionSpec) -> str | None:
         """Why a condition cannot be evaluated in this run, or None."""

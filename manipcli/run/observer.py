@@ -15,7 +15,7 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.record.write.contact_filter import ContactFilter
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.live_conditions import Live
-from manipcli.task.plan_task import PlannedStep
+from manipcli.task.plan_steps import PlannedStep
 
 FEEDBACK_PERIOD: Final = 0.05
 """[s] Period of recorded goal feedback, as of ROS action servers."""

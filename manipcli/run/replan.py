@@ -26,7 +26,7 @@ from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.source.tree import Plain
 from manipcli.spec.step import StepSpec
-from manipcli.task.plan_task import plan_step
+from manipcli.task.plan_steps import plan_step
 
 COMMANDED: Final = 1e-4
 """[rad or m] Largest distance of the start of a trajectory from the commanded position, without a jump."""

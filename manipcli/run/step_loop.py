@@ -1,127 +1,58 @@
-"""The loop over the steps of a task, with re-planning and retries."""
+"""Steps of a running task: attempts, two steps at once, choices and waits; `blocks` decides what comes next."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
-from itertools import islice
 from typing import Final
 
-from manipcli.control.action import GoalHandle
-from manipcli.core.errors import NotPlannable, SimulationFailed
-from manipcli.core.stopwatch import Stopwatch
-from manipcli.judge.verdict import StepOutcome
-from manipcli.model.collision import Carried
-from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
-from manipcli.model.state import WorldState
-from manipcli.plan.motion import Motion, PlanningState
-from manipcli.record.write.recorder import Recorder
-from manipcli.run.attaching import Attaching
+from manipcli.core.errors import NotPlannable
+from manipcli.judge.verdict import StepOutcome, StepWord
+from manipcli.plan.block_tree import Unit
+from manipcli.plan.motion import PlanningState
 from manipcli.run.effort_shortage import effort_shortage
-from manipcli.run.grasp_margin import GraspMargin
-from manipcli.run.live_conditions import Live, Probe
-from manipcli.run.monitors import Monitors
-from manipcli.run.observer import Progress
-from manipcli.run.replan import Measured, after
 from manipcli.run.restore import RESUMED
-from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import not_placed, not_poured, not_squeezed
-from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
-from manipcli.simulate.session import SLOW, Session
-from manipcli.spec.reactions import ReplanSpec
+from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, StepAttempt, missing
+from manipcli.simulate.executor import DONE, Alarmed, Lane, MotionEnd
+from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
-from manipcli.task.plan_task import Plan, PlannedStep
-from manipcli.task.task import Task
+from manipcli.task.plan_steps import PlannedStep, plan_units
 
-DEFAULT_UNTIL_TIME: Final = 30.0
-"""[s] Timeout of an `until` on a step without `timeout`."""
-SQUEEZED: Final = 0.3
-"""[s] Within this time after the hand closed, it presses on its object from opposite sides."""
+ASKED: Final = 0.2
+"""[s] The robot holds still for this time before a choice; its condition counts at the end of it."""
 AFTERMATH: Final = 0.6
 """[s] Simulated after the last step, so that `at_rest` can be judged."""
 
 
-class StepLoop:
-    """One pass over the steps.
+class StepLoop(StepAttempt):
+    """Does single steps and pairs of steps; see `StepAttempt` for the arguments."""
 
-    Args:
-        task, plan: to run.
-        session: the world, at time 0.
-        recorder: receives all events.
-        live: evaluates the conditions that steps wait for; receives starts and ends of steps.
-        progress: receives steps and unplanned events.
-        on_goal: called with every goal, see `Executor`.
-        replanning: stopwatch of re-planning.
-    """
+    def resume(self, first: PlannedStep) -> None:
+        """Before the `first` step of a part of a task that begins in a recorded state: let the forces return."""
+        if self._task.part.state is None:
+            return
+        self._attaching.resumed(first)
+        with suppress(Alarmed):
+            self._executor.hold(RESUMED)
 
-    def __init__(
-        self,
-        task: Task,
-        plan: Plan,
-        session: Session,
-        recorder: Recorder,
-        live: Live,
-        progress: Progress,
-        *,
-        on_goal: Callable[[str, GoalHandle], None],
-        replanning: Stopwatch,
-    ) -> None:
-        self._task = task
-        self._live = live
-        self._plan = plan
-        self._session = session
-        self._recorder = recorder
-        self._progress = progress
-        self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
-        self._monitors = Monitors(task.spec.watch, task.spec.expect, live)
-        self._executor = Executor(session, touch=self._physics, on_goal=on_goal, alarm=self._look)
-        replan = task.spec.replan
-        self._replans = replan is not False
-        self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
-        limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
-        self._measured = Measured(session, plan.planner, limits, physics=self._physics)
-        self._grasp_margin = GraspMargin(task.true.robot, task.true.scene)
-        self._believed = plan.start
-        self._replanning = replanning
-        self._failed = False
-        self._over = False
-        self._at: PlannedStep | None = None
-        self._attaching = Attaching(session, self._event)
+    def step(self, planned: PlannedStep, limit: float | None = None) -> StepOutcome:
+        """All attempts at a step. A broken watch ends the step at once; the stopping motion follows the step.
 
-    def steps(self) -> None:
-        """Run all steps in order, until a step fails without being tolerated, or a watch is broken."""
-        total = len(self._plan.steps)
-        planned_start, part = self._plan.start, self._task.part
-        if part.state is not None:  # let the forces return
-            self._attaching.resumed(self._plan.steps[part.first])
-            with suppress(Alarmed):
-                self._executor.hold(RESUMED)
-        every = enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True))
-        for index, (step, planned) in islice(every, part.first, part.last):
-            self._progress.step_started(planned, index, total)
-            outcome = self._step(index, step, planned, planned_start)
-            self._progress.step_ended(outcome)
-            if outcome.outcome != "done" and not outcome.tolerated:
-                break
-            planned_start = planned.plan.end
-        self._at = None
-        try:
-            self._executor.hold(AFTERMATH)
-        except Alarmed:
-            self._executor.stop()
-
-    def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: PlanningState) -> StepOutcome:
-        """All attempts at a step. A broken watch ends the step at once; the stopping motion follows the step."""
+        Args:
+            planned: the step.
+            limit: [s] simulated time at which it times out, besides its own `timeout`; None without one.
+        """
+        index = planned.index
+        step = self._task.spec.steps[index]
+        self._progress.step_started(planned, index, len(self._task.spec.steps))
+        planned_start = planned.start
         began = ended = self._session.time
         retry = step.retry
         attempts = 1 if retry is None else 1 + retry.retry
         end = DONE
-        self._at = planned
-        self._live.step_started(planned.id)
-        self._monitors.step_started(planned.id)
+        self._begin(planned)
         for attempt in range(1, attempts + 1):
             if attempt > 1:
                 changed = retried(self._task.file, index)
@@ -129,27 +60,203 @@ class StepLoop:
                     planned = replace(planned, grasps=())  # they belong to the unchanged step
                 step = changed
             self._event("step_started", planned, "", self._nth(step, attempt, attempts))
-            end = self._attempt(step, planned, planned_start, retry=attempt > 1)
-            if end.outcome == "done" or attempt == attempts or not self._may_go_on:
+            lane = self._attempt(step, planned, planned_start, retry=attempt > 1, limit=limit)
+            (end,) = self._executor.together(lane)
+            last = attempt == attempts or self.over(limit)
+            if end.outcome == "done" or last or not self.may_go_on:
                 end = self._closed(planned, end)
             ended = self._session.time
-            if end.outcome != "done" and self._physics:
-                short = effort_shortage(self._session, self._task.scene.gravity)
-                end = replace(end, text=f"{short}; {end.text}") if short else end
-            self._event("step_ended", planned, end.outcome, end.text)
-            if end.outcome == "done" or not self._may_go_on:
+            end = self._ended(planned, end)
+            if end.outcome == "done" or not self.may_go_on:
                 break
-            self._failed = True
-            if attempt < attempts:
+            self.failed = True
+            if not last:
                 self._report(f"{end.outcome}: {end.text}; retrying", detail=False)
-            if attempt < attempts or step.may_fail:
+            if not last or step.may_fail:
                 self._executor.stop()
+            if last:
+                break
+        return self._outcome(step, planned, began, ended, end)
+
+    def pair(self, both: Sequence[PlannedStep], limit: float | None = None) -> tuple[StepOutcome, ...]:
+        """Two steps at the same time, each with one attempt; both end before this returns."""
+        steps = [self._task.spec.steps[planned.index] for planned in both]
+        began, now = self._session.time, self._measured.situation(self._believed)
+        differences = self._measured.differences(both[0].start, now, steps[0])
+        refusal, replanned = "", self.failed or (self._replans and bool(differences))
+        if replanned:
+            try:
+                both = self.planned([tuple(planned.index for planned in both)], now)
+            except NotPlannable as refused:
+                refusal = f"re-planning from the measured state failed: {refused}"
+        for planned in both:
+            self._progress.step_started(planned, planned.index, len(self._task.spec.steps))
+            self._begin(planned)
+            self._event("step_started", planned, "", "")
+            if replanned:
+                self._event("replanned", planned, "", "; ".join(differences) or "the previous step failed")
+        self.failed = False
+
+        def lane(k: int) -> Lane[tuple[MotionEnd, float]]:
+            executor = self._executor.beside if k else self._executor
+            if refusal:
+                end = MotionEnd("failed", refusal)
+            else:
+                end = yield from self._guarded(both[k], self._motions(steps[k], both[k], now, executor, limit))
+            end = self._ended(both[k], self._closed(both[k], end))
+            return end, self._session.time
+
+        ends = self._executor.together(*map(lane, range(len(both))))
+        if all(end.outcome == "done" for end, _ in ends):
+            self._believed = both[0].plan.end
+        else:
+            self.failed = True
+            self._executor.stop()
+        return tuple(
+            self._outcome(step, planned, began, at, end)
+            for step, planned, (end, at) in zip(steps, both, ends, strict=True)
+        )
+
+    def ask(self, condition: ConditionSpec) -> tuple[bool, str] | MotionEnd:
+        """Whether a condition holds while the robot rests, with its margin and what was measured; or why not asked."""
+        absent = self._live.absent(condition)
+        if absent is not None:
+            return MotionEnd("failed", f"the condition cannot be evaluated: {absent}")
+        probe = self._live.open(condition)
+        try:
+            self._executor.hold(ASKED)
+            return probe.holds, probe.found
+        except Alarmed as alarm:
+            self._executor.stop()
+            return MotionEnd("failed", f"stopped: {alarm}")
+        finally:
+            self._live.close(probe)
+
+    def wait(self, condition: ConditionSpec, limit: float | None) -> MotionEnd:
+        """Wait until a condition holds, for `DEFAULT_UNTIL_TIME` or until `limit` [s]."""
+        if self._live.absent(condition) is not None:
+            return DONE
+        probe = self._live.open(condition)
+        try:
+            deadline = self._session.time + DEFAULT_UNTIL_TIME if limit is None else limit
+            end = self._executor.wait(lambda _: probe.holds, deadline=deadline)
+            return end if end.outcome == "done" else replace(end, text=end.text + missing(end, probe))
+        except Alarmed as alarm:
+            self._executor.stop()
+            return MotionEnd("failed", f"stopped: {alarm}")
+        finally:
+            self._live.close(probe)
+
+    def planned(self, units: Sequence[Unit], now: PlanningState | None = None) -> tuple[PlannedStep, ...]:
+        """Steps planned together from the measured state.
+
+        Raises:
+            NotPlannable: one of them has no plan.
+        """
+        with self._replanning:
+            now = self._measured.situation(self._believed) if now is None else now
+            solved = plan_units(self._task.known, self._plan.planner, units, now)
+        self.failed = False
+        return tuple(step for steps in solved.steps for step in steps)
+
+    def over(self, limit: float | None) -> bool:
+        """Whether a time limit [s] is reached."""
+        return limit is not None and self._session.time >= limit
+
+    def stop(self) -> None:
+        """Bring the robot to rest after a failure; the next step is re-planned."""
+        self.failed = True
+        self._executor.stop()
+
+    def begin_again(self, indices: Sequence[int]) -> None:
+        """These steps are not done yet in the next attempt at their block."""
+        for index in indices:
+            self._live.step_reset(str(self._task.spec.steps[index].id), skipped=False)
+
+    def let_go(self) -> bool:
+        """Plan from now on as if the hand held nothing; whether it held something."""
+        held = self._believed.carried is not None
+        self._believed = replace(self._believed, carried=None)
+        return held
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._session.time
+
+    def block_event(self, kind: str, index: int, outcome: str, text: str) -> None:
+        """Record an event of a block, and show the branch that is taken."""
+        block = self._task.spec.blocks[index]
+        self._recorder.event(
+            self._session.ticks, kind=kind, step=block.id, verb=block.word, outcome=outcome, text=text,
+            place=self._task.log_place("blocks", index),
+        )  # fmt: skip
+        if kind == "branch" or (kind == "block_ended" and outcome != "done" and text):
+            self._report(f"{block.word} '{block.id}': {outcome}: {text}", detail=False)
+
+    def skipped(self, index: int, reason: str) -> StepOutcome:
+        """A step of the branch that is not taken."""
+        self._live.step_reset(str(self._task.spec.steps[index].id), skipped=True)
+        return self._unreached(index, "step_skipped", "skipped", reason)
+
+    def tolerated(self, index: int, reason: str) -> None:
+        """A step that failed or was not reached, and whose block tolerates that."""
+        self._unreached(index, "step_tolerated", "", reason)
+
+    def refused(self, index: int, reason: str) -> StepOutcome:
+        """A step that has no plan when it is reached."""
+        step = self._task.spec.steps[index]
+        self._live.step_started(str(step.id))
+        self._unreached(index, "step_started", "", "")
+        outcome = self._unreached(index, "step_ended", "failed", f"no plan from the measured state: {reason}")
+        self._live.step_ended(str(step.id), "failed")
+        if step.may_fail:
+            self.tolerated(index, "on_fail: continue")
+            outcome = replace(outcome, tolerated=True)
+        self.stop()
+        self._progress.step_ended(outcome)
+        return outcome
+
+    def _unreached(self, index: int, kind: str, outcome: str, text: str) -> StepOutcome:
+        """Record an event of a step without a plan."""
+        step, now = self._task.spec.steps[index], self._session.time
+        self._recorder.event(
+            self._session.ticks, kind=kind, step=str(step.id), verb=step.verb, outcome=outcome, text=text,
+            place=self._task.log_place("steps", index),
+        )  # fmt: skip
+        word: StepWord = "skipped" if outcome == "skipped" else "failed"
+        return StepOutcome(str(step.id), step.verb, word, now, now, None, text)
+
+    def finish(self) -> None:
+        """The time after the last step."""
+        self._at = None
+        try:
+            self._executor.hold(AFTERMATH)
+        except Alarmed:
+            self._executor.stop()
+
+    def _begin(self, planned: PlannedStep) -> None:
+        self._at = planned
+        self._live.step_started(planned.id)
+        self._monitors.step_started(planned.id)
+        if planned.plan.duration != self._plan.listed[planned.index].planned_duration:
+            self._event("step_planned", planned, "", repr(planned.plan.duration))
+
+    def _ended(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
+        """The end of an attempt, recorded; with the joints that lack effort, if it failed."""
+        if end.outcome != "done" and self._physics:
+            short = effort_shortage(self._session, self._task.scene.gravity)
+            end = replace(end, text=f"{short}; {end.text}") if short else end
+        self._event("step_ended", planned, end.outcome, end.text)
+        return end
+
+    def _outcome(self, step: StepSpec, planned: PlannedStep, began: float, ended: float, end: MotionEnd) -> StepOutcome:
         if self._over:
             self._executor.stop()
-        tolerated = end.outcome != "done" and step.may_fail and self._may_go_on
+        tolerated = end.outcome != "done" and step.may_fail and self.may_go_on
         if tolerated:
             self._event("step_tolerated", planned, "", "on_fail: continue")
-        return StepOutcome(
+        outcome = StepOutcome(
             id=planned.id,
             verb=planned.verb,
             outcome=end.outcome,
@@ -159,6 +266,8 @@ class StepLoop:
             text=end.text,
             tolerated=tolerated,
         )
+        self._progress.step_ended(outcome)
+        return outcome
 
     def _closed(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
         """The end of a step; a failure if its last ticks, which are evaluated only now, break a watch."""
@@ -171,36 +280,6 @@ class StepLoop:
         before = f"; before that: {end.outcome}: {end.text}" if end.outcome != "done" else ""
         return MotionEnd("failed", f"stopped: {broken}{before}")
 
-    def _look(self, state: WorldState) -> str:
-        """At every tick: update the grasp and return the alarm."""
-        if self._physics and self._session.ticks % SLOW == 0:
-            self._measured.grasp.look(state, self._session.touching)
-        self._attaching.look(self._at)
-        return self._alarm(state) if self._task.spec.watch else ""
-
-    @property
-    def _may_go_on(self) -> bool:
-        """Whether a retry or `on_fail: continue` is possible: no broken watch and no controller fault."""
-        return not self._over and not self._session.manager.faults
-
-    def _alarm(self, _: WorldState) -> str:
-        """The first broken watch, recorded as an event; "" without one."""
-        broken = None if self._over else self._monitors.broken
-        if broken is None:
-            return ""
-        self._over = True
-        at = self._at
-        self._recorder.event(
-            self._session.ticks,
-            kind="watch_broken",
-            step="" if at is None else at.id,
-            verb="" if at is None else at.verb,
-            outcome="failed",
-            text=broken.text,
-            place=self._task.log_place("watch", broken.index),
-        )
-        return broken.text
-
     def _nth(self, step: StepSpec, attempt: int, attempts: int) -> str:
         """`attempt 2 of 3, with tilt = 140 deg`; "" if there is only one attempt."""
         if attempts == 1:
@@ -208,193 +287,3 @@ class StepLoop:
         changed = {} if step.retry is None or attempt == 1 else step.retry.with_
         values = ", ".join(f"{name} = {value}" for name, value in changed.items())
         return f"attempt {attempt} of {attempts}{f', with {values}' if values else ''}"
-
-    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: PlanningState, *, retry: bool) -> MotionEnd:
-        """One attempt, re-planned on `retry`, after a failed step, or if the measured state differs from the plan."""
-        before = saturations_of(self._session)
-        now = self._measured.situation(self._believed)
-        if retry and planned_start.carried is None and planned.plan.end.carried is not None:
-            now = replace(now, carried=None)  # a retried grasp may start with the hand closed on its object
-        differences = self._measured.differences(planned_start, now, step)
-        replanned = retry or self._failed or (self._replans and bool(differences) and _moves(planned))
-        if replanned:
-            try:
-                with self._replanning:
-                    plan, now, note = self._measured.plan(step, planned_start, now, planned.grasps)
-                poured = plan.poured or planned.plan.poured  # what the cup should hold, even if that is lost
-                planned = replace(planned, plan=replace(plan, poured=poured, into=plan.into or planned.plan.into))
-            except NotPlannable as refusal:
-                self._believed = now
-                forced = retry or self._failed or self._guards
-                text = self._measured.refused(planned_start, now, refusal.cause, step, forced=forced)
-                return MotionEnd("failed", text)
-            why = "; ".join(differences) or ("retry" if retry else "the previous step failed")
-            why += note
-            self._event("replanned", planned, "", why)
-            self._report(f"re-planned: {why}", detail=True)
-            self._failed = False
-        try:
-            end = self._motions(step, planned, now)
-        except Alarmed as alarm:
-            return MotionEnd("failed", f"stopped: {alarm}")
-        except SimulationFailed as failure:
-            text = str(failure) + saturated_since(before, self._session)
-            self._event("step_ended", planned, "failed", text)
-            raise
-        if end.outcome == "done":
-            return end
-        found = "" if replanned or not differences else f"; at its start {'; '.join(differences)}"
-        return MotionEnd(end.outcome, end.text + found + saturated_since(before, self._session))
-
-    def _motions(self, step: StepSpec, planned: PlannedStep, before: PlanningState) -> MotionEnd:
-        """All motions of the plan, which starts in `before`, and the wait for `until`."""
-        deadline = None if step.timeout is None else self._session.time + step.timeout
-        if before.carried is not None and self._physics:
-            self._measured.grasp.begin_step(before.carried, self._session.engine.read(), self._session.touching)
-        texts = []
-        with self._awaited(step) as probe:
-            until: Until | None = None if probe is None else lambda _: probe.holds
-            awaited = until is not None
-            for k, motion in enumerate(planned.plan.motions):
-                self._event("phase_started", planned, "", motion.label)
-                self._believed = after(planned.plan, before, done=k)
-                if motion.opens and before.carried is not None and k > 0:
-                    left = self._left_behind(before.carried)
-                    if left is not None:
-                        return left
-                self._attaching.before(motion, planned)
-                over = deadline
-                if motion.awaits and until is not None and over is None:
-                    over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
-                end = self._executor.run(motion, until=until, deadline=over)
-                if end.outcome != "done":
-                    held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
-                    text = f"{motion.label}: {end.text}{_missing(end, probe)}{f'; {held}' if held else ''}"
-                    return MotionEnd(end.outcome, text)
-                missed = self._attaching.after(motion, planned)
-                if missed:
-                    return MotionEnd("failed", missed)
-                if motion.closes and planned.plan.end.carried is not None:
-                    self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
-                    self._take(planned.plan.end.carried)
-                    if loose := self._loose(motion, planned.plan.end.carried.body):
-                        return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
-                if end.weak:
-                    self._report(f"{motion.label}: {end.text}", detail=False)
-                awaited = awaited and not motion.awaits
-                texts += [end.text + _no_longer(motion, probe)] if end.text else []
-            self._believed = planned.plan.end
-            if awaited and until is not None:
-                if deadline is None:
-                    deadline = self._session.time + DEFAULT_UNTIL_TIME
-                end = self._executor.wait(until, deadline=deadline)
-                if end.outcome != "done":
-                    return replace(end, text=end.text + _missing(end, probe))
-        held = self._still_held(before) if planned.plan.end.carried is None else ""
-        if held:
-            return MotionEnd("failed", held)
-        if planned.plan.end.carried is None:
-            self._measured.grasp.release()
-        left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
-        left = left or self._without_result(step, planned)
-        return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
-
-    @contextmanager
-    def _awaited(self, step: StepSpec) -> Iterator[Probe | None]:
-        """The open probe of the step's `until`; None without `until`, or if the engine cannot evaluate it."""
-        if step.until is None or self._live.absent(step.until) is not None:
-            yield None
-            return
-        probe = self._live.open(step.until)
-        try:
-            yield probe
-        finally:
-            self._live.close(probe)
-
-    def _take(self, carried: Carried) -> None:
-        """The hand has closed on an object."""
-        if self._physics:
-            self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
-
-    def _loose(self, motion: Motion, body: str) -> str:
-        """Why the closed hand does not hold an object, up to `SQUEEZED` after it closed; "" where it does."""
-        if not self._physics or motion.grip is None or not motion.grip.must_hold or self._attaching.holding is not None:
-            return ""
-
-        def squeezed(_: object) -> bool:
-            return squeeze_force(self._session.touching, body) >= GRIP_FORCE
-
-        if squeezed(None) or self._executor.wait(squeezed, deadline=self._session.time + SQUEEZED).outcome == "done":
-            return ""
-        return not_squeezed(self._session.touching, body)
-
-    def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
-        """A failure if the hand does not carry the planned object; None if it does."""
-        if carried is None or not self._physics:
-            return None
-        why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
-        if not why:
-            return None
-        text = f"the hand does not carry '{carried.body}': {why}"
-        if self._attaching.holding is not None:
-            return MotionEnd("failed", text)
-        grasp = self._grasp_margin.summary(carried.body)
-        text += "; it slipped or was never held"
-        return MotionEnd("failed", f"{text}{f'; {grasp}' if grasp else ''}")
-
-    def _short_of_plan(self, planned: PlannedStep, before: PlanningState) -> MotionEnd | None:
-        """A failure where the object in the hand did not follow the planned motion; a guarded step may end early."""
-        carried, end = before.carried, planned.plan.end
-        if carried is None or end.carried is None or not self._physics:
-            return None
-        if any(motion.guarded for motion in planned.plan.motions):
-            return None
-        planner = self._plan.planner
-        motion = planner.tool_pose(end).p - planner.tool_pose(before).p
-        why = self._measured.grasp.short_of(motion, self._session.engine.read())
-        return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
-
-    def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
-        """A failure where an object is not where the step places or pours it; `until` may define another pour."""
-        plan, planner = planned.plan, self._plan.planner
-        if not self._physics or not (plan.placed or plan.poured):
-            return None
-        now = self._measured.situation(replace(plan.end, carried=None))
-        why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
-        return MotionEnd("failed", why) if why else None
-
-    def _still_held(self, before: PlanningState) -> str:
-        """Which links still hold the object that was carried `before`; "" if it was released."""
-        if before.carried is None or not self._physics:
-            return ""
-        body = before.carried.body
-        if pinch_force(self._session.touching, body) < GRIP_FORCE:
-            return ""
-        self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
-        (_, first), (_, second), *_ = pressing(self._session.touching, body)
-        return f"the hand still holds '{body}', between '{first}' and '{second}'"
-
-    def _report(self, text: str, *, detail: bool) -> None:
-        self._progress.message(text, detail=detail)
-
-    def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
-        self._recorder.event(
-            self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
-        )
-
-
-def _moves(planned: PlannedStep) -> bool:
-    """Whether a step has motions that depend on the state."""
-    return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
-
-
-def _missing(end: MotionEnd, probe: Probe | None) -> str:
-    """By how much `until` fails, if the motion ended for it; else ""."""
-    missing = probe.missing if probe is not None and end.awaited else ""
-    return f"; at the end {missing}" if missing else ""
-
-
-def _no_longer(motion: Motion, probe: Probe | None) -> str:
-    """By how much the `until` of a guarded motion fails at rest, after a bounce; "" if it holds."""
-    missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
-    return f"; at rest {missing}" if missing else ""

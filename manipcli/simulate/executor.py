@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from functools import partial
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.control.trajectory_goal import TrajectoryGoal
-from manipcli.core.errors import InvalidArgument
+from manipcli.core.errors import InvalidArgument, SimulationFailed
 from manipcli.core.geometry import Array, wrapped
 from manipcli.model.state import WorldState
 from manipcli.plan.motion import OPENING, GoalTolerances, Grip, Motion
@@ -24,6 +26,10 @@ Until = Callable[[WorldState], bool]
 """Whether the condition that a step waits for holds in a state."""
 Alarm = Callable[[WorldState], str]
 """Maps the state of a tick to the reason for an immediate stop; empty if there is none."""
+
+T = TypeVar("T")
+Lane = Generator[None, WorldState, T]
+"""An activity that is sent the state of each tick, and returns how it ended."""
 
 UNTIL_TICKS: Final = SLOW
 """Control ticks between two evaluations of an `until`."""
@@ -61,7 +67,7 @@ class Alarmed(Exception):
 
 
 class Executor:
-    """Executes motions one after the other.
+    """Executes motions one after the other, and those of several executors of a session together.
 
     Args:
         session: what is stepped.
@@ -84,8 +90,51 @@ class Executor:
         self._alarm = alarm
         self._handles: tuple[GoalHandle, ...] = ()
         self._serving: tuple[Follower | Hand, ...] = ()
+        self._beside: Executor | None = None
+
+    @property
+    def beside(self) -> Executor:
+        """Another executor for a motion at the same time; `stop` of this one stops it, too."""
+        if self._beside is None:
+            self._beside = Executor(self._session, touch=self._touch, on_goal=self._on_goal)
+        return self._beside
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
+        """See `running`."""
+        (end,) = self.together(self.running(motion, until=until, deadline=deadline))
+        return end
+
+    def wait(self, until: Until, *, deadline: float) -> MotionEnd:
+        """Hold still until the condition holds."""
+        (end,) = self.together(self.waiting(until, deadline=deadline))
+        return end
+
+    def together(self, *lanes: Lane[T]) -> tuple[T, ...]:
+        """Tick until all lanes have ended. An alarm, and a failure of the simulation, is raised in each of them."""
+        ends: dict[int, T] = {}
+
+        def advance(k: int, step: Callable[[], None]) -> None:
+            try:
+                step()
+            except StopIteration as end:
+                ends[k] = end.value
+
+        for k, lane in enumerate(lanes):
+            advance(k, partial(next, lane))
+        while len(ends) < len(lanes):
+            active = [(k, lane) for k, lane in enumerate(lanes) if k not in ends]
+            try:
+                state = self._tick()
+            except (Alarmed, SimulationFailed) as stop:
+                with ExitStack() as every:  # all of them, also after one that raises it again
+                    for k, lane in reversed(active):
+                        every.callback(advance, k, partial(lane.throw, stop))
+                continue
+            for k, lane in active:
+                advance(k, partial(lane.send, state))
+        return tuple(ends[k] for k in range(len(lanes)))
+
+    def running(self, motion: Motion, *, until: Until | None, deadline: float | None) -> Lane[MotionEnd]:
         """Send the motion's goals and tick until all are reached and its duration has passed.
 
         Args:
@@ -108,7 +157,7 @@ class Executor:
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
         while True:
-            state = self._tick()
+            state = yield
             for handle in handles:
                 if handle.result is not None and handle.result.status != "succeeded":
                     self._cancel()
@@ -122,7 +171,7 @@ class Executor:
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
-                self._come_to_rest()
+                yield from self._come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
@@ -144,10 +193,10 @@ class Executor:
                 self._cancel()
                 return MotionEnd("timeout", late)
 
-    def wait(self, until: Until, *, deadline: float) -> MotionEnd:
+    def waiting(self, until: Until, *, deadline: float) -> Lane[MotionEnd]:
         """Hold still until the condition holds."""
         while self._session.time < deadline:
-            state = self._tick()
+            state = yield
             if self._session.manager.faults:
                 return _fault(self._session)
             looks = self._session.ticks % UNTIL_TICKS == 0 or self._session.time >= deadline
@@ -163,24 +212,27 @@ class Executor:
     def stop(self) -> None:
         """Cancel goals, let the joints stop within their limits, and hold still until they rest; alarms are ignored."""
         self._cancel()
+        if self._beside is not None:
+            self._beside._cancel()
         for _ in range(self._ticks(REST)):
             self._session.tick()
         while self._moving and not self._session.manager.faults:  # a stop with a low limit takes longer
             self._session.tick()
 
-    def _come_to_rest(self) -> None:
+    def _come_to_rest(self) -> Lane[None]:
         """Cancel active goals, and tick until all references rest, or a controller fails."""
         self._cancel()
-        self._tick()
+        yield
         faults = self._session.manager.faults
         while not faults and self._moving:
-            self._tick()
+            yield
             faults = self._session.manager.faults
 
     @property
     def _moving(self) -> bool:
         """Whether a reference of the last motion moves."""
-        return any(controller.output.velocity.any() for controller in self._serving)
+        serving = self._serving if self._beside is None else (*self._serving, *self._beside._serving)
+        return any(controller.output.velocity.any() for controller in serving)
 
     def _ticks(self, duration: float) -> int:
         """The number of ticks in `duration` [s]."""

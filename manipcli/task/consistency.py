@@ -35,6 +35,7 @@ from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.agree_limits import unusable_limits
+from manipcli.task.block_checks import BranchClaims, parallel_problems, planned_in_the_run
 from manipcli.task.held_objects import impossible_steps
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged
@@ -77,7 +78,7 @@ def disagreements(
     if controllers and controllers.source.untouched() and not misclaimed:
         claims = Claims.of(controllers.spec, controllers.place)
     found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
-    warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task))
+    warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task), *planned_in_the_run(task))
     impossible = () if found or task.source.kept else tuple(_impossible(task, scene))
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
@@ -103,7 +104,8 @@ def not_there(
     )
     of_steps = [*_of_steps(spec, context, claims)]
     of_steps += _of_blocks(spec, context)
-    for number, loc, p in (*of_steps, *_of_expectations(spec, context)):
+    parallel = () if kept or of_steps else parallel_problems(spec, robot, claims)
+    for number, loc, p in (*of_steps, *parallel, *_of_expectations(spec, context)):
         yield task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
     yield from _in_dropped(task, context)
     for k in range(0 if kept else len(spec.steps)):
@@ -122,9 +124,11 @@ def not_there(
 
 
 def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
-    """Problems of each step and its `until`; a switch of controllers changes the claims of later steps."""
+    """Problems of each step and its `until`; a switch of controllers changes the claims of later steps on its path."""
     robot = context.robot
+    branches = BranchClaims(spec.blocks)
     for k, step in enumerate(spec.steps):
+        claims = branches.before(k, claims)
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, context.scene)
         if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):

@@ -2,112 +2,155 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.core.work import WorkSpent
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
-from manipcli.plan.candidates import SPENT, Candidates, Dropped, first
+from manipcli.plan.block_tree import Item, Outcomes, Unit, block_tree, clipped, named
+from manipcli.plan.branches import Solved, plan_branches
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.clearance import StatedClearance, least_clearance, stated_clearances
-from manipcli.plan.cost import step_cost
 from manipcli.plan.grasp_margin import GraspMargin, grasp_margin
 from manipcli.plan.hand import SPEED, closing_speed
-from manipcli.plan.motion import Motion, PlanningState, StepPlan
+from manipcli.plan.motion import Motion, PlanningState
 from manipcli.plan.motion_margins import MotionMargins, motion_margins
-from manipcli.plan.outline import PlanOutline, StepOutline
+from manipcli.plan.outline import BlockOutline, PlanOutline, StepOutline
 from manipcli.plan.part_pairs import expanded_pairs
 from manipcli.plan.path_kind import path_kind
 from manipcli.plan.planner import Planner
 from manipcli.plan.search_budget import SearchBudget
-from manipcli.plan.search_progress import SearchProgress
-from manipcli.plan.steps import STEPS
-from manipcli.plan.task_search import search_task
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.plan.why_not import explained
 from manipcli.record.start_state import StartState
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.keep import KeepSpec
 from manipcli.spec.planner import PlannerSpec
-from manipcli.spec.step import StepSpec
-from manipcli.task.part import Part
+from manipcli.task.part import WHOLE
+from manipcli.task.plan_steps import PlannedStep, plan_units
 from manipcli.task.restored import restored_start
 from manipcli.task.task import Task
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedStep:
-    """A step and its plan.
-
-    Attributes:
-        id, verb: of the step.
-        plan: of its candidate.
-        place: file:line:column.
-        grasps: excluded tool orientations R_WT (3, 3), after which a later step has no plan.
-        candidate: name of the candidate; "" for the only way.
-        dropped: the candidates that were tried before it.
-        keep: of the step.
-    """
-
-    id: str
-    verb: str
-    plan: StepPlan
-    place: str
-    grasps: tuple[Array, ...] = ()
-    candidate: str = ""
-    dropped: tuple[Dropped, ...] = ()
-    keep: tuple[KeepSpec, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class PlannedMotion:
-    """One motion of one step, for tables and files."""
+    """One motion of one step, for tables and files; `branch`: the outcomes before it, `if_1: else`; `beside`: its step
+    is done at the same time as the one before."""
 
     step_id: str
     verb: str
     label: str
     trajectory: JointTrajectory | None
     duration: float
+    branch: str = ""
+    beside: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The plan of a task; steps that the run does not do have no motions.
+    """The plan of a task, or of the part of it that is run.
 
-    `planner` re-plans steps from measured states; `judged`: places of expectations and watches, for the log; `effort`:
-    the least `plan: {effort: ...}` with which it is found.
+    Attributes:
+        steps: in order, with `then` at every choice, up to the first that is planned during the run.
+        start: the state before them.
+        planner: re-plans steps from measured states.
+        judged: places of expectations and watches, for the log.
+        branches: the steps of every stretch that is planned before the run, by the outcomes of the choices before it.
+        items: the steps and blocks that are run.
+        branch: the outcomes that lead to `steps`, in words; "" for the path with `then` at every choice.
+        listed: every step of the task for the log, in the order of the file.
+        blocks: the same for blocks.
+        effort: the least `plan: {effort: ...}` with which it is found.
     """
 
     steps: tuple[PlannedStep, ...]
     start: PlanningState
     planner: Planner
     judged: tuple[str, ...] = ()
+    branches: Mapping[Outcomes, tuple[PlannedStep, ...]] = field(default_factory=dict)
+    items: tuple[Item, ...] = ()
+    branch: str = ""
+    listed: tuple[StepOutline, ...] = ()
+    blocks: tuple[BlockOutline, ...] = ()
     effort: float = 0.0
 
     @property
+    def every(self) -> tuple[PlannedStep, ...]:
+        """Every planned step once, in the order of the file: on the first path on which it is done."""
+        found: dict[int, PlannedStep] = {}
+        for steps in (self.steps, *(self.branches[key] for key in sorted(self.branches, reverse=True))):
+            found = {step.index: step for step in steps} | found
+        return tuple(found[k] for k in sorted(found))
+
+    @property
+    def duration(self) -> float:
+        """Planned duration [s] of `steps`."""
+        total = last = 0.0
+        for step in self.steps:
+            total += max(0.0, step.plan.duration - last) if step.beside else step.plan.duration
+            last = step.plan.duration
+        return total
+
+    def along(self, outcomes: Outcomes) -> Plan:
+        """The same plan with the path of these outcomes as its `steps`, as far as it is planned."""
+        keys = [outcomes[:k] for k in range(len(outcomes) + 1)]
+        return replace(self, steps=tuple(step for key in keys for step in self.branches.get(key, ())))
+
+    @property
     def motions(self) -> tuple[PlannedMotion, ...]:
-        """All motions in order."""
+        """All motions of `steps` in order."""
         return tuple(
-            PlannedMotion(step.id, step.verb, motion.label, motion.trajectory, motion.duration)
+            PlannedMotion(
+                step.id, step.verb, motion.label, motion.trajectory, motion.duration, self.branch, step.beside
+            )
             for step in self.steps
             for motion in step.plan.motions
         )
 
+    @property
+    def stretches(self) -> tuple[Plan, ...]:
+        """A plan for the steps of each stretch, in the order of their outcomes, `then` first; one without choices."""
+        keys = sorted(self.branches, key=lambda key: [not outcome for outcome in key])
+        return tuple(replace(self, steps=self.branches[key], branch=named(self.items, key)) for key in keys)
+
+    @property
+    def combinations(self) -> tuple[Plan, ...]:
+        """A plan with the steps of each combination of outcomes, as far as it is planned."""
+        inner = {key[:-1] for key in self.branches if key}
+        keys = sorted((key for key in self.branches if key not in inner), key=lambda key: [not one for one in key])
+        return tuple(replace(self.along(key), branch=named(self.items, key)) for key in keys)
+
+    @property
+    def merged(self) -> Plan:
+        """The same plan with steps at the same time as one step, whose first motion also moves the hand."""
+        found: list[PlannedStep] = []
+        for step in self.steps:
+            if not step.beside:
+                found.append(step)
+                continue
+            arm, hand = sorted((found.pop(), step), key=lambda one: all(m.trajectory is None for m in one.plan.motions))
+            (grip, *_), (first, *rest) = hand.plan.motions, arm.plan.motions
+            both = replace(
+                first,
+                grip=grip.grip,
+                duration=max(first.duration, grip.duration),
+                lets_go=grip.lets_go,
+                label=f"{first.label}, {grip.label}",
+            )
+            plan = replace(arm.plan, motions=(both, *rest))
+            found.append(replace(arm, id=f"{arm.id}+{hand.id}", plan=plan, beside=False))
+        return replace(self, steps=tuple(found))
+
     def spans(self) -> tuple[tuple[Motion, PlanningState, PlanningState], ...]:
         """Each motion with the states before and after it."""
         found: list[tuple[Motion, PlanningState, PlanningState]] = []
-        before = self.start
         for step in self.steps:
-            found += spans(step.plan.motions, before, step.plan.end)
-            before = step.plan.end
+            found += spans(step.plan.motions, step.start, step.plan.end)
         return tuple(found)
 
     def clearances(self) -> tuple[CollisionHit | None, ...]:
@@ -120,7 +163,7 @@ class Plan:
 
     def grasps(self) -> tuple[tuple[str, GraspMargin], ...]:
         """Id of each step that ends with an object in the closed hand, and the margin of its grasp."""
-        found = ((step.id, grasp_margin(self.planner, step.plan)) for step in self.steps)
+        found = ((step.id, grasp_margin(self.planner, step.plan)) for step in self.every)
         return tuple((id_, margin) for id_, margin in found if margin is not None)
 
     def margins(self) -> tuple[MotionMargins, ...]:
@@ -138,13 +181,7 @@ class Plan:
     @property
     def outline(self) -> PlanOutline:
         """The plan as the log stores it."""
-        return PlanOutline(
-            tuple(
-                StepOutline(step.id, step.verb, step.place, step.plan.duration, step.plan.motions)
-                for step in self.steps
-            ),
-            self.judged,
-        )
+        return PlanOutline(self.listed, self.judged, self.blocks)
 
 
 def unplanned(task: Task) -> Plan:
@@ -169,10 +206,76 @@ def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None
     start = _start(task)
     if task.part.state is not None:
         start = _resumed(task, planner, start, task.part.state, on_progress)
-    judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
+    spec = task.spec
     budget = _budget(task, planner, deeper=deeper)
-    steps = _steps(task, planner, start, on_progress, budget)
-    return Plan(steps, start, planner, judged, effort=task.spec.plan.effort * budget.used)
+    items = block_tree(len(spec.steps), spec.blocks)
+    if task.part != WHOLE:
+        items = clipped(items, range(len(spec.steps))[task.part.first : task.part.last])
+    branches = _branches(task, planner, items, start, on_progress, budget)
+    judged = tuple(task.log_place(*key) for key in spec.judged_at)
+    plan = Plan((), start, planner, judged, branches, items, effort=spec.plan.effort * budget.used)
+    plan = plan.along(max(branches, key=lambda outcomes: (all(outcomes), len(outcomes))))
+    return replace(plan, listed=_listed(task, plan), blocks=_blocks(task))
+
+
+def _branches(
+    task: Task,
+    planner: Planner,
+    items: Sequence[Item],
+    start: PlanningState,
+    on_progress: Callable[[str], None],
+    budget: SearchBudget,
+) -> Mapping[Outcomes, tuple[PlannedStep, ...]]:
+    """The plans of all branches; see `plan_branches`."""
+
+    def solve(units: Sequence[Unit], before: PlanningState, outcomes: Outcomes) -> Solved[PlannedStep]:
+        own = planner
+        if not all(outcomes):  # other branches draw for themselves, so that they change nothing on the first path
+            own = planner.keeping(())
+            own.rng = np.random.default_rng(task.spec.simulation.seed)
+        where = named(items, outcomes)
+        return plan_units(task, own, units, before, on_progress=on_progress, branch=where, budget=budget)
+
+    return plan_branches(items, start, solve)
+
+
+def _budget(task: Task, planner: Planner, *, deeper: bool = False) -> SearchBudget:
+    """The budget of the search: larger where the task asks for more samples of each path."""
+    share = task.spec.plan.effort * max(1.0, task.spec.planner.samples / PlannerSpec().samples)
+    return SearchBudget(planner.kinematics.work, deeper=deeper, effort=share)
+
+
+def _resumed(
+    task: Task, planner: Planner, start: PlanningState, state: StartState, on_progress: Callable[[str], None]
+) -> PlanningState:
+    """The state in which a part of the task begins. Without physics, objects are where the steps before it put them in
+    the plan: the engine does not move them."""
+    if ENGINES[task.spec.simulation.engine].physics == "full":
+        return restored_start(state, planner)
+    items = clipped(block_tree(len(task.spec.steps), task.spec.blocks), range(task.part.first))
+    before = _branches(task, planner, items, start, on_progress, _budget(task, planner))
+    done = Plan((), start, planner, branches=before).along(max(before, key=lambda key: (all(key), len(key)))).steps
+    return replace(done[-1].plan.end if done else start, position=state.position, at_start=False)
+
+
+def _listed(task: Task, plan: Plan) -> tuple[StepOutline, ...]:
+    planned = {step.index: step for step in plan.every}
+    return tuple(
+        StepOutline(one.id, one.verb, one.place, one.plan.duration, one.plan.motions)
+        if (one := planned.get(k)) is not None
+        else StepOutline(str(step.id), step.verb, task.log_place("steps", k), None)
+        for k, step in enumerate(task.spec.steps)
+    )
+
+
+def _blocks(task: Task) -> tuple[BlockOutline, ...]:
+    return tuple(
+        BlockOutline(
+            block.id, block.kind, block.word, block.first, block.last, block.split, block.parent,
+            task.log_place("blocks", k),
+        )
+        for k, block in enumerate(task.spec.blocks)
+    )  # fmt: skip
 
 
 def spans(
@@ -218,29 +321,6 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
     )
 
 
-def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
-    """Plans one step, excluding `grasps`.
-
-    Raises:
-        NotPlannable: with the id of the step.
-    """
-    try:
-        with SearchBudget(planner.kinematics.work).searching():
-            return first(_candidates(planner, step, state), exclude=grasps)
-    except NotPlannable as refusal:
-        raise refusal.but(step=step.id) from refusal
-    except WorkSpent:
-        raise NotPlannable(SPENT, step=step.id) from None
-
-
-def _candidates(planner: Planner, step: StepSpec, state: PlanningState) -> Candidates:
-    planner = planner.keeping(step.keep)
-    if state.at_start:
-        planner.outside(state)
-    allowed = expanded_pairs(planner.robot, planner.scene, step.allow)
-    return STEPS[step.verb].ways(step.body, planner, state, allowed)
-
-
 def start_position(task: Task) -> Array:
     """Start configuration (n,) [rad or m]: the task's `start` pose, else `home`, else zero clamped to the limits."""
     return configuration(task.robot, task.spec.start)
@@ -248,82 +328,6 @@ def start_position(task: Task) -> Array:
 
 def _start(task: Task) -> PlanningState:
     return PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
-
-
-def _budget(task: Task, planner: Planner, *, deeper: bool = False) -> SearchBudget:
-    """The budget of the search: larger where the task asks for more samples of each path."""
-    share = task.spec.plan.effort * max(1.0, task.spec.planner.samples / PlannerSpec().samples)
-    return SearchBudget(planner.kinematics.work, deeper=deeper, effort=share)
-
-
-def _resumed(
-    task: Task, planner: Planner, start: PlanningState, state: StartState, on_progress: Callable[[str], None]
-) -> PlanningState:
-    """The state in which a part of the task begins. Without physics, objects are where the steps before it put them in
-    the plan: the engine does not move them."""
-    if ENGINES[task.spec.simulation.engine].physics == "full":
-        return restored_start(state, planner)
-    before = replace(task, part=Part(0, task.part.first))
-    done = _steps(before, planner, start, on_progress, _budget(task, planner))[: task.part.first]
-    ends = [start, *(step.plan.end for step in done)]
-    return replace(ends[-1], position=state.position, at_start=False)
-
-
-def _steps(
-    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None], budget: SearchBudget
-) -> tuple[PlannedStep, ...]:
-    """Plans the steps of the task's part; see `task_search`."""
-    every, part = task.spec.steps, task.part
-    first = part.first
-    steps = every[first : part.last]
-
-    def located(k: int, refusal: NotPlannable) -> NotPlannable:
-        at = task.file.place("steps", first + k, *((steps[k].verb, *refusal.loc) if refusal.loc else ()))
-        return refusal.but(step=steps[k].id, place=at)
-
-    def placed(k: int, candidates: Candidates) -> Candidates:
-        def further() -> Candidates | None:
-            more = candidates.further()
-            return None if more is None else placed(k, more)
-
-        return replace(candidates, explain=lambda why: located(k, candidates.explain(why)), further=further)
-
-    def opens(k: int, state: PlanningState) -> Candidates:
-        try:
-            return placed(k, _candidates(planner, steps[k], state))
-        except NotPlannable as refusal:
-            raise located(k, refusal) from refusal
-
-    def explain(refusal: NotPlannable, refused: Sequence[tuple[int, Dropped]]) -> NotPlannable:
-        handled = {str(step.id): str(getattr(step.body, "object", "")) for step in steps}
-        return explained(refusal, [(str(steps[k].id), one) for k, one in refused], handled)
-
-    progress = SearchProgress(on_progress, [str(step.id) for step in steps])
-    planner.kinematics.work.doing = progress.doing
-    solved = search_task(
-        opens,
-        len(steps),
-        start,
-        on_step=progress.step,
-        on_candidate=progress.candidate,
-        budget=budget,
-        explain=explain,
-        optimise=task.spec.plan.optimise,
-        cost=lambda plan: step_cost(planner, plan).total,
-    )
-    planned = tuple(
-        PlannedStep(
-            str(step.id), step.verb, one.chosen.plan, task.log_place("steps", k), one.grasps,
-            one.chosen.candidate.name, one.dropped, step.keep,
-        )
-        for k, (step, one) in enumerate(zip(steps, solved, strict=True), first)
-    )  # fmt: skip
-    end = planned[-1].plan.end if planned else start
-    before, behind = (
-        [PlannedStep(str(every[k].id), every[k].verb, StepPlan((), at), task.log_place("steps", k)) for k in range(*of)]
-        for at, of in ((start, (0, first)), (end, (first + len(steps), len(every))))
-    )
-    return (*before, *planned, *behind)
 
 
 def _planner(task: Task) -> Planner:

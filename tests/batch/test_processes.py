@@ -30,7 +30,7 @@ from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite.suite import Case, CaseReport, Trouble
 
 if TYPE_CHECKING:
-    from manipcli.task.plan_task import PlannedStep
+    from manipcli.task.plan_steps import PlannedStep
 
 CHILD = f"""
 import os, signal, sys, time

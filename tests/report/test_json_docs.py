@@ -18,7 +18,7 @@ from manipcli.judge.agreement import compare
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.measured_run import MeasuredRun, Variant
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
+from manipcli.judge.verdict import Attempt, BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.logs import plot as chart
 from manipcli.report.agreement.agreement_json import render_json
 from manipcli.report.agreement.compared_runs import ComparedRuns
@@ -34,15 +34,15 @@ WRONG = Diagnostic("TASK201", "unknown key", Place("a.yaml", 3, 5))
 VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
     candidates=(RefusedCandidates("pick_1", "reach", 2, "reach: too far", ("yaw 15",)),),
-    implied=(NEAR,), drawn=Drawn(3, (("scene.cup.mass", 0.25),)),
-    saturations=Saturations({"joint_1": 3}, {"motor_1": 2}),
+    blocks=(BlockOutcome("if_1", "if", 0, 1, None, "done", 0.0, 6.1, 1, "then"),), implied=(NEAR,),
+    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), saturations=Saturations({"joint_1": 3}, {"motor_1": 2}),
 )  # fmt: skip
 RUN = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
 CASE = CaseReport(
     Case("a.yaml", "a"), "failed", 1.0, "", run=RUN, warnings=(WRONG,), troubles=(Trouble("x", Place("a.yaml", 1, 1)),)
 )
 OBJECTS = {
-    "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "implied", "errors",
+    "sample", "timing", "steps", "blocks", "steps.attempts", "saturated", "expectations", "implied", "errors",
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
     "findings", "disagreements", "numbers", "motions", "motions.limited_by", "motions.clearance", "motions.bound_by",
     "motions.margins", "motions.manipulability", "candidates", "pairs", "grasps",

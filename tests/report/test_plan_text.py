@@ -16,7 +16,18 @@ def test_refused_candidates_are_grouped_and_the_one_taken_is_named() -> None:
     step = SimpleNamespace(id="pick_1", candidate="from the top", dropped=dropped)
     only = SimpleNamespace(id="wait_1", candidate="", dropped=())
     plan: Any = SimpleNamespace(
-        motions=(), steps=(step, only), clearances=tuple, path_kinds=tuple, margins=tuple, grasps=tuple
+        motions=(),
+        steps=(step, only),
+        every=(step, only),
+        branches={},
+        combinations=(),
+        branch="",
+        items=(),
+        duration=0.0,
+        clearances=tuple,
+        path_kinds=tuple,
+        margins=tuple,
+        grasps=tuple,
     )
     text = render_text("t", plan)
     assert "pick_1 takes candidate 92: from the top" in text and "wait_1" not in text

@@ -15,7 +15,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.motion import Motion
 from manipcli.record.read.reading import read_recording
-from manipcli.run import observer
+from manipcli.run import observer, step_attempt
 from manipcli.run import step_loop as steps_run
 
 ROOT = Path(__file__).parents[2]
@@ -153,10 +153,10 @@ def test_the_time_for_an_until_ends_with_it(run: Run, monkeypatch: pytest.Monkey
         sequel = Motion("sequel", trajectory=None, grip=None, duration=0.5)
         (step,) = plan.steps
         longer = replace(step, plan=replace(step.plan, motions=(*step.plan.motions, sequel)))
-        return replace(plan, steps=(longer,))
+        return replace(plan, steps=(longer,), branches={(): (longer,)})
 
     monkeypatch.setattr(pipeline, "plan_task", with_a_sequel)
-    monkeypatch.setattr(steps_run, "DEFAULT_UNTIL_TIME", 0.2)
+    monkeypatch.setattr(step_attempt, "DEFAULT_UNTIL_TIME", 0.2)
     step = run(scene(*WAITING, steps=NEAR)).steps[0]
     assert step.outcome == "done"
     assert step.ended == pytest.approx(0.6, abs=0.011)

@@ -27,7 +27,8 @@ from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.load_task import load_task
-from manipcli.task.plan_task import Plan, plan_step, plan_task
+from manipcli.task.plan_steps import plan_step
+from manipcli.task.plan_task import Plan, plan_task
 from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]

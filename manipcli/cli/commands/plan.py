@@ -98,7 +98,7 @@ def plan(
         from manipcli.report.plan import write_csv
 
         with whole_file(csv) as partial, partial.open("w", encoding="utf-8", newline="") as stream:
-            write_csv(planned.motions, stream)
+            write_csv([motion for part in planned.stretches for motion in part.motions], stream)
     if picture is not None and kind is not None:
         from manipcli.core.whole_file import write_whole
         from manipcli.replay.plan_figure import plan_figure
@@ -151,11 +151,12 @@ def _export(planned: Plan, folder: Path) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     columns = {name: k for k, name in enumerate(planned.planner.robot.joint_names)}
+    planned = planned.merged
     spans = iter(planned.spans())
     for k, step in enumerate(planned.steps, start=1):
         trajectory = step_trajectory([next(spans) for _ in step.plan.motions], columns)
         if trajectory is not None:
-            path = folder / f"{k:02d}_{step.id}.yaml"
+            path = folder / f"{k:02d}_{step.id.replace('/', '_')}.yaml"
             write_whole(
                 path, message(trajectory, f"{step.verb} '{step.id}'; the hand's motion is not included").encode()
             )

@@ -183,4 +183,11 @@ def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Pr
     return unfollowed(claims, names, (*at, "joint_names"))
 
 
-MEMBER = StepMember(name="follow", spec=FollowSpec, candidates=single(plan), check=check, uncommanded=uncommanded)
+MEMBER = StepMember(
+    name="follow",
+    spec=FollowSpec,
+    candidates=single(plan),
+    check=check,
+    uncommanded=uncommanded,
+    part=lambda *_: "arm",
+)

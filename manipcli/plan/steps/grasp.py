@@ -78,4 +78,5 @@ MEMBER = StepMember(
     check=check,
     uncommanded=uncommanded,
     moves=False,
+    part=lambda spec, *_: "hand" if spec.object is None else "both",
 )

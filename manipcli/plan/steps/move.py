@@ -34,7 +34,7 @@ from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.pose_error import Leaving, Open, pointed
 from manipcli.plan.prediction import met, pushed
-from manipcli.plan.step import StepMember
+from manipcli.plan.step import Part, StepMember
 from manipcli.plan.tolerance_spec import ToleranceSpec
 from manipcli.plan.tool_path import arc, blended
 from manipcli.plan.unknown_names import unknown_joint, unknown_pose
@@ -279,6 +279,16 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("pose",) if spec.pose is not None else ("point",))
 
 
+def part(spec: MoveSpec, robot: RobotModel, hand: Sequence[str]) -> Part:
+    """The arm for a goal of the tool; else by the joints that it names."""
+    if spec.to is None:
+        return "arm"
+    poses = {pose.name: pose.joints for pose in robot.poses}
+    joints = poses.get(spec.to, ()) if isinstance(spec.to, str) else tuple(spec.to)
+    inside = [name in hand for name in joints]
+    return "arm" if not any(inside) else "hand" if all(inside) else "both"
+
+
 MEMBER = StepMember(
     name="move",
     spec=MoveSpec,
@@ -286,4 +296,5 @@ MEMBER = StepMember(
     check=check,
     uncommanded=uncommanded,
     guarded=lambda spec: spec.guarded,
+    part=part,
 )

@@ -50,4 +50,5 @@ MEMBER = StepMember(
     check=check,
     uncommanded=uncommanded,
     moves=False,
+    part=lambda *_: "hand",
 )

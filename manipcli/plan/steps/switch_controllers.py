@@ -101,6 +101,7 @@ MEMBER = StepMember(
     spec=SwitchControllersSpec,
     candidates=single(plan),
     moves=False,
+    part=lambda *_: "nothing",
     check=check,
     uncommanded=uncommanded,
     request=request,

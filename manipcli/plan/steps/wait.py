@@ -50,4 +50,5 @@ MEMBER = StepMember(
     check=lambda *_: (),
     uncommanded=lambda *_: (),
     moves=False,
+    part=lambda *_: "nothing",
 )

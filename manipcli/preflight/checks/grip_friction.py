@@ -47,7 +47,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
         if grasp.end.carried is None:
             continue
         body = task.scene.body(grasp.end.carried.body)
-        ends = [step.plan.end for step in plan.steps[grasp.index :]]
+        ends = [step.plan.end for step in plan.every if step.index >= grasp.index]
         carrying = itertools.takewhile(lambda end: end.carried is not None, ends)
         heights = [-float(plan.planner.body_pose(end, body.name).p @ gravity) / g for end in carrying]
         if max(heights) < heights[0] + LIFTED or not _between_two(plan.planner, grasp.end, grasp.joints, gravity / g):

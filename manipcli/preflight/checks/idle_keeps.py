@@ -15,7 +15,8 @@ OF_HELD = ("upright", "slosh")
 def findings(subject: Subject) -> Iterator[Diagnostic]:
     """`upright` and `slosh` where the hand is empty in all motions, `slosh` where what it holds is empty."""
     task, plan = subject.task, subject.plan
-    for k, (step, planned) in enumerate(zip(task.spec.steps, plan.steps, strict=True)):
+    for planned in plan.every:
+        k, step = planned.index, task.spec.steps[planned.index]
         states = [motion.begins for motion in planned.plan.motions if motion.begins is not None]
         held = [(state, state.carried.body) for state in states if state.carried is not None]
         bodies = dict.fromkeys(body for _, body in held)

@@ -21,7 +21,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
     task, plan = subject.task, subject.plan
     if task.robot.holding is not None:
         return
-    for k, step in enumerate(plan.steps):
+    for step in plan.every:
         end = step.plan.end
         if end.carried is None or not any(motion.grip is not None for motion in step.plan.motions):
             continue
@@ -34,7 +34,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
                 f"step '{step.id}': '{body.name}' ({body.kind}) may rotate between the point contacts of two fingers"
             )
             hint = f"set `spinning_friction: 0.01` on '{body.name}' to model the contact area of real fingertips"
-            yield Diagnostic("TASK240", message, task.file.place("steps", k), hint, "warning")
+            yield Diagnostic("TASK240", message, task.file.place("steps", step.index), hint, "warning")
 
 
 CHECK = Check(name="rotation_slip", codes=("TASK240",), findings=findings, needs_plan=True)

@@ -86,8 +86,8 @@ def image(picture: Picture, label: str) -> Markup:
 
 
 def mark(good: bool, word: str, *, excused: bool = False) -> Markup:
-    """`✓ done`, `✗ failed`, `– not run`; with a dash also what is `excused`."""
-    if word == "not_run" or excused:
+    """`✓ done`, `✗ failed`, `– not run`, `– skipped`; with a dash also what is `excused`."""
+    if word in ("not_run", "skipped") or excused:
         return element("span", f"– {word.replace('_', ' ')}", class_="idle")
     return element("span", f"{'✓' if good else '✗'} {word.replace('_', ' ')}", class_="yes" if good else "no")
 

@@ -6,7 +6,7 @@ from manipcli.core.text import number_of
 from manipcli.judge.drawn import value_text
 from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.self_contacts import self_contact_line
-from manipcli.judge.verdict import StepOutcome
+from manipcli.judge.verdict import BlockOutcome, StepOutcome
 from manipcli.replay.playback import Phase
 from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
@@ -23,6 +23,7 @@ from manipcli.report.html.page_parts import (
     signed,
     table,
 )
+from manipcli.report.nesting import block_line, nested
 from manipcli.report.run_page import RunPage, Source, Written
 
 SHORT_HASH = 16
@@ -168,15 +169,20 @@ def steps(page: RunPage) -> Markup | None:
     else:
         end = max(facts.end, 1e-9)
         by_id = {measured.id: measured for measured in facts.steps}
+        written_at = {step.id: written for step, written in page.located_steps}
         timed: list[tuple[str, ...]] = []
-        for step, written in page.located_steps:
+        for depth, step in nested(verdict.steps, verdict.blocks):
+            if isinstance(step, BlockOutcome):
+                timed.append(_block_row(depth, step))
+                continue
+            written = written_at[step.id]
             took = None if step.started is None or step.ended is None else step.ended - step.started
             planned = step.planned_duration
             mine = by_id.get(step.id)
             timed.append(
                 (
                     _outcome(step),
-                    _step_name(page, step, written),
+                    _indented(depth, _step_name(page, step, written)),
                     _gantt(page, step, end),
                     "" if planned is None else f"{planned:.2f} s",
                     "" if took is None else f"{took:.2f} s",
@@ -192,6 +198,22 @@ def steps(page: RunPage) -> Markup | None:
         parts.append(_pictures(page))
     about = "Outline: planned. Filled: measured. Lines: starts of phases." if facts is not None else ""
     return element("section", heading("steps", "Steps", about), *parts)
+
+
+def _block_row(depth: int, block: BlockOutcome) -> tuple[str, ...]:
+    """The row of a block, before those of its parts."""
+    took = "" if block.started is None or block.ended is None else f"{block.ended - block.started:.2f} s"
+    tries = element("small", f"at attempt {block.attempts}") if block.attempts > 1 else None
+    shown = element("span", f"– {block.outcome}, may fail", class_="idle") if block.tolerated else None
+    named = joined(element("b", block.label), element("small", block_line(block)) if block.text else None)
+    starts = seek(block.started) if block.started is not None else ""
+    outcome = joined(shown or mark(block.outcome == "done", block.outcome), tries)
+    return (outcome, _indented(depth, named), block.taken, "", took, "", "", "", starts)
+
+
+def _indented(depth: int, shown: Markup) -> Markup:
+    """What is in `depth` blocks."""
+    return element("div", shown, style=f"margin-left:{1.2 * depth:.1f}em") if depth else shown
 
 
 def _outcome(step: StepOutcome) -> Markup:
@@ -224,16 +246,18 @@ def _phases(page: RunPage, step: StepOutcome) -> tuple[Phase, ...]:
 
 def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
     """One row of the Gantt chart: two bars over the time of the whole run."""
-    if step.started is None or step.planned_duration is None:
+    if step.started is None:
         return element("small", "not started")
     last = end if step.ended is None else step.ended
     scale = 1000.0 / end
     starts = [phase.start for phase in _phases(page, step)[1:]]
-    planned = min(step.planned_duration, end - step.started)
-    label = f"{step.id}: planned {step.planned_duration:.2f} s, measured {last - step.started:.2f} s"
+    duration = step.planned_duration
+    told = "in the run" if duration is None else f"{duration:.2f} s"
+    label = f"{step.id}: planned {told}, measured {last - step.started:.2f} s"
+    width = 0.0 if duration is None else max(min(duration, end - step.started) * scale, 2.0)
     drawn = (
         element("rect", class_="row", x="0", y="0", width="1000", height="26"),
-        element("rect", class_="planned", x=step.started * scale, y="3.5", width=max(planned * scale, 2.0), height="8"),
+        element("rect", class_="planned", x=step.started * scale, y="3.5", width=width, height="8"),
         element(
             "rect",
             class_="measured" if step.outcome == "done" or step.tolerated else "measured no",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.verdict import StepOutcome
+from manipcli.judge.verdict import BlockOutcome, StepOutcome
 from manipcli.record.attachments import INERTIALS
 from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
@@ -26,12 +26,14 @@ class LogInfo:
         ours: whether manipcli wrote it.
         steps: outcomes of the steps; empty if the log has none.
         missing: parts that are missing compared to the log of a finished run, or damaged; one sentence each.
+        blocks: outcomes of the groups of steps.
     """
 
     found: Topics
     ours: bool
     steps: tuple[StepOutcome, ...]
     missing: tuple[str, ...]
+    blocks: tuple[BlockOutcome, ...] = ()
 
     @property
     def run(self) -> Mapping[str, str]:
@@ -70,7 +72,7 @@ def render_text(info: LogInfo) -> str:
     if lines:
         lines.append("")
     if info.steps:
-        lines += [steps_table(info.steps), ""]
+        lines += [steps_table(info.steps, info.blocks), ""]
     rows = [
         [topic.name, topic.type or topic.encoding, str(topic.count), _rate(topic.rate), _until(topic, found)]
         for topic in _by_name(found)

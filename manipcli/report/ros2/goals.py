@@ -63,6 +63,7 @@ class Phase:
 
 def phases(plan: Plan, spec: ControllersSpec, exported: Sequence[Exported], robot: RobotModel) -> tuple[Phase, ...]:
     """All motions of a plan in order."""
+    plan = plan.merged
     claims = Claims.of(spec)
     known = {own.name: own for own in exported}
     sender = _Sender(robot, spec, known)

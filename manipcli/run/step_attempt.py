@@ -1,0 +1,321 @@
+"""One attempt at a step: re-planning, motions, conditions that are waited for, and what must be true at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
+
+from manipcli.control.action import GoalHandle
+from manipcli.core.errors import NotPlannable, SimulationFailed
+from manipcli.core.stopwatch import Stopwatch
+from manipcli.model.collision import Carried
+from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
+from manipcli.model.state import WorldState
+from manipcli.plan.motion import Motion, PlanningState
+from manipcli.record.write.recorder import Recorder
+from manipcli.run.attaching import Attaching
+from manipcli.run.grasp_margin import GraspMargin
+from manipcli.run.live_conditions import Live, Probe
+from manipcli.run.monitors import Monitors
+from manipcli.run.observer import Progress
+from manipcli.run.replan import Measured, after
+from manipcli.run.saturation_counts import saturated_since, saturations_of
+from manipcli.run.step_results import not_placed, not_poured, not_squeezed
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
+from manipcli.simulate.session import SLOW, Session
+from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.step import StepSpec
+from manipcli.task.plan_steps import PlannedStep
+from manipcli.task.plan_task import Plan
+from manipcli.task.task import Task
+
+DEFAULT_UNTIL_TIME: Final = 30.0
+"""[s] Timeout of an `until` on a step without `timeout`."""
+SQUEEZED: Final = 0.3
+"""[s] Within this time after the hand closed, it presses on its object from opposite sides."""
+
+
+class StepAttempt:
+    """One attempt at a step: re-planned where needed, its motions, and whether it had its effect.
+
+    Args:
+        task, plan: to run.
+        session: the world, at time 0.
+        recorder: receives all events.
+        live: evaluates the conditions that steps wait for; receives starts and ends of steps.
+        progress: receives steps and unplanned events.
+        on_goal: called with every goal, see `Executor`.
+        replanning: stopwatch of re-planning.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        plan: Plan,
+        session: Session,
+        recorder: Recorder,
+        live: Live,
+        progress: Progress,
+        *,
+        on_goal: Callable[[str, GoalHandle], None],
+        replanning: Stopwatch,
+    ) -> None:
+        self._task = task
+        self._live = live
+        self._plan = plan
+        self._session = session
+        self._recorder = recorder
+        self._progress = progress
+        self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
+        self._monitors = Monitors(task.spec.watch, task.spec.expect, live)
+        self._executor = Executor(session, touch=self._physics, on_goal=on_goal, alarm=self._look)
+        replan = task.spec.replan
+        self._replans = replan is not False
+        self._guards = any(motion.guarded for step in plan.every for motion in step.plan.motions)
+        limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
+        self._measured = Measured(session, plan.planner, limits, physics=self._physics)
+        self._grasp_margin = GraspMargin(task.true.robot, task.true.scene)
+        self._believed = plan.start
+        self._replanning = replanning
+        self.failed = False
+        self._over = False
+        self._at: PlannedStep | None = None
+        self._attaching = Attaching(session, self._event)
+
+    def _look(self, state: WorldState) -> str:
+        """At every tick: update the grasp and return the alarm."""
+        if self._physics and self._session.ticks % SLOW == 0:
+            self._measured.grasp.look(state, self._session.touching)
+        self._attaching.look(self._at)
+        return self._alarm(state) if self._task.spec.watch else ""
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether a retry or `on_fail: continue` is possible: no broken watch and no controller fault."""
+        return not self._over and not self._session.manager.faults
+
+    def _alarm(self, _: WorldState) -> str:
+        """The first broken watch, recorded as an event; "" without one."""
+        broken = None if self._over else self._monitors.broken
+        if broken is None:
+            return ""
+        self._over = True
+        at = self._at
+        self._recorder.event(
+            self._session.ticks,
+            kind="watch_broken",
+            step="" if at is None else at.id,
+            verb="" if at is None else at.verb,
+            outcome="failed",
+            text=broken.text,
+            place=self._task.log_place("watch", broken.index),
+        )
+        return broken.text
+
+    def _attempt(
+        self, step: StepSpec, planned: PlannedStep, planned_start: PlanningState, *, retry: bool, limit: float | None
+    ) -> Lane[MotionEnd]:
+        """One attempt, re-planned on `retry`, after a failed step, or if the measured state differs from the plan."""
+        now = self._measured.situation(self._believed)
+        if retry and planned_start.carried is None and planned.plan.end.carried is not None:
+            now = replace(now, carried=None)  # a retried grasp may start with the hand closed on its object
+        differences = self._measured.differences(planned_start, now, step)
+        replanned = retry or self.failed or (self._replans and bool(differences) and _moves(planned))
+        if replanned:
+            try:
+                with self._replanning:
+                    plan, now, note = self._measured.plan(step, planned_start, now, planned.grasps)
+                poured = plan.poured or planned.plan.poured  # what the cup should hold, even if that is lost
+                planned = replace(planned, plan=replace(plan, poured=poured, into=plan.into or planned.plan.into))
+            except NotPlannable as refusal:
+                self._believed = now
+                forced = retry or self.failed or self._guards
+                text = self._measured.refused(planned_start, now, refusal.cause, step, forced=forced)
+                return MotionEnd("failed", text)
+            why = "; ".join(differences) or ("retry" if retry else "the previous step failed")
+            why += note
+            self._event("replanned", planned, "", why)
+            self._report(f"re-planned: {why}", detail=True)
+            self.failed = False
+        found = "" if replanned or not differences else f"; at its start {'; '.join(differences)}"
+        return (yield from self._guarded(planned, self._motions(step, planned, now, self._executor, limit), found))
+
+    def _guarded(self, planned: PlannedStep, motions: Lane[MotionEnd], found: str = "") -> Lane[MotionEnd]:
+        """The motions of a step, ended by alarms; a failure also reports what was `found`, and saturated joints."""
+        before = saturations_of(self._session)
+        try:
+            end = yield from motions
+        except Alarmed as alarm:
+            return MotionEnd("failed", f"stopped: {alarm}")
+        except SimulationFailed as failure:
+            text = str(failure) + saturated_since(before, self._session)
+            self._event("step_ended", planned, "failed", text)
+            raise
+        if end.outcome == "done":
+            return end
+        return MotionEnd(end.outcome, end.text + found + saturated_since(before, self._session))
+
+    def _motions(
+        self, step: StepSpec, planned: PlannedStep, before: PlanningState, executor: Executor, limit: float | None
+    ) -> Lane[MotionEnd]:
+        """All motions of the plan, which starts in `before`, and the wait for `until`; both up to `limit` [s]."""
+        deadline = _sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
+        if before.carried is not None and self._physics:
+            self._measured.grasp.begin_step(before.carried, self._session.engine.read(), self._session.touching)
+        texts = []
+        with self._awaited(step) as probe:
+            until: Until | None = None if probe is None else lambda _: probe.holds
+            awaited = until is not None
+            for k, motion in enumerate(planned.plan.motions):
+                self._event("phase_started", planned, "", motion.label)
+                self._believed = after(planned.plan, before, done=k)
+                if motion.opens and before.carried is not None and k > 0:
+                    left = self._left_behind(before.carried)
+                    if left is not None:
+                        return left
+                self._attaching.before(motion, planned)
+                over = deadline
+                if motion.awaits and until is not None and step.timeout is None:
+                    over = _sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
+                end = yield from executor.running(motion, until=until, deadline=over)
+                if end.outcome != "done":
+                    held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
+                    text = f"{motion.label}: {end.text}{missing(end, probe)}{f'; {held}' if held else ''}"
+                    return MotionEnd(end.outcome, text)
+                missed = self._attaching.after(motion, planned)
+                if missed:
+                    return MotionEnd("failed", missed)
+                if motion.closes and planned.plan.end.carried is not None:
+                    self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
+                    self._take(planned.plan.end.carried)
+                    if loose := (yield from self._loose(motion, planned.plan.end.carried.body)):
+                        return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
+                if end.weak:
+                    self._report(f"{motion.label}: {end.text}", detail=False)
+                awaited = awaited and not motion.awaits
+                texts += [end.text + _no_longer(motion, probe)] if end.text else []
+            self._believed = planned.plan.end
+            if awaited and until is not None:
+                if step.timeout is None:
+                    deadline = _sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
+                end = yield from executor.waiting(until, deadline=deadline or 0.0)
+                if end.outcome != "done":
+                    return replace(end, text=end.text + missing(end, probe))
+        held = self._still_held(before) if planned.plan.end.carried is None else ""
+        if held:
+            return MotionEnd("failed", held)
+        if planned.plan.end.carried is None:
+            self._measured.grasp.release()
+        left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
+        left = left or self._without_result(step, planned)
+        return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    @contextmanager
+    def _awaited(self, step: StepSpec) -> Iterator[Probe | None]:
+        """The open probe of the step's `until`; None without `until`, or if the engine cannot evaluate it."""
+        if step.until is None or self._live.absent(step.until) is not None:
+            yield None
+            return
+        probe = self._live.open(step.until)
+        try:
+            yield probe
+        finally:
+            self._live.close(probe)
+
+    def _take(self, carried: Carried) -> None:
+        """The hand has closed on an object."""
+        if self._physics:
+            self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
+
+    def _loose(self, motion: Motion, body: str) -> Lane[str]:
+        """Why the closed hand does not hold an object, up to `SQUEEZED` after it closed; "" where it does."""
+        if not self._physics or motion.grip is None or not motion.grip.must_hold or self._attaching.holding is not None:
+            return ""
+
+        def squeezed(_: object) -> bool:
+            return squeeze_force(self._session.touching, body) >= GRIP_FORCE
+
+        if squeezed(None):
+            return ""
+        end = yield from self._executor.waiting(squeezed, deadline=self._session.time + SQUEEZED)
+        if end.outcome == "done":
+            return ""
+        return not_squeezed(self._session.touching, body)
+
+    def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
+        """A failure if the hand does not carry the planned object; None if it does."""
+        if carried is None or not self._physics:
+            return None
+        why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
+        if not why:
+            return None
+        text = f"the hand does not carry '{carried.body}': {why}"
+        if self._attaching.holding is not None:
+            return MotionEnd("failed", text)
+        grasp = self._grasp_margin.summary(carried.body)
+        text += "; it slipped or was never held"
+        return MotionEnd("failed", f"{text}{f'; {grasp}' if grasp else ''}")
+
+    def _short_of_plan(self, planned: PlannedStep, before: PlanningState) -> MotionEnd | None:
+        """A failure where the object in the hand did not follow the planned motion; a guarded step may end early."""
+        carried, end = before.carried, planned.plan.end
+        if carried is None or end.carried is None or not self._physics:
+            return None
+        if any(motion.guarded for motion in planned.plan.motions):
+            return None
+        planner = self._plan.planner
+        motion = planner.tool_pose(end).p - planner.tool_pose(before).p
+        why = self._measured.grasp.short_of(motion, self._session.engine.read())
+        return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
+
+    def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
+        """A failure where an object is not where the step places or pours it; `until` may define another pour."""
+        plan, planner = planned.plan, self._plan.planner
+        if not self._physics or not (plan.placed or plan.poured):
+            return None
+        now = self._measured.situation(replace(plan.end, carried=None))
+        why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
+        return MotionEnd("failed", why) if why else None
+
+    def _still_held(self, before: PlanningState) -> str:
+        """Which links still hold the object that was carried `before`; "" if it was released."""
+        if before.carried is None or not self._physics:
+            return ""
+        body = before.carried.body
+        if pinch_force(self._session.touching, body) < GRIP_FORCE:
+            return ""
+        self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
+        (_, first), (_, second), *_ = pressing(self._session.touching, body)
+        return f"the hand still holds '{body}', between '{first}' and '{second}'"
+
+    def _report(self, text: str, *, detail: bool) -> None:
+        self._progress.message(text, detail=detail)
+
+    def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
+        self._recorder.event(
+            self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
+        )
+
+
+def _sooner(a: float | None, b: float | None) -> float | None:
+    return min((one for one in (a, b) if one is not None), default=None)
+
+
+def _moves(planned: PlannedStep) -> bool:
+    """Whether a step has motions that depend on the state."""
+    return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
+
+
+def missing(end: MotionEnd, probe: Probe | None) -> str:
+    """By how much `until` fails, if the motion ended for it; else ""."""
+    missing = probe.missing if probe is not None and end.awaited else ""
+    return f"; at the end {missing}" if missing else ""
+
+
+def _no_longer(motion: Motion, probe: Probe | None) -> str:
+    """By how much the `until` of a guarded motion fails at rest, after a bounce; "" if it holds."""
+    missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
+    return f"; at rest {missing}" if missing else ""
