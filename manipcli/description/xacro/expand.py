@@ -46,7 +46,7 @@ _MACRO_ARGUMENT = re.compile(
     r"""^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?(\$\{.*?\}|\$\(.*?\)|(?:'[^'\n]*'|"[^"\n]*"|[^\s'"])+|)(?:\s+|$)(.*)"""
 )
 ALLOW_ENV = "MANIPCLI_ALLOW_ENV"
-"""Environment variable that lists the variables that descriptions may read, `A B`, in all commands."""
+"""Environment variable with the names of variables that descriptions may read."""
 _NODE = 16
 """Cost of an attribute, a text or an element in addition to its characters: empty nodes use memory, too."""
 _DATA = "expressions in a description can only compute numbers and text"
@@ -339,8 +339,7 @@ class _Expansion:
 
         What a file describes does not depend on the machine, so a variable is not read unless the user names it.
         """
-        name, _, default = rest.partition(" ")
-        default = default.strip()
+        name, default = (*map(str.strip, rest.partition(" ")[::2]),)
         if name not in self._allow_env and name not in os.environ.get(ALLOW_ENV, "").replace(",", " ").split():
             hint = f"allow it with {ALLOW_ENV}={name} before the command (check-urdf: --allow-env), or use $(arg NAME)"
             if command == "optenv":
