@@ -16,12 +16,13 @@ from typing import Final, Literal, cast, get_args
 
 from manipcli.description.lint.checks import CHECKS
 
-Kind = Literal["task", "robot", "controllers", "urdf", "xacro", "srdf", "command", "situation"]
-"""What an example is: keys of a file, which stand in a complete one; a whole description; a command line; or words."""
+Kind = Literal["task", "robot", "controllers", "urdf", "xacro", "srdf", "command", "python", "situation"]
+"""What an example is: keys of a file, which stand in a complete one; a whole description; a command line; Python; or
+words."""
 
 _LANGUAGE: Final[Mapping[str, str]] = {
     "task": "yaml", "robot": "yaml", "controllers": "yaml", "urdf": "xml", "xacro": "xml", "srdf": "xml",
-    "command": "sh", "situation": "text",
+    "command": "sh", "python": "python", "situation": "text",
 }  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.cli import app
-from manipcli.core.errors import ExitCode, InvalidInput
+from manipcli.core.errors import ExitCode, InvalidInput, ManipcliError
 from manipcli.description.lint.checks import CHECKS
 from manipcli.report.codes.code_page import CodePage, Kind, code_pages, render_markdown, render_text
 from manipcli.spec.source.tree import MappingNode
@@ -32,6 +33,13 @@ steps: [{{wait: 0.1 s}}]
     "robot": "robot: example\ndescription: arm.urdf\n",
     "controllers": "",
 }
+TASK_OF_CONTROLLERS = f"""\
+task: example
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: example.yaml
+steps: [{{wait: 0.1 s}}]
+"""
+"""The task that is checked for an example of a controllers file."""
 ARM = """<robot name="arm">
   <link name="base"/>
   <link name="upper"><inertial><mass value="1"/>
@@ -44,6 +52,8 @@ ARM = """<robot name="arm">
 PAGES = code_pages()
 CHECKED = {check.code for check in CHECKS}
 FILES = [page for page in PAGES.values() if page.kind in BASES or (page.kind in ("urdf", "xacro") and page.good)]
+COMMANDS = [page for page in PAGES.values() if page.kind == "command" and page.bad.startswith("manipcli check ")]
+SNIPPETS = [page for page in PAGES.values() if page.kind == "python"]
 
 
 def written(page: CodePage, text: str, folder: Path) -> Path:
@@ -68,6 +78,9 @@ def written(page: CodePage, text: str, folder: Path) -> Path:
     ]  # fmt: skip
     path = folder / "example.yaml"
     path.write_text("\n".join([*added, text]) + "\n")
+    if page.kind == "controllers":
+        path = folder / "task.yaml"
+        path.write_text(TASK_OF_CONTROLLERS)
     return path
 
 
@@ -80,6 +93,27 @@ def test_the_faulty_example_gets_the_code_and_the_sound_one_no_error(page: CodeP
         found = pipeline.check_files([written(page, page.good, tmp_path)])
         assert page.code not in {finding.code for finding in found}, found
         assert not [finding for finding in found if finding.severity == "error"], found
+
+
+@pytest.mark.parametrize("page", COMMANDS, ids=lambda page: page.code)
+def test_the_faulty_command_gets_the_code_and_the_sound_one_no_error(
+    page: CodePage, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    app.main(shlex.split(page.bad)[1:])
+    assert f"[{page.code}]" in "".join(capsys.readouterr())
+    if page.good:
+        assert app.main(shlex.split(page.good)[1:]) == ExitCode.PASSED
+        assert f"[{page.code}]" not in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize("page", SNIPPETS, ids=lambda page: page.code)
+def test_the_faulty_python_raises_the_code_and_the_sound_one_nothing(page: CodePage) -> None:
+    with pytest.raises(ManipcliError) as raised:
+        exec(page.bad, {})
+    assert page.code in {finding.code for finding in raised.value.findings}
+    if page.good:
+        exec(page.good, {})
 
 
 def test_every_code_in_the_source_has_a_page() -> None:
