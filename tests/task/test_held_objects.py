@@ -10,7 +10,8 @@ from manipcli.core.errors import InvalidInput, NotPlannable
 from manipcli.spec.block import BlockSpec
 from manipcli.task.held_objects import HANDS_FULL, NO_HOLLOW, NOT_HELD, TOO_SMALL, impossible_steps
 from manipcli.task.load_task import load_task
-from manipcli.task.plan_task import plan_step, unplanned
+from manipcli.task.plan_steps import plan_step
+from manipcli.task.plan_task import unplanned
 from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
