@@ -1,4 +1,4 @@
-"""The examples of commands, run: the faulty one gets its code. And those of SRDFs, by `init`."""
+"""The examples of commands, run: the faulty one gets its code. And those of SRDFs, read."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from manipcli.cli import app
+from manipcli.core.errors import InvalidInput
+from manipcli.description.srdf import read_srdf
+from manipcli.onboard.from_srdf import stated_parts
+from manipcli.pipeline import load_sight
 from manipcli.report.codes.code_page import CodePage, code_pages
-
-from .test_code_pages import ARM, ROOT
+from tests.report.codes.test_code_pages import ARM, ROOT
 
 TASK = """\
 task: example
@@ -57,12 +60,16 @@ def test_the_faulty_command_gets_the_code(
 
 
 @pytest.mark.parametrize("page", SRDFS, ids=lambda page: page.code)
-def test_the_faulty_srdf_gets_the_code_and_the_sound_one_does_not(
-    page: CodePage, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("arm.urdf").write_text(ARM)
-    for text, refused in ((page.bad, True), (page.good, False)):
-        Path("arm.srdf").write_text(text)
-        app.main(["init", "project", "--robot", "arm.urdf", "--srdf", "arm.srdf"])
-        assert (f"[{page.code}]" in capsys.readouterr().err) == refused
+def test_the_faulty_srdf_gets_the_code_and_the_sound_one_none(page: CodePage, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    file = tmp_path / "arm.srdf"
+    robot = load_sight(tmp_path / "arm.urdf").robot
+    found: list[set[str]] = []
+    for text in (page.bad, page.good):
+        file.write_text(text)
+        try:
+            stated_parts(robot, read_srdf(file))
+            found.append(set())
+        except InvalidInput as error:
+            found.append({finding.code for finding in error.findings})
+    assert found == [{page.code}, set()]
