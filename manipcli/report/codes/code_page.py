@@ -15,6 +15,7 @@ from importlib.resources import files
 from typing import Final, Literal, cast, get_args
 
 from manipcli.description.lint.checks import CHECKS
+from manipcli.report.codes.xml_lines import broken
 
 Kind = Literal["task", "robot", "controllers", "urdf", "xacro", "srdf", "command", "python", "situation"]
 """What an example is: keys of a file, which stand in a complete one; a whole description; a command line; Python; or
@@ -55,7 +56,9 @@ class CodePage:
 def code_pages() -> dict[str, CodePage]:
     """The pages of all codes, in their order."""
     found: dict[str, CodePage] = {
-        check.code: CodePage(check.code, check.summary, "", check.reason, _kind_of(check.bad), check.bad, "")
+        check.code: CodePage(
+            check.code, check.summary, "", check.reason, _kind_of(check.bad), broken(check.bad, width=0), ""
+        )
         for check in CHECKS
     }
     for file in files("manipcli.report.codes").iterdir():
