@@ -13,7 +13,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair
+from manipcli.core.prose import amount, listing, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.spec.base import Model, or_short, problem
 from manipcli.spec.names import MARK, PartName
@@ -107,6 +109,21 @@ def check(spec: NoCollisionSpec | CollisionSpec, context: CheckContext) -> tuple
     return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(context, pair, ("pairs", k)))
 
 
+def _touching(spec: PairsSpec) -> str:
+    other = {("robot", "robot"): "one link of the robot touches another"}
+    return listing([other.get(pair) or f"{named(pair[0])} touches {named(pair[1])}" for pair in spec.pairs], "or")
+
+
+def no_collision_clause(spec: NoCollisionSpec, robot: RobotModel) -> str:
+    if spec.below:
+        return f"it never happens that {_touching(spec)} with more than {amount(spec.below, 'N')}"
+    return f"it never happens that {_touching(spec)}"
+
+
+def collision_clause(spec: CollisionSpec, robot: RobotModel) -> str:
+    return f"{_touching(spec)} with {amount(spec.above, 'N')} or more"
+
+
 NO_COLLISION = Condition(
     name="no_collision",
     spec=NoCollisionSpec,
@@ -115,6 +132,7 @@ NO_COLLISION = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world),
     scope="always",
+    clause=no_collision_clause,
     example="no_collision: {pairs: [[robot, desk], [robot, tray]]}",
     stateless=True,
 )
@@ -125,6 +143,7 @@ COLLISION = Condition(
     open=monitor_collision,
     check=check,
     absent=lambda spec, world: untouchable(world),
+    clause=collision_clause,
     example="collision: [robot, desk]",
     stateless=True,
 )

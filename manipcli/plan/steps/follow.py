@@ -18,9 +18,11 @@ from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc, NotPlannable
+from manipcli.core.prose import amount, listing
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unfollowed
+from manipcli.plan.clauses import joint_value
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import GoalTolerances, JointTolerance, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -183,11 +185,20 @@ def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Pr
     return unfollowed(claims, names, (*at, "joint_names"))
 
 
+def clause(spec: FollowSpec, robot: RobotModel) -> str:
+    names, points, _ = spec.message
+    through = f"through {len(points)} points" if len(points) > 1 else "to one point"
+    timed = "as fast as the limits allow" if spec.retime else f"in {amount(points[-1].seconds, 's')}"
+    ends = [joint_value(robot, name, value) for name, value in zip(names, points[-1].positions, strict=True)]
+    return f"move the joints on a trajectory {through} {timed}; at its end, {listing(ends)}"
+
+
 MEMBER = StepMember(
     name="follow",
     spec=FollowSpec,
     candidates=single(plan),
     check=check,
     uncommanded=uncommanded,
+    clause=clause,
     part=lambda *_: "arm",
 )
