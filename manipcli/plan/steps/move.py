@@ -293,11 +293,10 @@ def part(spec: MoveSpec, robot: RobotModel, hand: Sequence[str]) -> Part:
 
 def clause(spec: MoveSpec, robot: RobotModel) -> str:
     touch = f"; the hand may touch {listing([named(body) for body in spec.touch])}" if spec.touch else ""
-    guarded = ", and stop early as soon as the condition below holds" if spec.guarded else ""
-    return f"move {_goal(spec, robot)}{_along(spec)}{at_share(spec.velocity_scaling, 1.0)}{guarded}{touch}"
+    return f"move {_destination(spec, robot)}{_along(spec)}{at_share(spec.velocity_scaling, 1.0)}{touch}"
 
 
-def _goal(spec: MoveSpec, robot: RobotModel) -> str:
+def _destination(spec: MoveSpec, robot: RobotModel) -> str:
     if isinstance(spec.to, str):
         return f"to the pose {named(spec.to)}"
     if spec.to is not None:

@@ -390,8 +390,8 @@ def clause(spec: PickSpec, robot: RobotModel) -> str:
     return (
         f"pick {named(spec.object)}{part}{approached(approach.from_, approach.pitch, approach.yaw, approach.frame)}: "
         f"open the hand (pose {named(spec.open)}), approach straight over {between(approach.distance, 'm')}, and close "
-        f"the hand (pose {named(grasp.posture)}){height} until each finger presses with {amount(grasp.force, 'N')}{until}"
-        f"{at_share(spec.velocity_scaling, 1.0)}"
+        f"the hand (pose {named(grasp.posture)}){height} until each finger presses with {amount(grasp.force, 'N')}"
+        f"{until}{at_share(spec.velocity_scaling, 1.0)}"
     )
 
 

@@ -180,9 +180,9 @@ def clause(spec: PourSpec, robot: RobotModel) -> str:
     side = "before" if spec.offset > 0.0 else "beyond"
     offset = f" and {amount(abs(spec.offset), 'm')} {side} its centre" if spec.offset else ""
     return (
-        f"pour from {named(spec.object)} into {named(spec.into)}: hold its lip {between(spec.clearance, 'm')} above "
-        f"the rim of {named(spec.into)}{offset}, tilt it by {amount(spec.tilt, 'rad')}, wait {amount(spec.dwell, 's')}, "
-        f"and tilt it back{at_share(spec.velocity_scaling, 0.5)}"
+        f"pour from {named(spec.object)} into {named(spec.into)}: hold the lip {between(spec.clearance, 'm')} above "
+        f"its rim{offset}, tilt it by {amount(spec.tilt, 'rad')}, wait {amount(spec.dwell, 's')}, and "
+        f"tilt it back{at_share(spec.velocity_scaling, 0.5)}"
     )
 
 
