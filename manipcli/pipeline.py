@@ -27,6 +27,7 @@ from manipcli.model.robot import LinkInertial, RobotModel
 from manipcli.model.self_collision import SelfCollisionMatrix
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
+from manipcli.preflight.editor_schema import updated_schema
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
@@ -71,6 +72,7 @@ __all__ = [
     "self_collisions",
     "simulation_of",
     "unplanned",
+    "updated_schema",
     "verify_log",
     "words",
 ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from manipcli.core.prose import amount, named, share
+from collections.abc import Sequence
+
+from manipcli.core.prose import amount, listing, named, share
 from manipcli.model.robot import RobotModel
 
 
@@ -11,9 +13,12 @@ def at_share(scaling: float, default: float) -> str:
     return "" if scaling == default else f", at {share(scaling)} of the velocity, acceleration and jerk limits"
 
 
-def joint_value(robot: RobotModel, name: str, value: float) -> str:
-    """A joint position: `'joint_1' to 30 deg`."""
-    return f"{named(name)} to {amount(value, robot.joint(name).unit)}"
+def joint_values(robot: RobotModel, names: Sequence[str], values: Sequence[float]) -> str:
+    """Joint positions: `'joint_1' is at 30 deg and 'joint_2' is at 0 deg`."""
+    texts = [amount(value, robot.joint(name).unit) for name, value in zip(names, values, strict=True)]
+    if len(texts) > 2 and len(set(texts)) == 1:
+        return f"{listing([named(name) for name in names])} are at {texts[0]}"
+    return listing([f"{named(name)} is at {text}" for name, text in zip(names, texts, strict=True)])
 
 
 def approached(from_: str | None, pitch: float | None, yaw: float | None, frame: str | None) -> str:

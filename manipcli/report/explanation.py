@@ -10,7 +10,7 @@ from typing import Final
 from manipcli.core.prose import sentence
 from manipcli.report.json import dumps
 from manipcli.report.outline import Item, outline
-from manipcli.task.explanation import Explanation, Part
+from manipcli.task.explanation import Explanation
 from manipcli.task.origins import Origin
 
 WIDTH: Final = 110

@@ -131,9 +131,7 @@ def _step(task: Task, k: int, step: StepSpec) -> Part:
         if given is not None:
             values += origins.value(getattr(step, key), given, key, given=True)
     said = [sentence(member.clause(step.body, task.robot))]
-    if step.until is not None and member.guarded(step.body):
-        said.append(sentence(f"stop as soon as {condition_clause(step.until, task.robot, CONDITIONS)}"))
-    said += _waits(step.until, step.timeout, task.robot)
+    said += _waits(step.until, step.timeout, task.robot, guarded=member.guarded(step.body))
     kept = [member.clause(keep) for keep in step.keep for member in KEEPS if getattr(keep, member.name) is not None]
     said += [sentence(f"meanwhile, {listing(kept)}")] if kept else []
     pairs = [listing([named(part) for part in pair]) for pair in step.allow]
@@ -142,11 +140,14 @@ def _step(task: Task, k: int, step: StepSpec) -> Part:
     return Part(str(step.id), " ".join(said), str(task.file.place("steps", k)), tuple(values))
 
 
-def _waits(until: ConditionSpec | None, timeout: float | None, robot: RobotModel) -> Iterator[str]:
+def _waits(
+    until: ConditionSpec | None, timeout: float | None, robot: RobotModel, *, guarded: bool = False
+) -> Iterator[str]:
     if until is not None:
         clause = condition_clause(until, robot, CONDITIONS)
         most = "" if timeout is not None else f", for {amount(WAITED, 's')} at most"
-        yield sentence(f"then wait until {clause}{most}")
+        stops = f"stop as soon as {clause}; if that does not happen on the way, wait for it at the end{most}"
+        yield sentence(stops if guarded else f"then wait until {clause}{most}")
     if timeout is not None:
         yield f"It fails after {amount(timeout, 's')}."
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
-from manipcli.core.prose import amount, shortest
+from manipcli.core.prose import amount, point
 from manipcli.core.units import NUMBER, UnitError, parse_quantity
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
@@ -165,7 +165,7 @@ def readable_value(value: object, unit: str | None, node: Node | None = None) ->
     if isinstance(value, list | tuple):
         numbers = [item for item in value if isinstance(item, int | float) and not isinstance(item, bool)]
         if numbers and len(numbers) == len(value):
-            return shortest(numbers, unit or "", ", ", "[{}]")
+            return point(numbers, unit or "")
         return f"[{', '.join(readable_value(item, unit) for item in value)}]"
     return f"'{value}'" if isinstance(value, str) else str(value)
 

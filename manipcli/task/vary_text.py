@@ -18,7 +18,7 @@ def varied_sentence(path: str, spec: VarySpec) -> str:
 
 def _law(law: DistributionSpec) -> str:
     if law.uniform is not None:
-        return f"between {_amount(law.uniform[0])} and {_amount(law.uniform[1])}, all values equally likely"
+        return f"a value between {_amount(law.uniform[0])} and {_amount(law.uniform[1])}, all equally likely"
     if law.normal is not None:
         mean, sd = _amount(law.normal.mean), _amount(law.normal.sd)
         return f"normally distributed about {mean} with a standard deviation of {sd}"

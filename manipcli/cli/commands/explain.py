@@ -9,6 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed
+from manipcli.cli.volume import Verbose
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.text import did_you_mean
 
@@ -23,6 +24,7 @@ def explain(
         bool,
         typer.Option("--values", help="Of a task: list each value, and where it comes from; write out each round."),
     ] = False,
+    verbose: Verbose = False,
     overrides: Overrides = None,
     seed: Seed = None,
     package_path: PackagePath = None,
@@ -33,7 +35,8 @@ def explain(
 
     A code: what it reports, why, and an example with and without the defect. A task: its steps, expectations, watches
     and varied values as English sentences with resolved numbers; with --values also the place of each value (file,
-    line and column), its override, its default, or its expression and parameters. Nothing is planned.
+    line and column), its override, its default, or its expression and parameters. --verbose implies --values. Nothing
+    is planned.
     """
     if _is_file(subject):
         return _task(
@@ -43,7 +46,7 @@ def explain(
             tuple(package_path or ()),
             allow_outside=allow_outside,
             format_=format_,
-            values=values,
+            values=values or verbose,
         )
     if values or overrides or seed is not None:
         message = f"--values, --set and --seed need a task; '{subject}' is not a file"

@@ -109,19 +109,21 @@ def check(spec: NoCollisionSpec | CollisionSpec, context: CheckContext) -> tuple
     return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(context, pair, ("pairs", k)))
 
 
-def _touching(spec: PairsSpec) -> str:
-    other = {("robot", "robot"): "one link of the robot touches another"}
-    return listing([other.get(pair) or f"{named(pair[0])} touches {named(pair[1])}" for pair in spec.pairs], "or")
+def _pairs(spec: PairsSpec, touches: str) -> str:
+    """`the robot touches 'desk' or 'tray', or 'cup' touches 'desk'`: pairs grouped by their first part."""
+    others: dict[str, list[str]] = {}
+    for a, b in spec.pairs:
+        others.setdefault(named(a), []).append("itself" if a == b else named(b))
+    return "; or ".join(f"{a} {touches} {listing(b, 'or')}" for a, b in others.items())
 
 
 def no_collision_clause(spec: NoCollisionSpec, robot: RobotModel) -> str:
-    if spec.below:
-        return f"it never happens that {_touching(spec)} with more than {amount(spec.below, 'N')}"
-    return f"it never happens that {_touching(spec)}"
+    pairs = _pairs(spec, "does not touch").replace("; or ", "; ")
+    return f"{pairs}, with more than {amount(spec.below, 'N')}" if spec.below else pairs
 
 
 def collision_clause(spec: CollisionSpec, robot: RobotModel) -> str:
-    return f"{_touching(spec)} with {amount(spec.above, 'N')} or more"
+    return f"{_pairs(spec, 'touches')} with {amount(spec.above, 'N')} or more"
 
 
 NO_COLLISION = Condition(

@@ -47,7 +47,7 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
 
 
 def clause(spec: KeepSpec) -> str:
-    return f"the contents of the held object feel gravity within {amount(spec.slosh or 0.0, 'rad')} of its axis"
+    return f"gravity and acceleration together act within {amount(spec.slosh or 0.0, 'rad')} of the held object's axis"
 
 
 MEMBER = KeepMember("slosh", opened, clause)

@@ -18,11 +18,11 @@ from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc, NotPlannable
-from manipcli.core.prose import amount, listing
-from manipcli.core.text import did_you_mean
+from manipcli.core.prose import amount
+from manipcli.core.text import did_you_mean, number_of
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unfollowed
-from manipcli.plan.clauses import joint_value
+from manipcli.plan.clauses import joint_values
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import GoalTolerances, JointTolerance, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -187,10 +187,9 @@ def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Pr
 
 def clause(spec: FollowSpec, robot: RobotModel) -> str:
     names, points, _ = spec.message
-    through = f"through {len(points)} points" if len(points) > 1 else "to one point"
     timed = "as fast as the limits allow" if spec.retime else f"in {amount(points[-1].seconds, 's')}"
-    ends = [joint_value(robot, name, value) for name, value in zip(names, points[-1].positions, strict=True)]
-    return f"move the joints on a trajectory {through} {timed}; at its end, {listing(ends)}"
+    end = joint_values(robot, names, points[-1].positions)
+    return f"follow a trajectory of {number_of(len(points), 'point')} {timed}, until {end}"
 
 
 MEMBER = StepMember(

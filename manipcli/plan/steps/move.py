@@ -29,7 +29,7 @@ from manipcli.core.prose import amount, listing, named, point
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
-from manipcli.plan.clauses import at_share, joint_value
+from manipcli.plan.clauses import at_share, joint_values
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -300,8 +300,7 @@ def _destination(spec: MoveSpec, robot: RobotModel) -> str:
     if isinstance(spec.to, str):
         return f"to the pose {named(spec.to)}"
     if spec.to is not None:
-        ends = [joint_value(robot, name, value) for name, value in spec.to.items()]
-        return f"the joints: {listing(ends)}"
+        return f"the joints so that {joint_values(robot, list(spec.to), list(spec.to.values()))}"
     frame = "" if spec.frame == "world" else f" in the frame of {named(spec.frame)}"
     within = "" if spec.tolerance is None else f", within {amount(spec.tolerance.distance, 'm')}"
     if spec.pose is None:

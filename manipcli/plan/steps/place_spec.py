@@ -22,7 +22,7 @@ from pydantic import Field, field_validator, model_validator
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.conditions.frames import carrier, fixed_frame, unknown_part
 from manipcli.core.errors import Loc
-from manipcli.core.prose import amount, named, point
+from manipcli.core.prose import amount, named, point, shortest
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.place_goals import UPRIGHT, floor_of
@@ -174,8 +174,9 @@ def where(spec: PlaceSpec) -> str:
     support = "" if spec.support is None else f"{'on' if spec.onto is not None else 'in'} {named(spec.support)}"
     if spec.region is not None:
         box, frame = spec.region.box, spec.region.frame
+        sides = shortest(box.size, "m", " x ", "{}")
         origin = "" if frame in (None, "world") else f" of {named(str(frame))}"
-        return f"{support}, its frame in a rectangle of {point(box.size)} around {point(box.centre)}{origin}"
+        return f"{support}, with its frame in a rectangle of {sides} around {point(box.centre)}{origin}"
     if spec.at_start:
         return "where it was at the start"
     if spec.at is None:
