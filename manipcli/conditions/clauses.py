@@ -45,5 +45,5 @@ def watch_sentence(spec: ExpectationSpec, robot: RobotModel, seam: Seams) -> str
     """A watch: `The robot stops and the run ends as soon as the robot touches 'desk'.`"""
     clause = condition_clause(spec.condition, robot, seam)
     during = f"during {listing([named(step) for step in spec.steps])}, " if spec.steps else ""
-    no_longer = "" if spec.quantifier == "never" else "it is not true that "
+    no_longer = "" if spec.quantifier == "never" else "this is no longer true: "
     return sentence(f"{during}the robot stops and the run ends as soon as {no_longer}{clause}")

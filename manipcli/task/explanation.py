@@ -174,7 +174,7 @@ def _block(task: Task, k: int, block: BlockSpec) -> Group:
     elif block.word == "if":
         taken = task.spec.steps[block.first].id or ""
         branch = ELSE if taken.startswith(f"{block.id}/{ELSE}/") else "then"
-        text = f"The values in the file decide this `if` for `{branch}`:"
+        text = f"The values in the file select `{branch}`:"
     elif block.kind == "parallel":
         text = "At the same time:"
     elif block.word == "do":
