@@ -70,7 +70,9 @@ def test_the_examples_of_a_step(member: StepMember[Any]) -> None:
 
 @pytest.mark.parametrize("member", CONDITIONS.members, ids=CONDITIONS.names)
 def test_the_example_of_a_condition(member: Condition[Any]) -> None:
-    found = load_task_text(f"{HEAD}  - id: lift_1\n    wait: 1\nexpect:\n  - {member.example}\n", "t", model=task_spec())
+    found = load_task_text(
+        f"{HEAD}  - id: lift_1\n    wait: 1\nexpect:\n  - {member.example}\n", "t", model=task_spec()
+    )
     body = found.spec.expect[0].body
     node = node_at(found.source.root, ("expect", 0, member.name))
     clause = member.clause(body, robot())

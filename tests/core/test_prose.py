@@ -42,7 +42,8 @@ def test_known_texts(text: str, found: str) -> None:
 
 
 @given(
-    st.floats(1e-7, 1e7) | st.floats(-1e7, -1e-7), st.sampled_from(["m", "rad", "kg", "s", "N", "m/s", "rad/s", "J", "N m"])
+    st.floats(1e-7, 1e7) | st.floats(-1e7, -1e-7),
+    st.sampled_from(["m", "rad", "kg", "s", "N", "m/s", "rad/s", "J", "N m"]),
 )
 def test_an_amount_reads_back(value: float, symbol: str) -> None:
     found = parse_quantity(amount(value, symbol))
