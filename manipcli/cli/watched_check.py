@@ -21,6 +21,7 @@ def watch_files(
     package_path: Sequence[Path],
     allow_outside: bool,
     format_: str,
+    strict: bool,
 ) -> None:
     """Checks the files after each change until Ctrl-C; see `check_files`.
 
@@ -63,7 +64,7 @@ def watch_files(
                 on_plan=plans.__setitem__,
             )
         names = [str(file) for file in files]
-        console.result((json if format_ == "json" else text).render_findings(findings, names))
+        console.result((json if format_ == "json" else text).render_findings(findings, names, strict=strict))
         failed = {finding.place.file for finding in findings if finding.severity == "error" and finding.place}
         for file, plan in plans.items() if format_ == "text" else ():
             if str(file) not in failed:

@@ -69,6 +69,7 @@ def check(
                 package_path=tuple(package_path or ()),
                 allow_outside=allow_outside,
                 format_=format_,
+                strict=strict,
             )
         except KeyboardInterrupt:
             return ExitCode.PASSED

@@ -66,7 +66,7 @@ def explain(
 
 def _is_file(subject: str) -> bool:
     """Whether it is the path of a file; codes are single words without a dot."""
-    return "/" in subject or "." in subject or Path(subject).exists()
+    return bool(subject) and ("/" in subject or "." in subject or Path(subject).exists())
 
 
 def _task(
