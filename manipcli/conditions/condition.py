@@ -117,6 +117,8 @@ class Condition(Generic[S]):
             `absent` is None.
         check: (spec, context) -> every unknown name in the spec.
         absent: (spec, world) -> why it cannot be evaluated in this world, or None.
+        clause: (spec, robot) -> the condition in English, as a statement without a capital and a full stop: `'ball' is
+            inside 'tray'`. `core/prose.py` has the parts.
         scope: the default time of an expectation.
         example: in YAML.
         stateless: True if it uses only contacts and steps, which are known at every tick, also in a log with fewer
@@ -130,6 +132,7 @@ class Condition(Generic[S]):
     open: Callable[[S, World], Monitor]
     check: Callable[[S, CheckContext], tuple[Problem, ...]]
     absent: Callable[[S, World], str | None]
+    clause: Callable[[S, RobotModel], str]
     example: str
     scope: Scope = "end"
     stateless: bool = False

@@ -8,7 +8,9 @@ from pydantic import Field
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
+from manipcli.core.prose import named
 from manipcli.core.text import did_you_mean
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import StepName
 
@@ -53,6 +55,10 @@ def check(spec: StepDoneSpec, context: CheckContext) -> tuple[Problem, ...]:
     return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, context.steps)),)
 
 
+def clause(spec: StepDoneSpec, robot: RobotModel) -> str:
+    return f"step {named(spec.step)} is done"
+
+
 STEP_DONE = Condition(
     name="step_done",
     spec=StepDoneSpec,
@@ -60,6 +66,7 @@ STEP_DONE = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: None if spec.step in world.steps else f"the recording has no step '{spec.step}'",
+    clause=clause,
     example="step_done: {step: lift_1}",
     stateless=True,
 )
