@@ -49,6 +49,9 @@ FILES = [page for page in PAGES.values() if page.kind in BASES or (page.kind in 
 def written(page: CodePage, text: str, folder: Path) -> Path:
     """The example as a complete file: the keys of its base that it does not have are added."""
     (folder / "arm.urdf").write_text(ARM)
+    for name in ("robots", "controllers"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to(ROOT / name)
     for name, content in page.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(content)
