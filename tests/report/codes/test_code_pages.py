@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -43,11 +44,15 @@ ARM = """<robot name="arm">
 """`arm.urdf` beside the examples of robot and controllers files."""
 PAGES = code_pages()
 CHECKED = {check.code for check in CHECKS}
-FILES = [page for page in PAGES.values() if page.kind in BASES or (page.kind in ("urdf", "xacro") and page.good)]
+IN_SOURCE = set(re.findall(r"(?<!\d)\d{3}(?!\d)", "\n".join(path.read_text(encoding="utf-8") for path in SOURCE)))
+"""Numbers of codes; a page may be written before its code is."""
+PRESENT = [page for page in PAGES.values() if page.code[-3:] in IN_SOURCE]
+COMMANDS = [page for page in PRESENT if page.kind == "command"]
+FILES = [page for page in PRESENT if page.kind in BASES or (page.kind in ("urdf", "xacro") and page.good)]
 
 
-def written(page: CodePage, text: str, folder: Path) -> Path:
-    """The example as a complete file: the keys of its base that it does not have are added."""
+def surround(page: CodePage, folder: Path) -> None:
+    """Writes the files that examples name."""
     (folder / "arm.urdf").write_text(ARM)
     for name in ("robots", "controllers"):
         if not (folder / name).exists():
@@ -55,6 +60,11 @@ def written(page: CodePage, text: str, folder: Path) -> Path:
     for name, content in page.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(content)
+
+
+def written(page: CodePage, text: str, folder: Path) -> Path:
+    """The example as a complete file: the keys of its base that it does not have are added."""
+    surround(page, folder)
     if page.kind in ("urdf", "xacro"):
         path = folder / ("example.urdf.xacro" if page.kind == "xacro" else "example.urdf")
         path.write_text(text)
@@ -83,6 +93,33 @@ def test_the_faulty_example_gets_the_code_and_the_sound_one_no_error(page: CodeP
         found = pipeline.check_files([written(page, page.good, tmp_path)])
         assert page.code not in {finding.code for finding in found}, found
         assert not [finding for finding in found if finding.severity == "error"], found
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The log of a short run, for examples that read one."""
+    folder = tmp_path_factory.mktemp("log")
+    (folder / "task.yaml").write_text(BASES["task"])
+    assert app.main(["run", str(folder / "task.yaml"), "--log", str(folder / "run.mcap")]) == ExitCode.PASSED
+    return (folder / "run.mcap").read_bytes()
+
+
+@pytest.mark.parametrize("page", COMMANDS, ids=lambda page: page.code)
+def test_the_faulty_command_gets_the_code_and_the_sound_one_passes(
+    page: CodePage, log: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    surround(page, tmp_path)
+    (tmp_path / "task.yaml").write_text(BASES["task"])
+    (tmp_path / "run.mcap").write_bytes(log)
+    monkeypatch.chdir(tmp_path)
+    for command in filter(None, (page.bad, page.good)):
+        settings, _, words = command.partition("manipcli ")
+        for name, _, value in (setting.partition("=") for setting in settings.split()):
+            monkeypatch.setenv(name, value)
+        code = app.main(shlex.split(words))
+        found = page.code in "".join(capsys.readouterr())
+        assert found == (command == page.bad)
+        assert (code != ExitCode.PASSED) == found
 
 
 def test_every_code_in_the_source_has_a_page() -> None:
