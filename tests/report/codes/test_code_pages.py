@@ -45,7 +45,7 @@ ARM = """<robot name="arm">
 PAGES = code_pages()
 CHECKED = {check.code for check in CHECKS}
 TEXT = "\n".join(path.read_text(encoding="utf-8") for path in SOURCE)
-NUMBERED = ("model", "preflight", "scene", "spec", "task")
+NUMBERED = ("control", "model", "preflight", "scene", "spec", "task")
 """Folders whose codes are made of the area of a file and a number."""
 NUMBERS = {
     number for path in SOURCE if path.relative_to(ROOT / "manipcli").parts[0] in NUMBERED
@@ -156,6 +156,6 @@ def test_the_docs_are_those_of_the_pages() -> None:
 
 def test_the_command_prints_a_page(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["explain", "task203"]) == ExitCode.PASSED
-    assert capsys.readouterr().out.startswith("TASK203: unknown parameter\n")
+    assert capsys.readouterr().out.startswith("TASK203: unknown parameter")
     assert app.main(["explain", "TSAK203"]) == ExitCode.USAGE
     assert "did you mean 'TASK203'" in capsys.readouterr().err
