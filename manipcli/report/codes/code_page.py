@@ -94,8 +94,13 @@ def render_text(page: CodePage) -> str:
     blocks = [f"{page.code}: {page.title}", page.what, page.why]
     for title, example in (("This gets it:", page.bad), ("This does not:", page.good)):
         if example:
-            blocks.append("\n".join([title, *(f"    {line}".rstrip() for line in example.split("\n"))]))
+            blocks.append(_indented(title, example))
+    blocks += [_indented(f"with {name}:", text.strip()) for name, text in page.files.items()]
     return "\n\n".join(block for block in blocks if block)
+
+
+def _indented(title: str, text: str) -> str:
+    return "\n".join([title, *(f"    {line}".rstrip() for line in text.split("\n"))])
 
 
 def render_markdown(page: CodePage) -> str:
