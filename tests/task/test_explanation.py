@@ -53,7 +53,7 @@ TASK = f"""{HEAD}steps:
   - if: {{inside: {{object: red, of: tray}}}}
     then: [{{wait: 1 s}}]
     else: [{{move: {{to: home}}}}]
-  - parallel: [{{move: {{to: home}}}}, {{release: {{}}}}]
+  - parallel: [{{move: {{to: {{panda_joint1: 10 deg}}}}}}, {{release: {{}}}}]
 expect:
   - near: {{object: red, to: start, within: $half}}
   - eventually: {{not: {{at_rest: {{object: red}}}}}}
