@@ -75,16 +75,16 @@ def watch_files(
         """A round; what goes wrong in it is printed, since a file may have vanished while it was read."""
         from manipcli.report.text import describe
 
+        found = [*files]
         try:
-            return one(changed)
+            found = one(changed)
         except ManipcliError as error:
             for finding in error.findings:
                 console.error(describe(finding))
         except Exception as error:  # noqa: BLE001 (a file that is being written must not end the watch)
             console.error(f"✗ the check failed: {type(error).__name__}: {error}")
-        finally:
-            console.talk("waiting for changes; Ctrl-C stops")
-        return [*files]
+        console.talk("waiting for changes; Ctrl-C stops")
+        return found
 
     folder = cache_folder()
 

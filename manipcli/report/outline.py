@@ -15,6 +15,7 @@ from manipcli.core.prose import listing
 from manipcli.task.explanation import Explanation, Group
 
 INDEX: Final = "index"
+LETTERS: Final = "kmnpqrstuvwxyz"
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,7 @@ class Item:
     """A step or a block.
 
     Attributes:
-        id: its id; in the template of a round with `[k]`.
+        id: its id; in the template of a round with `[k]` or `[m]`.
         text: its sentence, or the heading of its parts.
         parts: headings ("" for none) and their items.
         then: what follows its parts.
@@ -95,7 +96,11 @@ def _collapsed(group: Group, rounds: Sequence[Group], items: Sequence[Item]) -> 
             groups.append((_template(steps, group.id, own), [own]))
         else:
             known.append(own)
-    parts = tuple((_heading(members, len(groups)), form) for form, members in groups)
+    alone = {own.id: item.parts[0][1] for own, item in zip(rounds, items, strict=True)}
+    # A round of its own keeps its values: a value may be in a sentence without being the parameter's.
+    parts = tuple(
+        (_heading(members, len(groups)), form if len(members) > 1 else alone[members[0].id]) for form, members in groups
+    )
     count = len(rounds)
     text = f"Do these steps {count} times:" if count > 1 and not _values(rounds[0]) and len(groups) == 1 else group.text
     text = text.replace("For each of 1 rounds:", "For one round:")
@@ -104,15 +109,21 @@ def _collapsed(group: Group, rounds: Sequence[Group], items: Sequence[Item]) -> 
 
 def _heading(rounds: Sequence[Group], groups: int) -> str:
     """The rounds of a group and their values."""
-    lines = [f"k = {_number(own)}{_values(own)}" for own in rounds]
+    letter = _letter(rounds[0].id)
+    lines = [f"{letter} = {_number(own)}{_values(own)}" for own in rounds]
     if not _values(rounds[0]):
-        return "" if groups == 1 else f"k = {listing([str(_number(own)) for own in rounds])}:"
+        return "" if groups == 1 else f"{letter} = {listing([str(_number(own)) for own in rounds])}:"
     return "; ".join(lines) + ":"
 
 
 def _values(own: Group) -> str:
     texts = [f"{name} = {value}" for name, value in sorted(own.given.items()) if name != INDEX]
     return f", {', '.join(texts)}" if texts else ""
+
+
+def _letter(round_: str) -> str:
+    """The letter for the number of a round: another in each nested `repeat`."""
+    return LETTERS[min(round_.count("[") - 1, len(LETTERS) - 1)]
 
 
 def _number(own: Group) -> int:
@@ -130,7 +141,7 @@ def _template(items: Sequence[Item], repeat: str, own: Group) -> tuple[Item, ...
     found = re.compile("|".join(rf"(?<![\w.]){re.escape(value)}(?![\w.]*\w)" for value in forms)) if forms else None
 
     def change(text: str) -> str:
-        text = text.replace(f"{repeat}[{_number(own)}]", f"{repeat}[k]")
+        text = text.replace(f"{repeat}[{_number(own)}]", f"{repeat}[{_letter(own.id)}]")
         return text if found is None else found.sub(lambda match: f"${names[match.group()]}", text)
 
     return tuple(item.mapped(change) for item in items)
@@ -140,7 +151,7 @@ def _filled(form: Sequence[Item], repeat: str, own: Group) -> tuple[Item, ...]:
     """A template with the values of a round."""
 
     def change(text: str) -> str:
-        text = text.replace(f"{repeat}[k]", f"{repeat}[{_number(own)}]")
+        text = text.replace(f"{repeat}[{_letter(own.id)}]", f"{repeat}[{_number(own)}]")
         return re.sub(r"\$([A-Za-z_]\w*)", lambda match: own.given.get(match.group(1), match.group()), text)
 
     return tuple(item.mapped(change) for item in form)

@@ -167,7 +167,18 @@ def readable_value(value: object, unit: str | None, node: Node | None = None) ->
         if numbers and len(numbers) == len(value):
             return point(numbers, unit or "")
         return f"[{', '.join(readable_value(item, unit) for item in value)}]"
-    return f"'{value}'" if isinstance(value, str) else str(value)
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {readable_value(each, unit)}' for key, each in value.items())}}}"
+    return _text(value) if isinstance(value, str) else str(value)
+
+
+def _text(value: str) -> str:
+    """A word in quotes; a quantity without."""
+    try:
+        quantity = parse_quantity(value)
+    except UnitError:
+        return f"'{value}'"
+    return f"'{value}'" if quantity.dimension == NUMBER else amount(quantity.value, quantity.dimension.symbol)
 
 
 def _is_plain(node: SequenceNode) -> bool:

@@ -53,7 +53,7 @@ TASK = f"""{HEAD}steps:
   - if: {{inside: {{object: red, of: tray}}}}
     then: [{{wait: 1 s}}]
     else: [{{move: {{to: home}}}}]
-  - parallel: [{{move: {{to: home}}}}, {{release: {{}}}}]
+  - parallel: [{{move: {{to: {{panda_joint1: 10 deg}}}}}}, {{release: {{}}}}]
 expect:
   - near: {{object: red, to: start, within: $half}}
   - eventually: {{not: {{at_rest: {{object: red}}}}}}
@@ -209,3 +209,15 @@ def test_the_text(path: Path) -> None:
     assert max(map(len, text.splitlines())) <= 120
     whole = render_text(explained(load_task(path)), values=True)
     assert all(str(value) in whole for value in all_values(explained(load_task(path))))
+
+
+def test_nested_rounds_have_letters_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "task.yaml"
+    inner = "{repeat: {each: {w: [1 s, 2 s]}, steps: [{wait: $w}]}}"
+    path.write_text(f"{HEAD}steps:\n  - repeat: {{times: 2, steps: [{inner}, {{wait: 5 s}}]}}\n")
+    items = {item.id: item for item in leaves(outline(explained(load_task(path))))}
+    assert {*items} == {"repeat_1", "repeat_1[k]/repeat_1", "repeat_1[k]/repeat_1[m]/wait_1", "repeat_1[k]/wait_1"}
+    assert items["repeat_1[k]/repeat_1[m]/wait_1"].text == "Hold still for $w."
+    path.write_text(f"{HEAD}steps:\n  - repeat: {{times: 2, steps: [{{wait: 1 s + $index * 1 s}}]}}\n")
+    items = {item.id: item for item in leaves(outline(explained(load_task(path))))}
+    assert [items[f"repeat_1[{k}]/wait_1"].text for k in (0, 1)] == ["Hold still for 1 s.", "Hold still for 2 s."]
