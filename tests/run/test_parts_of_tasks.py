@@ -178,6 +178,21 @@ def test_expectations_about_other_steps_are_not_evaluated(
     assert same_again(log)
 
 
+@pytest.mark.parametrize(("within", "found"), [(2.0, "not_evaluated"), (0.01, "failed")])
+def test_what_must_hold_throughout_several_steps_fails_in_those_that_were_run(
+    waves: Path, tmp_path: Path, within: float, found: str
+) -> None:
+    """The rest of the steps cannot mend it; where it holds so far, they may still break it."""
+    task = waves / f"throughout_{found}.yaml"
+    expect = f"expect:\n  - always: {{at_pose: {{pose: up, within: {within}}}}}\n    during: [up, down]\n"
+    task.write_text(TASK.partition("expect:")[0] + expect)
+    verdict = run_task(task, log=tmp_path / "part.mcap", until="up").verdict
+    (one,) = verdict.expectations
+    assert (one.outcome, one.excused) == (found, found == "not_evaluated")
+    assert verdict.verdict == ("failed" if found == "failed" else "passed")
+    assert judge_log(tmp_path / "part.mcap") == verdict
+
+
 def same_again(log: Path) -> bool:
     verification = verify_log(log)
     return verification.messages.same and not verification.entries
