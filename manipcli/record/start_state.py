@@ -97,8 +97,10 @@ class StartState:
     def damage(self) -> str:
         """Why no run can begin with it: sizes, or numbers that no run reaches; "" if one can."""
         n, m = len(self.joints), len(self.bodies)
-        sizes = [(self.position, (n,)), (self.velocity, (n,)), (self.reference, (n,))]
-        sizes += [(self.poses, (m, 7)), (self.twists, (m, 6))]
+        sizes: list[tuple[Array, tuple[int, ...]]] = [
+            (self.position, (n,)), (self.velocity, (n,)), (self.reference, (n,)),
+            (self.poses, (m, 7)), (self.twists, (m, 6)),
+        ]  # fmt: skip
         if any(values.shape != size for values, size in sizes):
             return "its lists have different lengths"
         known = [values for values, _ in sizes if values is not self.reference]
