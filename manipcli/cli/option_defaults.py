@@ -25,7 +25,7 @@ from manipcli.core.text import did_you_mean, escape, shorten
 
 OWN: Final = "manipcli.toml"
 PROJECT: Final = "pyproject.toml"
-REFUSED: Final = ("force", "allow-outside", "help", "version")
+REFUSED: Final = ("force", "allow-outside", "allow-env", "help", "version")
 """Options that a person gives: they lift a protection."""
 LARGEST: Final = 1_000_000
 """[bytes] A larger file is not read."""
