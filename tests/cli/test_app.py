@@ -304,15 +304,23 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
-    pipeline.plan_task = lambda _, **__: SimpleNamespace(
+    plan = SimpleNamespace(
         motions=(_motion(),),
         steps=(),
+        every=(),
+        branches={},
+        combinations=(),
+        branch="",
+        items=(),
+        duration=2.0,
         path_kinds=lambda: ("straight",),
         clearances=lambda: (NEAR,),
         margins=lambda: (margins,),
         grasps=tuple,
         stated_clearances=tuple,
     )
+    plan.stretches = (plan,)
+    pipeline.plan_task = lambda _, **__: plan
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
     assert "j1 velocity, 60 % of the time" in (out := capsys.readouterr().out)
@@ -332,7 +340,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple)
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple, stretches=())
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
     assert "' does not exist" in capsys.readouterr().err
 
