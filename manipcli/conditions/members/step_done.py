@@ -8,7 +8,7 @@ from pydantic import Field
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, listed
 from manipcli.spec.base import Model
 from manipcli.spec.names import StepName
 
@@ -50,6 +50,9 @@ def check(spec: StepDoneSpec, context: CheckContext) -> tuple[Problem, ...]:
     """An unknown step."""
     if context.steps is None or spec.step in context.steps:
         return ()
+    if spec.step in context.blocks:
+        inside = [step for step in context.steps if step.startswith((f"{spec.step}/", f"{spec.step}["))]
+        return (Problem(("step",), f"'{spec.step}' is a block, not a step", f"name a step in it: {listed(inside)}"),)
     return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, context.steps)),)
 
 
