@@ -122,3 +122,11 @@ def test_a_bad_default_is_told_with_its_place(
     (tmp_path / "manipcli.toml").write_text('[list]\nformat = "xml"\n')
     assert app.main(["list", "steps"]) == ExitCode.USAGE
     assert f"hint: it is a default: --format xml ({tmp_path / 'manipcli.toml'}:2)" in capsys.readouterr().err
+
+
+def test_the_table_of_a_project_in_the_own_file(tmp_path: Path) -> None:
+    (tmp_path / "manipcli.toml").write_text("[tool.manipcli.walk]\nsteps = 3\n")
+    with pytest.raises(InvalidInput) as raised:
+        defaults_of("walk", COMMANDS, folder=tmp_path)
+    (found,) = raised.value.findings
+    assert found.hint == "in manipcli.toml write `[check]` instead of `[tool.manipcli.check]`"
