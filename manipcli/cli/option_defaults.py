@@ -190,7 +190,10 @@ class _Reader:
                 )
             elif key not in everywhere:
                 known = [*everywhere, *self._options]
-                self._error("", key, f"there is no option or command '{escape(key)}'", did_you_mean(key, known))
+                hint = did_you_mean(key, known)
+                if key == "tool" and self._file.path.name == OWN:
+                    hint = f"in {OWN} write `[check]` instead of `[tool.manipcli.check]`"
+                self._error("", key, f"there is no option or command '{escape(key)}'", hint)
             else:
                 yield "", key, value
         for section, table in self._file.table.items():

@@ -77,6 +77,7 @@ class CheckContext:
         steps: the ids of its steps; None: unknown.
         in_order: True if `steps` is complete and in order; else it holds every possible id, unordered.
         self_collision: whether links of the robot collide with each other in the simulation.
+        blocks: the ids of its blocks.
     """
 
     robot: RobotModel
@@ -84,6 +85,7 @@ class CheckContext:
     steps: tuple[str, ...] | None = None
     in_order: bool = True
     self_collision: bool = True
+    blocks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +178,11 @@ def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) ->
     if name in known:
         return ()
     word = "a movable body of the scene" if movable else "in the scene"
-    return (Problem(loc, f"'{name}' is not {word}", did_you_mean(name, known)),)
+    body, _, part = name.partition("/")
+    apart = (
+        f"name the body, '{body}'; where the step has `part`, add `part: {part}`" if part and body in known else None
+    )
+    return (Problem(loc, f"'{name}' is not {word}", apart or did_you_mean(name, known)),)
 
 
 def unknown_group(robot: RobotModel, name: str | None, loc: Loc) -> tuple[Problem, ...]:

@@ -136,3 +136,11 @@ def test_a_file_that_comes_with_a_task_opens_nothing(
     (tmp_path / "manipcli.toml").write_text(text)
     assert app.main(["check-urdf", "a.urdf.xacro"]) == ExitCode.USAGE
     assert "cannot be set here: it lifts a protection" in capsys.readouterr().err
+
+
+def test_the_table_of_a_project_in_the_own_file(tmp_path: Path) -> None:
+    (tmp_path / "manipcli.toml").write_text("[tool.manipcli.walk]\nsteps = 3\n")
+    with pytest.raises(InvalidInput) as raised:
+        defaults_of("walk", COMMANDS, folder=tmp_path)
+    (found,) = raised.value.findings
+    assert found.hint == "in manipcli.toml write `[check]` instead of `[tool.manipcli.check]`"

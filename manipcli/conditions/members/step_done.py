@@ -9,7 +9,7 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.prose import named
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, listed
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import StepName
@@ -52,6 +52,9 @@ def check(spec: StepDoneSpec, context: CheckContext) -> tuple[Problem, ...]:
     """An unknown step."""
     if context.steps is None or spec.step in context.steps:
         return ()
+    if spec.step in context.blocks:
+        inside = [step for step in context.steps if step.startswith((f"{spec.step}/", f"{spec.step}["))]
+        return (Problem(("step",), f"'{spec.step}' is a block, not a step", f"name a step in it: {listed(inside)}"),)
     return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, context.steps)),)
 
 
