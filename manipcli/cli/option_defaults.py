@@ -12,6 +12,7 @@ cannot lift a protection, and its paths, relative to it, stay below its folder.
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -222,9 +223,9 @@ class _Reader:
         return None
 
     def _path(self, section: str, key: str, word: str) -> str | None:
-        folder = self._file.path.parent.resolve()
+        folder = Path(os.path.realpath(self._file.path.parent))
         try:
-            path = (folder / word).resolve()
+            path = Path(os.path.realpath(folder / word))
             below = path.is_relative_to(folder)
         except (OSError, ValueError):
             below = False

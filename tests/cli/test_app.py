@@ -296,7 +296,9 @@ def _motion() -> SimpleNamespace:
     trajectory = JointTrajectory.of_arrays(
         ("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1))
     )
-    return SimpleNamespace(step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0)
+    return SimpleNamespace(
+        step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0, branch="", beside=False
+    )
 
 
 def test_plan_names_the_joint_that_limits_and_writes_every_point(
@@ -416,7 +418,7 @@ def test_what_is_on_a_full_disk_is_named_and_no_bug(
 
 def test_a_file_on_a_full_disk_is_named(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple)
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple, stretches=())
     assert main(["plan", "t.yaml", "--csv", "/dev/full"]) == 3
     assert capsys.readouterr().err == "error[INT001]: /dev/full: the disk is full (No space left on device)\n"
 

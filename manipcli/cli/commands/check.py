@@ -9,7 +9,6 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed
-from manipcli.cli.progress import PlanningProgress
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 UNREADABLE: Final = {"USE101", "USE102", "USE103"}
@@ -52,6 +51,7 @@ def check(
     to compare joints and gains.
     """
     from manipcli import pipeline
+    from manipcli.cli.progress import PlanningProgress
     from manipcli.report import json, text
     from manipcli.report.inertials import render_table
 

@@ -47,10 +47,10 @@ Parse = Callable[[Path, str], tuple[Node | None, list[Diagnostic]]]
 
 def within(folder: Path) -> Find:
     """Finds files in a folder and below, symbolic links resolved."""
-    root = folder.resolve()
+    root = Path(os.path.realpath(folder))
 
     def find(name: str, base: Path) -> Path:
-        found = (base.parent / name).resolve()
+        found = Path(os.path.realpath(base.parent / name))
         if not found.is_relative_to(root):
             raise Refused(f"'{escape(name)}' is outside the folder of the task")
         if not found.exists():
@@ -124,7 +124,7 @@ class Files:
         except (OSError, ValueError, RuntimeError):
             self.reports.add(Diagnostic("TASK264", f"{at}: '{shorten(named.value)}' is not a name of a file", place))
             return None
-        chain = user.chain or (user.path.resolve(),)
+        chain = user.chain or (Path(os.path.realpath(user.path)),)
         if path in chain:
             self.reports.add(
                 Diagnostic("TASK264", f"{at}: '{escape(named.value)}' uses itself", place, "remove this use")
