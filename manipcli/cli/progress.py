@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Sequence
-from typing import Protocol, Self
+from typing import Final, Protocol, Self
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
@@ -15,8 +16,8 @@ from manipcli.report.text import describe, describe_step
 REDRAW_PERIOD = 0.1
 """[s] of wall time between two drawings: drawing more often would slow a run of 1000 ticks per second."""
 
-_PLANNING = "planning step"
-"""Start of the lines of the planner."""
+_PLANNED_STEP: Final = re.compile(r"planning step \d+ of \d+, '[^']*'(?: \([^)]*\))?")
+"""What a line of the planner says of its step, before the candidate: `planning step 3 of 5, 'place_1' (if_1: then)`."""
 
 
 class NamedStep(Protocol):
@@ -51,9 +52,10 @@ class PlanningProgress:
 
     def activity(self, what: str) -> None:
         """Shows a line of the planner: `planning step 3 of 5, 'pick_1': candidate 12`."""
-        if self._quiet or not what.startswith(_PLANNING):
+        found = _PLANNED_STEP.match(what)
+        if self._quiet or found is None:
             return
-        step = what.partition(": ")[0]
+        step = found[0]
         if self._live:
             now = time.monotonic()
             if step not in self._printed or now >= self._next_drawing:

@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from manipcli.cli.progress import StepProgress
+from manipcli.cli.progress import PlanningProgress, StepProgress
 from manipcli.judge.verdict import StepOutcome
 
 STEP = StepOutcome("lift_1", "lift", "done", 1.0, 2.0, 0.9)
@@ -49,3 +49,11 @@ def test_quiet_is_silent(capsys: pytest.CaptureFixture[str]) -> None:
         progress.tick(0.1, 0.1)
         progress.step_ended(STEP)
     assert capsys.readouterr().err == ""
+
+
+def test_a_planned_step_is_one_whole_line_in_each_branch(capsys: pytest.CaptureFixture[str]) -> None:
+    then, other = (f"planning step 2 of 2, 'sort[0]/place_1' (sort[0]/if_1: {word})" for word in ("then", "else"))
+    with PlanningProgress() as progress:
+        for line in ("planning step 1 of 2, 'pick_1'", then, f"{then}: candidate 2, path search", other, "judging: 3"):
+            progress.activity(line)
+    assert capsys.readouterr().err.splitlines() == ["planning step 1 of 2, 'pick_1'", then, other]
