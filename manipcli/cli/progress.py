@@ -77,6 +77,7 @@ class StepProgress:
         self._verbose = verbose
         self._quiet = quiet
         self._live = console.is_live() and not quiet
+        self._counts: dict[str, str] = {}
         self._head = ""
         self._next_drawing = 0.0
         self._planning = PlanningProgress(quiet=quiet)
@@ -102,13 +103,14 @@ class StepProgress:
     def step_started(self, step: NamedStep, index: int, total: int) -> None:
         """Step `index` (from 0) of `total` begins."""
         self._may_stop()
-        self._head = f"[{index + 1}/{total}] {step.id}"
+        self._counts[step.id] = f"[{index + 1}/{total}] "
+        self._head = f"{self._counts[step.id]}{step.id}"
         self._next_drawing = 0.0
         if self._verbose and not self._live and not self._quiet:
             console.talk(f"{self._head}: started")
 
     def message(self, text: str, *, detail: bool) -> None:
-        """Prints an unplanned event of the current step; a `detail` only with --verbose."""
+        """Prints an unplanned event, of the current step if there is one; a `detail` only with --verbose."""
         if self._quiet or (detail and not self._verbose):
             return
         if self._live:
@@ -122,15 +124,15 @@ class StepProgress:
             return
         self._next_drawing = wall + REDRAW_PERIOD
         speed = f"{simulated_time / wall:.1f} x real time" if wall > 0.0 else ""
-        console.redraw(f"{self._head}  {simulated_time:.2f} s  {speed}")
+        console.redraw(f"{self._head}  {simulated_time:.2f} s  {speed}".lstrip())
 
     def step_ended(self, outcome: StepOutcome) -> None:
         """Prints the outcome of a step."""
         if self._live:
             console.redraw("")
         if not self._quiet and (self._verbose or not self._live):
-            count = self._head.split(" ", 1)[0]
-            console.talk(f"{count} {describe_step(outcome)}")
+            console.talk(f"{self._counts.get(outcome.id, '')}{describe_step(outcome)}")
+        self._head = ""
 
     def _may_stop(self) -> None:
         if self._interrupts is not None:
