@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Sequence
-from typing import Protocol, Self
+from typing import Final, Protocol, Self
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
@@ -15,8 +16,8 @@ from manipcli.report.text import describe, describe_step
 REDRAW_PERIOD = 0.1
 """[s] of wall time between two drawings: drawing more often would slow a run of 1000 ticks per second."""
 
-_PLANNING = "planning step"
-"""Start of the lines of the planner."""
+_PLANNED_STEP: Final = re.compile(r"planning step \d+ of \d+, '[^']*'(?: \([^)]*\))?")
+"""What a line of the planner says of its step, before the candidate: `planning step 3 of 5, 'place_1' (if_1: then)`."""
 
 
 class NamedStep(Protocol):
@@ -51,9 +52,10 @@ class PlanningProgress:
 
     def activity(self, what: str) -> None:
         """Shows a line of the planner: `planning step 3 of 5, 'pick_1': candidate 12`."""
-        if self._quiet or not what.startswith(_PLANNING):
+        found = _PLANNED_STEP.match(what)
+        if self._quiet or found is None:
             return
-        step = what.partition(": ")[0]
+        step = found[0]
         if self._live:
             now = time.monotonic()
             if step not in self._printed or now >= self._next_drawing:
@@ -75,6 +77,7 @@ class StepProgress:
         self._verbose = verbose
         self._quiet = quiet
         self._live = console.is_live() and not quiet
+        self._counts: dict[str, str] = {}
         self._head = ""
         self._next_drawing = 0.0
         self._planning = PlanningProgress(quiet=quiet)
@@ -100,13 +103,14 @@ class StepProgress:
     def step_started(self, step: NamedStep, index: int, total: int) -> None:
         """Step `index` (from 0) of `total` begins."""
         self._may_stop()
-        self._head = f"[{index + 1}/{total}] {step.id}"
+        self._counts[step.id] = f"[{index + 1}/{total}] "
+        self._head = f"{self._counts[step.id]}{step.id}"
         self._next_drawing = 0.0
         if self._verbose and not self._live and not self._quiet:
             console.talk(f"{self._head}: started")
 
     def message(self, text: str, *, detail: bool) -> None:
-        """Prints an unplanned event of the current step; a `detail` only with --verbose."""
+        """Prints an unplanned event, of the current step if there is one; a `detail` only with --verbose."""
         if self._quiet or (detail and not self._verbose):
             return
         if self._live:
@@ -120,15 +124,15 @@ class StepProgress:
             return
         self._next_drawing = wall + REDRAW_PERIOD
         speed = f"{simulated_time / wall:.1f} x real time" if wall > 0.0 else ""
-        console.redraw(f"{self._head}  {simulated_time:.2f} s  {speed}")
+        console.redraw(f"{self._head}  {simulated_time:.2f} s  {speed}".lstrip())
 
     def step_ended(self, outcome: StepOutcome) -> None:
         """Prints the outcome of a step."""
         if self._live:
             console.redraw("")
         if not self._quiet and (self._verbose or not self._live):
-            count = self._head.split(" ", 1)[0]
-            console.talk(f"{count} {describe_step(outcome)}")
+            console.talk(f"{self._counts.get(outcome.id, '')}{describe_step(outcome)}")
+        self._head = ""
 
     def _may_stop(self) -> None:
         if self._interrupts is not None:

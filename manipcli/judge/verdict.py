@@ -26,6 +26,12 @@ def broken_at(watch: str) -> str:
     return f"'{watch}' is broken at "
 
 
+def own_name(id: str) -> str:
+    """An id without the blocks around it: `pick_1` of `stack[0]/pick_1`, `else/place_1` of `if_1/else/place_1`."""
+    around, _, name = id.rpartition("/")
+    return f"else/{name}" if around.endswith("/else") else name
+
+
 @dataclass(frozen=True, slots=True)
 class Attempt:
     """An attempt at a step: start and end [s], and outcome."""
@@ -65,8 +71,8 @@ class StepOutcome:
 
     @property
     def label(self) -> str:
-        """Its id, followed by its verb unless the id begins with it."""
-        return self.id if self.id.startswith(self.verb) else f"{self.id} ({self.verb})"
+        """Its id, followed by its verb unless its own name begins with it."""
+        return self.id if self.id.rpartition("/")[2].startswith(self.verb) else f"{self.id} ({self.verb})"
 
     @property
     def went_wrong(self) -> bool:

@@ -10,24 +10,28 @@ PATH_SEARCH: Final = "path search"
 
 
 class SearchProgress:
-    """Reports each step, candidate and path search; the text before the colon names the step.
+    """Reports each step, candidate and path search.
 
     Args:
         report: receives each line.
         ids: of the steps.
-        branch: the outcomes of the choices before them, in words.
+        branch: the outcomes of the choices before the step of this index, in words.
     """
 
-    def __init__(self, report: Callable[[str], None], ids: Sequence[str], branch: str = "") -> None:
+    def __init__(
+        self, report: Callable[[str], None], ids: Sequence[str], branch: Callable[[int], str] = lambda _: ""
+    ) -> None:
         self._report = report
         self._ids = ids
-        self._where = f" ({branch})" if branch else ""
+        self._branch = branch
         self._step = ""
         self._details: tuple[str, ...] = ()
 
     def step(self, k: int, again: bool) -> None:
         """Step `k` is planned; `again`: with another candidate, as a later step has no plan with the last."""
-        self._step = f"planning step {k + 1} of {len(self._ids)}, '{self._ids[k]}'{self._where}"
+        branch = self._branch(k)
+        where = f" ({branch})" if branch else ""
+        self._step = f"planning step {k + 1} of {len(self._ids)}, '{self._ids[k]}'{where}"
         self._details = ("another candidate",) if again else ()
         self._show()
 

@@ -127,6 +127,7 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str]:
         "start": playback.start,
         "end": playback.end,
         "steps": [asdict(step) for step in playback.steps],
+        "skipped": _skipped(playback),
         "camera": {"eye": camera.eye, "target": camera.target, "field": camera.field},
         "ground": ground_height(drawing, start, floors),
         "frames": frames,
@@ -156,6 +157,18 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str]:
     # These three occur only in JSON strings; a name must not end the script element.
     safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     return safe, pack.text()
+
+
+def _skipped(playback: Playback) -> list[Json]:
+    """The skipped steps, each with the number of steps that are listed before it."""
+    index = {step.id: k for k, step in enumerate(playback.steps, 1)}
+    found: list[Json] = []
+    after = 0
+    for step in playback.verdict.steps if playback.verdict is not None else ():
+        after = index.get(step.id, after)
+        if step.outcome == "skipped":
+            found.append({"id": step.id, "label": step.label, "text": step.text, "after": after})
+    return found
 
 
 def _frames(drawing: Drawing, robot: RobotModel | None, scene: Scene | None) -> tuple[list[Json], list[int]]:

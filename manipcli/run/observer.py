@@ -39,7 +39,7 @@ class Progress(Protocol):
         ...
 
     def message(self, text: str, *, detail: bool) -> None:
-        """An unplanned event in the current step; `detail`: only for verbose output."""
+        """An unplanned event of the current step, or of a block that it names; `detail`: only for verbose output."""
         ...
 
     def tick(self, simulated_time: float, wall: float) -> None:

@@ -192,7 +192,7 @@ class StepLoop(StepAttempt):
             place=self._task.log_place("blocks", index),
         )  # fmt: skip
         if kind == "branch" or (kind == "block_ended" and outcome != "done" and text):
-            self._report(f"{block.word} '{block.id}': {outcome}: {text}", detail=False)
+            self._report(f"{block.id}: {outcome}: {text}", detail=False)
 
     def skipped(self, index: int, reason: str) -> StepOutcome:
         """A step of the branch that is not taken."""

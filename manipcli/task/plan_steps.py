@@ -86,7 +86,7 @@ def plan_units(
     start: PlanningState,
     *,
     on_progress: Callable[[str], None] = lambda _: None,
-    branch: str = "",
+    branch: Callable[[int], str] = lambda _: "",
     budget: SearchBudget | None = None,
 ) -> Solved[PlannedStep]:
     """Plans steps together, see `task_search`.
@@ -97,7 +97,7 @@ def plan_units(
         units: indices of the steps; those of a unit are done at the same time.
         start: predicted or measured.
         on_progress: callback with a line for each step and candidate that is tried.
-        branch: where they are, for these lines.
+        branch: the outcomes of the choices before the step of an index, for these lines.
         budget: of the search; None: the usual one.
 
     Raises:

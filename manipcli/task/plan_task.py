@@ -14,7 +14,7 @@ from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.collision import CollisionHit
 from manipcli.model.configuration import configuration
-from manipcli.plan.block_tree import Item, Outcomes, Unit, block_tree, clipped, named
+from manipcli.plan.block_tree import Item, Outcomes, Unit, block_tree, clipped, named, stretch
 from manipcli.plan.branches import Solved, plan_branches
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.clearance import StatedClearance, least_clearance, stated_clearances
@@ -233,8 +233,9 @@ def _branches(
         if not all(outcomes):  # other branches draw for themselves, so that they change nothing on the first path
             own = planner.keeping(())
             own.rng = np.random.default_rng(task.spec.simulation.seed)
-        where = named(items, outcomes)
-        return plan_units(task, own, units, before, on_progress=on_progress, branch=where, budget=budget)
+        leads = [outcomes[:n] for n in range(len(outcomes) + 1)]
+        where = {k: named(items, lead) for lead in leads for unit in stretch(items, lead).units for k in unit}
+        return plan_units(task, own, units, before, on_progress=on_progress, branch=where.__getitem__, budget=budget)
 
     return plan_branches(items, start, solve)
 

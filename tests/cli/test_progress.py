@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import pytest
 
-from manipcli.cli.progress import StepProgress
+from manipcli.cli.progress import PlanningProgress, StepProgress
 from manipcli.judge.verdict import StepOutcome
 
 STEP = StepOutcome("lift_1", "lift", "done", 1.0, 2.0, 0.9)
@@ -49,3 +50,32 @@ def test_quiet_is_silent(capsys: pytest.CaptureFixture[str]) -> None:
         progress.tick(0.1, 0.1)
         progress.step_ended(STEP)
     assert capsys.readouterr().err == ""
+
+
+def test_a_planned_step_is_one_whole_line_in_each_branch(capsys: pytest.CaptureFixture[str]) -> None:
+    then, other = (f"planning step 2 of 2, 'sort[0]/place_1' (sort[0]/if_1: {word})" for word in ("then", "else"))
+    with PlanningProgress() as progress:
+        for line in ("planning step 1 of 2, 'pick_1'", then, f"{then}: candidate 2, path search", other, "judging: 3"):
+            progress.activity(line)
+    assert capsys.readouterr().err.splitlines() == ["planning step 1 of 2, 'pick_1'", then, other]
+
+
+def test_lines_between_steps_have_no_number_and_each_of_a_pair_has_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    pair = [replace(STEP, id=f"parallel_1/{name}") for name in ("move_1", "grasp_1")]
+    with StepProgress() as progress:
+        progress.step_started(STEP, 0, 3)
+        progress.message("failed: slipped; retrying", detail=False)
+        progress.step_ended(STEP)
+        progress.message("if_1: then: it holds by 3 mm", detail=False)
+        for k, step in enumerate(pair):
+            progress.step_started(step, 1 + k, 3)
+        for step in pair:
+            progress.step_ended(step)
+    done = "done (1.00 s to 2.00 s)"
+    assert capsys.readouterr().err.splitlines() == [
+        "[1/3] lift_1: failed: slipped; retrying",
+        f"[1/3] lift_1: {done}",
+        "if_1: then: it holds by 3 mm",
+        f"[2/3] parallel_1/move_1: {done}",
+        f"[3/3] parallel_1/grasp_1: {done}",
+    ]

@@ -8,7 +8,7 @@ from typing import cast
 import pytest
 
 from manipcli.judge.steps import step_outcomes
-from manipcli.judge.verdict import StepOutcome
+from manipcli.judge.verdict import StepOutcome, own_name
 from manipcli.record.recording import Recording, TaskEvent
 
 PLAN = b'{"steps": [{"id": "a", "verb": "move", "planned_duration": 1.5}]}'
@@ -63,3 +63,18 @@ def test_without_a_plan_each_step_that_started_is_one_however_often_it_did() -> 
 def test_an_outcome_that_nobody_knows_is_a_failure_that_names_it() -> None:
     (step,) = outcomes("0.0 a started", "1.0 a ended splendid")
     assert (step.outcome, step.text) == ("failed", "unknown outcome 'splendid' at 1.0")
+
+
+def test_a_label_tells_the_verb_only_where_its_own_name_does_not() -> None:
+    def label(id: str) -> str:
+        return StepOutcome(id, "pick", "done", 0.0, 1.0, 1.0).label
+
+    assert [*map(label, ("pick_1", "take", "sort[0]/pick_1", "pick_all/take"))] == [
+        "pick_1",
+        "take (pick)",
+        "sort[0]/pick_1",
+        "pick_all/take (pick)",
+    ]
+    assert own_name("sort[0]/if_1/place_1") == "place_1"
+    assert own_name("sort[0]/if_1/else/place_1") == "else/place_1"
+    assert own_name("pick_1") == "pick_1"

@@ -154,3 +154,14 @@ def test_progress_names_step_candidate_and_what_is_done() -> None:
         "planning step 2 of 2, 'b': candidate 2",
         "planning step 1 of 2, 'a': another candidate",
     ]
+
+
+def test_a_line_names_the_branch_of_its_own_step() -> None:
+    lines: list[str] = []
+    branches = ["", "if_1: then, if_2: else"]
+    progress = SearchProgress(lines.append, ["a", "b[0]/if_1/c"], branches.__getitem__)
+    progress.step(0, again=False)
+    progress.step(1, again=False)
+    progress.candidate(2)
+    whole = "planning step 2 of 2, 'b[0]/if_1/c' (if_1: then, if_2: else)"
+    assert lines == ["planning step 1 of 2, 'a'", whole, f"{whole}: candidate 2"]

@@ -17,12 +17,13 @@ import pytest
 from PIL import Image
 
 from manipcli.core.geometry import matrix_from_quat
+from manipcli.judge.verdict import StepOutcome
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
 from manipcli.replay.drawing import draw
 from manipcli.replay.ghost import ghost_of
 from manipcli.replay.page_server import PageServer
-from manipcli.replay.playback import RATE, Playback
+from manipcli.replay.playback import RATE, Playback, PlaybackStep
 from manipcli.replay.player import player_html, player_page
 
 ROOT = Path(__file__).parents[2]
@@ -89,6 +90,35 @@ def test_ghosts_are_where_the_other_run_was(browser: Page, playback: Playback, t
         (found,) = json.loads(str(browser.evaluate(f"JSON.stringify({player}.ghosts({time_of!r}))")))
         np.testing.assert_allclose([one["p"] for one in found], poses.position[k], atol=1e-5)
     assert browser.evaluate(f"{CLICK}('mujoco')"), "its switch"
+    assert not browser.complaints
+
+
+@pytest.mark.slow
+def test_the_list_groups_steps_by_block_and_tells_the_skipped(
+    browser: Page, playback: Playback, tmp_path: Path
+) -> None:
+    assert playback.verdict is not None
+    ids = ("sort[0]/pick_1", "sort[0]/if_1/place_1", "sort[0]/if_1/else/place_1", "sort[1]/pick_1")
+    judged = tuple(StepOutcome(id, id.rpartition("/")[2][:-2], "done", 0.0, 1.0, 1.0) for id in ids)
+    judged = (judged[0], replace(judged[1], outcome="skipped", text="took else"), *judged[2:])
+    done = [step for step in judged if step.outcome == "done"]
+    steps = tuple(PlaybackStep(one.id, one.verb, one.label, float(k), k + 1.0, "done") for k, one in enumerate(done))
+    path = tmp_path / "blocks.html"
+    path.write_text(
+        player_page(replace(playback, steps=steps, verdict=replace(playback.verdict, steps=judged))), "utf-8"
+    )
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player').player")
+    rows = "[...document.querySelector('.steps').children]"
+    told = str(browser.evaluate(f"{rows}.map(e => (e.querySelector('.label') || e).textContent).join()"))
+    assert told.split(",") == ["sort[0]", "pick_1", "if_1", "place_1", "else/place_1", "sort[1]", "pick_1"]
+    assert str(browser.evaluate(f"{rows}.map(e => parseInt(e.style.marginLeft) / 14 || 0).join()")) == "0,1,1,2,2,0,1"
+    assert browser.evaluate(f"{rows}[3].textContent") == "–place_1skipped"
+    assert browser.evaluate(f"{rows}[3].title") == "sort[0]/if_1/place_1: skipped\ntook else"
+    track = str(browser.evaluate("[...document.querySelectorAll('.track .step')].map(e => e.textContent).join()"))
+    assert track == "pick_1,place_1,pick_1"
+    browser.evaluate("document.querySelector('.mc-player').player.seek(1.5)")
+    browser.wait_for(f"{rows}[4].classList.contains('now')")
     assert not browser.complaints
 
 

@@ -55,7 +55,7 @@ function showStatus() {
   track.setAttribute("aria-valuetext", `${time.toFixed(2)} s${step ? ", " + step.label : ""}`);
   for (const mark of root.querySelectorAll("[data-step]"))
     mark.classList.toggle("now", step !== null && run.steps[Number(mark.dataset.step)] === step);
-  const button = step && part("steps").children[run.steps.indexOf(step)];
+  const button = step && part("steps").querySelector(`[data-step="${run.steps.indexOf(step)}"]`);
   if (button && button !== showStatus.last) {
     showStatus.last = button;
     const box = part("steps");

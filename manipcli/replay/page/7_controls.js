@@ -13,28 +13,54 @@ function scrub(box, at) {
   box.addEventListener("pointermove", move);
 }
 
+// The label of a step without the blocks around it, and these blocks: `pick_1` and `stack[0]`.
+function placed(step) {
+  const name = step.id.match(/(?:(?<=\/)else\/)?[^/]*$/)[0], around = step.id.slice(0, step.id.length - name.length);
+  return { short: step.label.startsWith(around) ? step.label.slice(around.length) : step.label, around: around.split("/").slice(0, -1) };
+}
+
+// An entry of the list of steps, indented under the names of the blocks around it; `list.around`: of the entry before.
+function entry(list, kind, step, mark, title) {
+  const { short, around } = placed(step), indent = (made, depth) => { if (depth) made.style.marginLeft = `${14 * depth}px`; };
+  const shared = around.findIndex((name, k) => name !== (list.around || [])[k]);
+  for (let k = shared < 0 ? around.length : shared; k < around.length; k++)
+    indent(element(list, "div", "block", around[k]), k);
+  list.around = around;
+  const made = element(list, kind);
+  indent(made, around.length);
+  made.title = title;
+  element(made, "span", "mark" + (mark === "✗" ? " bad" : ""), mark);
+  element(made, "span", "label", short);
+  return made;
+}
+
 function build() {
   const track = part("track"), length = run.end - run.start || 1, good = (step) => step.outcome === "done";
   track.setAttribute("aria-valuemin", run.start.toFixed(2));
   track.setAttribute("aria-valuemax", run.end.toFixed(2));
+  const list = part("steps"), skip = (k) => {
+    for (const step of run.skipped.filter((one) => one.after === k)) {
+      const row = entry(list, "div", step, "–", `${step.label}: skipped${step.text ? "\n" + step.text : ""}`);
+      row.className = "skipped";
+      element(row, "span", "when", "skipped");
+    }
+  };
+  skip(0);
   run.steps.forEach((step, k) => {
     const piece = track.insertBefore(document.createElement("div"), part("head-line"));
     piece.className = "step" + (good(step) ? "" : " bad");
     piece.dataset.step = k;
     piece.style.left = `${(100 * (step.start - run.start)) / length}%`;
     piece.style.width = `${(100 * (step.end - step.start)) / length}%`;
-    piece.textContent = step.label;
+    piece.textContent = placed(step).short.replace(/^else\//, "");
     piece.title = `${step.label}: ${step.outcome}${step.text ? "\n" + step.text : ""}`;
     for (const phase of step.phases) {
       const line = element(piece, "div", "phase");
       line.style.left = `${(100 * (phase.start - step.start)) / (step.end - step.start || 1)}%`;
     }
-    const button = element(part("steps"), "button");
+    const button = entry(list, "button", step, good(step) ? "✓" : "✗", piece.title);
     button.type = "button";
     button.dataset.step = k;
-    button.title = piece.title;
-    element(button, "span", "mark" + (good(step) ? "" : " bad"), good(step) ? "✓" : "✗");
-    element(button, "span", "label", step.label);
     element(button, "span", "phase", step.phases.map((phase) => phase.name).join(" · "));
     element(button, "span", "when", `${step.start.toFixed(2)} s`);
     button.addEventListener("click", (event) => {
@@ -42,6 +68,7 @@ function build() {
       // After a click, keys control the time, not this button.
       if (event.detail) track.focus({ preventScroll: true });
     });
+    skip(k + 1);
   });
   scrub(track, (event) => {
     const box = track.getBoundingClientRect();

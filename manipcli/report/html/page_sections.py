@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from manipcli.core.text import number_of
 from manipcli.judge.drawn import value_text
 from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.self_contacts import self_contact_line
-from manipcli.judge.verdict import BlockOutcome, StepOutcome
+from manipcli.judge.verdict import BlockOutcome, StepOutcome, own_name
 from manipcli.replay.playback import Phase
 from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
@@ -205,7 +207,9 @@ def _block_row(depth: int, block: BlockOutcome) -> tuple[str, ...]:
     took = "" if block.started is None or block.ended is None else f"{block.ended - block.started:.2f} s"
     tries = element("small", f"at attempt {block.attempts}") if block.attempts > 1 else None
     shown = element("span", f"– {block.outcome}, may fail", class_="idle") if block.tolerated else None
-    named = joined(element("b", block.label), element("small", block_line(block)) if block.text else None)
+    short = replace(block, id=own_name(block.id))
+    told = element("small", block_line(short)) if block.text else None
+    named = joined(element("b", short.label, title=block.id), told)
     starts = seek(block.started) if block.started is not None else ""
     outcome = joined(shown or mark(block.outcome == "done", block.outcome), tries)
     return (outcome, _indented(depth, named), block.taken, "", took, "", "", "", starts)
@@ -235,7 +239,9 @@ def _step_name(page: RunPage, step: StepOutcome, written: Written) -> Markup:
         folded = element("details", element("summary", "details"), element("small", step.text))
         details = folded if step.outcome == "done" else element("small", step.text)
     replanned = [element("small", f"re-planned: {why}") for why in step.replanned]
-    return joined(element("b", step.label), line_link(written), named, *replanned, details)
+    shown_id = step.id if page.facts is None else own_name(step.id)  # with facts, the blocks around it have rows
+    name = element("b", replace(step, id=shown_id).label, title=step.id)
+    return joined(name, line_link(written), named, *replanned, details)
 
 
 def _phases(page: RunPage, step: StepOutcome) -> tuple[Phase, ...]:
