@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -103,6 +103,16 @@ def grasp_margin(planner: Planner, plan: StepPlan) -> GraspMargin | None:
     touching = len({contact.finger for contact in contacts} - {PALM})
     attachment = "" if holding is None else holding.limits
     return GraspMargin(name, force, mu, weight, ratio, acceleration, touching, load.contents, attachment)
+
+
+def weakest_first(
+    grasps: Sequence[tuple[str, GraspMargin]], of: Callable[[str], object]
+) -> list[tuple[str, GraspMargin]]:
+    """The grasps by what their step is part of, `of` its id, in the order of the first; the smallest margin first."""
+    first: dict[object, int] = {}
+    for step, _ in grasps:
+        first.setdefault(of(step), len(first))
+    return sorted(grasps, key=lambda grasp: (first[of(grasp[0])], round(grasp[1].ratio, 2)))
 
 
 def carries(planner: Planner, plan: StepPlan) -> bool:

@@ -8,6 +8,7 @@ the arm stays on one branch of its inverse kinematics.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,12 +16,15 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
+from manipcli.plan.base_move import base_advice
 from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics
 from manipcli.plan.pose_error import rotation_vector
 
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
+_STARTS = 4  # further configurations from which the end of a line is tried
+_REFINED = 3  # the steps towards a far goal are short: the nearest point needs more of them
 _OTHERWISE = "start {} from another arm configuration (after a `pick`: another `yaw` of its `approach`)"
 
 
@@ -110,6 +114,8 @@ def follow_poses(
         rotated = f" and {np.degrees(turned):.0f} deg" if turned > ANGLE_TOLERANCE else ""
         where = f"after {walked * 1000.0:.0f} mm{rotated}"
         if not (found.converged or found.within(solver.tolerance)):
+            if shape == "straight line" and (beyond := _end_beyond_reach(solver, poses[-1], q)) is not None:
+                raise beyond
             raise NotPlannable(
                 f"the {shape} is unreachable {where}: {found.explain(solver.tolerance)}",
                 hint=f"{otherwise}, make it shorter, or use `path: free`",
@@ -128,3 +134,26 @@ def follow_poses(
         visit(q)
         waypoints.append(q[columns])
     return joint_path(waypoints)
+
+
+def _end_beyond_reach(solver: InverseKinematics, X_WT: Transform, q: Array) -> NotPlannable | None:
+    """The refusal of a line whose end no arm configuration reaches, in any orientation; None if one may."""
+    anyhow = solver.leaving("rotation")
+    starts = (q, *solver.random_configurations(q, np.random.default_rng(0), _STARTS))
+    tried = []
+    for start in starts:
+        tried.append(anyhow.near(X_WT, start))
+        if tried[-1].converged or tried[-1].within(solver.tolerance):
+            return None
+    best = min(tried, key=lambda found: found.position_error)
+    for _ in range(_REFINED):
+        best = anyhow.near(X_WT, best.q)
+    place = ", ".join(f"{value:.3f}" for value in X_WT.p)
+    distance = float(np.linalg.norm(X_WT.p - solver.base.p))
+    return NotPlannable(
+        f"the end of the straight line, ({place}) m, is out of reach: {distance:.3f} m from the robot's base, the "
+        f"nearest point is {1000.0 * best.position_error:.1f} mm off",
+        hint="move the goal nearer",
+        reason="line",
+        remedy=partial(base_advice, solver, X_WT, q),
+    )

@@ -20,6 +20,8 @@ from manipcli.plan.candidates import SPENT, Attempts, Candidates, Chosen, Droppe
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.search_budget import LONGER, SearchBudget
 
+EXHAUSTED: Final = "all candidates were tried: a longer search tries no others"
+"""The hint, where a deeper search was asked for, of a search that ended before its budget."""
 MOST: Final = 7
 """Maximum number of plans of one step before its failure is passed on."""
 
@@ -150,7 +152,8 @@ def _search(
             resumed = _back(done, conflicts, refusal)
             if resumed is None:
                 counted = _counted(latest[1], max(grasps.values(), default=0))
-                raise _refused(counted, opened, explain, budget) from refusal
+                found = _refused(counted, opened, explain, budget)
+                raise (_exhausted(found) if budget.deeper else found) from refusal
         else:
             node.taken += 1
             done.append(node)
@@ -168,6 +171,11 @@ def _ended(refusal: NotPlannable | None, node: Node | None, budget: SearchBudget
     else:
         found = NotPlannable(SPENT)
     return found if budget.deeper else found.but(hint="; ".join(filter(None, (found.hint, LONGER))))
+
+
+def _exhausted(refusal: NotPlannable) -> NotPlannable:
+    """The refusal of a deeper search that ended before its budget: a longer one is of no use."""
+    return refusal.but(hint="; ".join(filter(None, (refusal.hint, EXHAUSTED))))
 
 
 def _refused(

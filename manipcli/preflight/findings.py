@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 from manipcli.core.errors import Diagnostic, NotPlannable
 from manipcli.core.registry import Seam
+from manipcli.plan.grasp_margin import weakest_first
 from manipcli.preflight.checks import PREFLIGHT_CHECKS
 from manipcli.preflight.preflight import Check, Subject
 from manipcli.simulate.engines import ENGINES
@@ -57,9 +58,9 @@ def preflight_findings(
 
 
 def _grasp_margins(task: Task, plan: Plan) -> Iterator[Diagnostic]:
-    """What each grasp of the plan holds, at its step."""
+    """What each grasp of the plan holds, at its step; of the rounds of a loop, the smallest margin first."""
     numbers = {step.id: step.index for step in plan.every}
-    for step, margin in plan.grasps():
+    for step, margin in weakest_first(plan.grasps(), lambda step: task.file.place("steps", numbers[step])):
         place = task.file.place("steps", numbers[step])
         if margin.attachment and margin.ratio < 1.0:
             hint = "it will fall: raise the limits under `tool: {holding: ...}`, or lift something lighter"

@@ -9,8 +9,10 @@ from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.core.text import number_of
 from manipcli.plan.block_tree import choices
 from manipcli.plan.clearance import StatedClearance
+from manipcli.plan.grasp_margin import weakest_first
 from manipcli.plan.motion_margins import Binding, MotionMargins
 from manipcli.plan.why_not import by_stage
+from manipcli.report.rounds import first_of_rounds, round_of
 from manipcli.report.table import table
 from manipcli.task.plan_task import Plan
 
@@ -31,7 +33,7 @@ def render_text(task: str, plan: Plan, *, every: bool = False) -> str:
             margins = part.margins()
             parts += [_motions(part, margins), _margins(part, margins)]
     parts.append("\n".join(_stated(plan, each) for each in plan.stated_clearances()))
-    parts.append("\n".join(f"{step} {margin.text}" for step, margin in plan.grasps()))
+    parts.append(_grasps(plan))
     chosen = [step for step in plan.every if step.dropped and step.candidate]
     parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
     parts.append(render_refused(by_stage([(step.id, one) for step in plan.every for one in step.dropped]), every=every))
@@ -47,6 +49,13 @@ def render_text(task: str, plan: Plan, *, every: bool = False) -> str:
     else:
         parts.append(f"✓ {task} planned: {number_of(len(plan.motions), 'motion')}, {plan.duration:.2f} s")
     return "\n\n".join(part for part in parts if part)
+
+
+def _grasps(plan: Plan) -> str:
+    """The margin of each grasp; of the rounds of a loop, the smallest."""
+    grasps = weakest_first(plan.grasps(), lambda step: round_of(step, "") or step)
+    told = first_of_rounds(grasps, lambda grasp: round_of(grasp[0], grasp[1].text))
+    return "\n".join(f"{step} {margin.text}{more}" for (step, margin), more in told)
 
 
 def render_durations(plan: Plan) -> str:

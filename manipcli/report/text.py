@@ -13,6 +13,7 @@ from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import quantity
 from manipcli.report.nesting import MARKS, block_line, nested
+from manipcli.report.rounds import first_of_rounds, round_of_finding
 from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 
@@ -44,19 +45,23 @@ def render_verdict(verdict: Verdict, log: str) -> str:
 
 
 def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, strict: bool = False) -> str:
-    """All findings of the checked files, then one line with their number; with `strict`, warnings fail."""
+    """All findings of the checked files, then one line with their number; with `strict`, warnings fail.
+
+    What is the same in several rounds of a loop is told once.
+    """
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = sum(finding.severity == "warning" for finding in findings)
     mark, word = (FAIL, "failed") if errors or (strict and warnings) else (PASS, "passed")
     summary = f"{mark} {word}: {number_of(len(files), 'file')} checked, {number_of(errors, 'error')}"
     if warnings:
         summary += f", {number_of(warnings, 'warning')}"
-    return "\n".join([*map(describe, findings), summary])
+    told = [describe(finding, more) for finding, more in first_of_rounds(findings, round_of_finding)]
+    return "\n".join([*told, summary])
 
 
-def describe(finding: Diagnostic) -> str:
-    """One finding on one line: place, severity, code and message; its hint on the next line."""
-    line = one_line(str(finding))
+def describe(finding: Diagnostic, more: str = "") -> str:
+    """One finding on one line: place, severity, code, message and `more`; its hint on the next line."""
+    line = one_line(f"{finding}{more}")
     return f"{line}\n  hint: {one_line(finding.hint)}" if finding.hint else line
 
 

@@ -7,11 +7,12 @@ from typing import Final
 
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Diagnostic, Loc
-from manipcli.core.text import number_of
+from manipcli.core.text import listed, number_of
 from manipcli.model.robot import RobotModel
 from manipcli.plan.block_tree import MOST, block_tree, blocks_of, choices
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.steps import STEPS
+from manipcli.plan.steps.move import MoveSpec
 from manipcli.spec.block import BlockSpec
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
@@ -71,14 +72,27 @@ def _parallel(
     if not wrong and len(set(parts.values())) < len(parts):
         wrong = [block.last - 1]
     for k in wrong[:1]:
-        other = " too" if parts[k] in ("arm", "hand") else ""
-        message = f"`{spec.steps[k].verb}` cannot be done in parallel here: it {MOVES[parts[k]]}{other}"
+        why = f"it {MOVES[parts[k]]}{' too' if parts[k] in ('arm', 'hand') else ''}"
+        body = spec.steps[k].body
+        if parts[k] == "both" and isinstance(body, MoveSpec):
+            why, hint = _beyond_the_arm(body, robot, claims.hand)
+        message = f"`{spec.steps[k].verb}` cannot be done in parallel here: {why}"
         yield UNLIKE_PARTS, ("steps", k), Problem((spec.steps[k].verb,), message, hint)
     for k in indices:
         if spec.steps[k].retry is not None:
             message = "a part of `parallel` cannot be retried alone"
             retried = "write `on_fail` next to `parallel`: both parts are then done again"
             yield RETRIED_PART, ("steps", k), Problem(("on_fail",), message, retried)
+
+
+def _beyond_the_arm(body: MoveSpec, robot: RobotModel, hand: Sequence[str]) -> tuple[str, str]:
+    """Why a `move` to joint positions needs the arm and the hand, and what moves the arm alone instead."""
+    if not isinstance(body.to, str):
+        too = listed(name for name in body.to or () if name in hand)
+        return f"it also moves joints of the hand ({too})", "name the arm's joints alone"
+    alone = [pose.name for pose in robot.poses if pose.joints and not set(pose.joints) & set(hand)]
+    poses = f" ({listed(alone, most=3)})" if alone else ""
+    return f"pose '{body.to}' also moves the hand", f"name the arm's joints, a pose of the arm alone{poses}, or a point"
 
 
 def planned_in_the_run(task: Located[TaskSpec]) -> Iterator[Diagnostic]:

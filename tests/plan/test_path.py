@@ -60,8 +60,22 @@ def test_the_tool_stays_on_its_straight_line_also_between_the_points(
 
 def test_a_line_out_of_reach_says_how_far_it_goes(solver: InverseKinematics, middle: Array) -> None:
     start = solver.forward(middle)
-    with pytest.raises(NotPlannable, match=r"unreachable after \d+ mm: the nearest pose is"):
-        linear_path(solver, middle, Transform(R=start.R, p=start.p + np.array([1.5, 0.0, 0.0])))
+    beyond = Transform(R=start.R, p=start.p + np.array([1.5, 0.0, 0.0]))
+    with pytest.raises(NotPlannable, match=r"tool's path is unreachable after \d+ mm: the nearest pose is"):
+        follow_poses(solver, middle, interpolate(start, beyond))
+
+
+def test_a_line_whose_end_is_out_of_reach_says_so_with_its_distance(solver: InverseKinematics, middle: Array) -> None:
+    """The nearest point is about that of many configurations drawn at random."""
+    start = solver.forward(middle)
+    beyond = Transform(R=start.R, p=start.p + np.array([3.0, 0.0, 0.0]))
+    distance = float(np.linalg.norm(beyond.p - solver.base.p))
+    with pytest.raises(NotPlannable, match=f"is out of reach: {distance:.3f} m from the robot's base") as refused:
+        linear_path(solver, middle, beyond)
+    off = float(refused.value.cause.rpartition("point is ")[2].split()[0]) / 1000.0
+    drawn = solver.random_configurations(middle, np.random.default_rng(1), 2000)
+    nearest = min(float(np.linalg.norm(solver.forward(q).p - beyond.p)) for q in drawn)
+    assert nearest - 0.3 < off < nearest + 0.05
 
 
 def test_a_turn_beyond_a_limit_names_the_joint(make_arm7: Callable[..., RobotModel], middle: Array) -> None:

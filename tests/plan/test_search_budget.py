@@ -16,7 +16,7 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.path_search import NARROWEST
 from manipcli.plan.search_budget import DEEPER, DIAGNOSIS, LONGER, STEP, SearchBudget
 from manipcli.plan.search_progress import SearchProgress
-from manipcli.plan.task_search import search_task
+from manipcli.plan.task_search import EXHAUSTED, search_task
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
@@ -76,6 +76,18 @@ def test_a_search_ends_one_budget_after_the_last_step_that_was_reached() -> None
     assert refused.value.cause.endswith(SPENT)
     assert refused.value.hint == LONGER
     assert 0.4 <= budget.used <= 1.0 + units / STEP
+
+
+@pytest.mark.parametrize("deeper", [False, True])
+def test_a_deeper_search_that_tried_all_candidates_says_that_a_longer_one_is_of_no_use(deeper: bool) -> None:
+    work = Work()
+
+    def opens(k: int, state: PlanningState) -> Candidates:
+        return Candidates([Candidate(fails(work, 10)) for _ in range(3)], what="cannot do it")
+
+    with pytest.raises(NotPlannable, match="all 3 candidates failed") as refused:
+        search_task(opens, 1, START, budget=SearchBudget(work, deeper=deeper))
+    assert (refused.value.hint == EXHAUSTED) == deeper
 
 
 def test_deeper_and_effort_make_the_budget_larger_by_their_factor() -> None:

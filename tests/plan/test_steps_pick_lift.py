@@ -149,7 +149,7 @@ def test_what_cannot_be_lifted_or_put_so_far_is_told_what_those_steps_can_do_abo
     lift = arm.refused("lift", {"object": "cup", "by": 1.5})
     arm.now = story.steps["lift"][1].end
     place = arm.refused("place", {"object": "cup", "at": [1.12, 0.45], "onto": "desk"})
-    assert "the straight line is unreachable" in lift.cause and "the straight line is unreachable" in place.cause
+    assert "the end of the straight line, (" in lift.cause and "the end of the straight line, (" in place.cause
     assert (lift.hint or "").startswith("lift it less, `by: ...`; or ")
     assert (place.hint or "").startswith("place it within reach, `at: [x, y]`; or ")
 

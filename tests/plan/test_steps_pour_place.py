@@ -148,7 +148,7 @@ def test_a_receiver_out_of_reach_is_refused_with_what_was_tried(bench: Make, sto
     arm.now = story.steps["pour"][0]
     refusal = arm.refused("pour", {"object": "cup", "into": "floor", "clearance": "2 m"})
     assert refusal.cause.startswith(
-        "cannot pour from 'cup' into 'floor', all 18 candidates failed: carry: the straight line"
+        "cannot pour from 'cup' into 'floor', all 18 candidates failed: carry: the end of the straight line, ("
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from manipcli.conditions.robustness import EDGE
-from manipcli.core.errors import Diagnostic, Place
+from manipcli.core.errors import Diagnostic, Place, Severity
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import quantity
@@ -105,6 +105,19 @@ def test_findings_are_counted() -> None:
         "✗ failed: 2 files checked, 1 error, 1 warning",
     ]
     assert render_findings([], ["a"]) == "✓ passed: 1 file checked, 0 errors"
+
+
+def test_what_is_the_same_in_the_rounds_of_a_loop_is_told_once_and_counted() -> None:
+    def of(step: str, body: str, line: int, severity: Severity = "note", ratio: int = 16) -> Diagnostic:
+        text = f"step '{step}': holds {ratio} x the weight of '{body}'"
+        return Diagnostic("A1", text, Place("a.yaml", line, 1), severity=severity)
+
+    findings = [of(f"sort[{k}]/take", "abcd"[k], 7, ratio=9 + k) for k in range(4)]
+    alone = [of("take", "e", 9), of("take", "f", 9), of("sort[0]/take", "a", 8)]
+    warned = [of(f"sort[{k}]/take", "ab"[k], 7, "warning", 9 + k) for k in range(2)]
+    lines = render_findings([*findings, *alone, *warned], ["a.yaml"]).splitlines()
+    assert lines == [f"{findings[0]}; and 3 more rounds", *map(str, alone), *map(str, warned), lines[-1]]
+    assert lines[-1].endswith("2 warnings")
 
 
 def test_columns_line_up_also_for_wide_characters_and_nothing_is_cut() -> None:

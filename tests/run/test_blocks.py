@@ -246,6 +246,16 @@ def test_what_cannot_be_done_in_parallel_is_refused_at_its_place(tmp_path: Path)
     assert all(codes == [retried, ("TASK281", head + 5)] for codes in found.values()), found
 
 
+def test_a_pose_of_all_joints_beside_a_part_of_the_hand_is_named_as_the_cause(tmp_path: Path) -> None:
+    file = tmp_path / "small.yaml"
+    file.write_text(PANDA + "steps:\n  - parallel: [{move: {to: home}}, {release: {}}]\n")
+    with pytest.raises(pipeline.InvalidInput) as refused:
+        pipeline.load_task(file)
+    (one,) = refused.value.findings
+    assert one.code == "TASK281" and "pose 'home' also moves the hand" in one.message
+    assert one.hint and "name the arm's joints" in one.hint
+
+
 def test_all_reports_show_the_blocks(run: Run, tmp_path: Path) -> None:
     verdict = run(IF % 0.2)
     text = render_verdict(verdict, "small.mcap")
