@@ -142,3 +142,20 @@ def test_blocks_are_no_key() -> None:
     with pytest.raises(InvalidInput) as refused:
         load_task_text(f"{HEAD}blocks: []\nsteps: [{{wait: 0}}]\n", "t.yaml", model=task_spec())
     assert [finding.code for finding in refused.value.findings] == ["TASK201"]
+
+
+@pytest.mark.parametrize(
+    ("steps", "told"),
+    [
+        ("[{repeat_: {each: {x: [1, 2]}, steps: [{wait: $x}]}}]", "sequence, repeat, if, parallel, do, include"),
+        ("[{wait: 1 s}, {sequense: [{wait: $y}]}]", "unknown verb 'sequense'"),
+        ("[{repeat: {each: {base: [1, 2]}, steps: [{wait: $bass}]}}]", "unknown parameter '$bass'"),
+    ],
+)
+def test_what_only_follows_from_a_misspelt_word_or_name_is_not_reported(steps: str, told: str) -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        load_task_text(f"{HEAD}steps: {steps}\n", "t.yaml", model=task_spec())
+    (finding,) = refusal.value.findings
+    assert told in finding.message
+    assert finding.hint is not None
+    assert finding.hint.startswith("did you mean '")
