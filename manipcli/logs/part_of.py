@@ -228,10 +228,12 @@ def _motions(recording: Recording, ran: set[str]) -> Iterator[dict[str, object]]
     try:
         plan = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
         steps = [step for step in plan.get("steps", ()) if step["id"] in ran]
-        for step in steps:
-            yield from step.get("motions", ())
+        motions = [motion for step in steps for motion in step.get("motions", ())]
     except (ValueError, KeyError, TypeError, AttributeError):
         return
+    if not all(isinstance(motion, dict) for motion in motions):
+        raise InvalidInput([Diagnostic("LOG103", f"its {PLAN_FILE} is damaged: a motion is not a mapping")])
+    yield from motions
 
 
 def _held(recording: Recording, contacts: tuple[Contact, ...], time: float, bodies: tuple[str, ...]) -> str:

@@ -358,3 +358,12 @@ def test_a_log_whose_state_was_damaged_is_not_verified(waves: Path, rewrite_log:
     rewrite_log(log, bad, metadata=lambda name, values: {**values, "from": "none"} if name == "part" else values)
     with pytest.raises(InvalidInput, match="names step 'none', which its task does not have"):
         verify_log(bad)
+
+
+def test_a_log_whose_plan_has_a_motion_that_is_none_is_refused(waves: Path, rewrite_log: Any, tmp_path: Path) -> None:
+    def bad(name: str, data: bytes) -> bytes:
+        return data.replace(b'"motions": [', b'"motions": [5, ') if name == "plan.json" else data
+
+    log = rewrite_log(waves / "whole.mcap", tmp_path / "bad.mcap", attachment=bad)
+    with pytest.raises(InvalidInput, match="plan"):
+        task_part(load_task(waves / "waves.yaml"), first="last", last=None, log=log)

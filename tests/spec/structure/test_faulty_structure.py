@@ -20,6 +20,7 @@ FAULTY = (
     (205, "6:39", "expected a string", "[{sequence: [{wait: 1 s}], id: 5}, {wait: 0}]"),
     (263, "6:30", "a value is missing", "[{repeat: {each: {x: [null]}, steps: [{wait: $x}]}}]"),
     (270, "6:8", "no step is left", "[{if: {equal: [1, 2]}, then: [{wait: 1 s}]}]"),
+    (270, "6:29", "only one of them is true or false", "[{if: {equal: [true, 'true']}, then: [{wait: 1 s}]}]"),
     (262, "6:10", "`then` is missing", "[{if: {equal: [$color, red]}, else: [{wait: 1 s}]}]"),
     (261, "6:21", "`then` belongs to `if`", "[{wait: 1 s, then: [{wait: 1 s}]}]"),
     (261, "6:10", "`then` without `if`", "[{then: [{wait: 1 s}]}]"),
