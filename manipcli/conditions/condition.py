@@ -77,6 +77,7 @@ class CheckContext:
         steps: the ids of its steps; None: unknown.
         in_order: True if `steps` is complete and in order; else it holds every possible id, unordered.
         self_collision: whether links of the robot collide with each other in the simulation.
+        blocks: the ids of its blocks.
     """
 
     robot: RobotModel
@@ -84,6 +85,7 @@ class CheckContext:
     steps: tuple[str, ...] | None = None
     in_order: bool = True
     self_collision: bool = True
+    blocks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
