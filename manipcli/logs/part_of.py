@@ -37,19 +37,20 @@ def task_part(task: Task, *, first: str | None, last: str | None, log: Path) -> 
 
     Args:
         task: the task.
-        first: id of the first step, whose start state `log` has; None: the first of the task.
-        last: id of the last step; None: the last of the task.
+        first: id of the first step, whose start state `log` has, or of a block that begins with it; None: the first
+            of the task.
+        last: id of the last step, or of a block that ends with it; None: the last of the task.
         log: the log of a run of the task.
 
     Raises:
-        InvalidInput: an unknown step, a step inside a block that is not done in order, or a log without the state.
+        InvalidInput: an unknown step or block, one inside a block not done in order, or a log without the state.
     """
     begin = 0 if first is None else _index(task, first, "--from")
     end = None if last is None else _index(task, last, "--until") + 1
     if end is not None and begin >= end:
         raise InvalidInput([Diagnostic("USE121", f"--until '{last}' is before --from '{first}'")])
     state = None if first is None else _StateOf(task, begin, log).state()
-    return Part(begin, end, last or "", state)
+    return Part(begin, end, "" if end is None else str(task.spec.steps[end - 1].id), state)
 
 
 def recorded_part(recording: Recording, path: Path, spec: TaskSpec, robot: RobotModel, scene: Scene) -> Part:
@@ -89,19 +90,26 @@ def _damaged(path: Path, why: str) -> InvalidInput:
 
 
 def _index(task: Task, name: str, option: str) -> int:
-    """Index of a step by id."""
-    ids = [str(step.id) for step in task.spec.steps]
-    if name not in ids:
+    """Index of a step by its id; by the id of a block, of its first step for `--from`, of its last for `--until`."""
+    ids, blocks = [str(step.id) for step in task.spec.steps], task.spec.blocks
+    at, named = next(((k, block) for k, block in enumerate(blocks) if block.id == name), (0, None))
+    if named is None and name not in ids:
         message = f"{option}: task '{task.name}' has no step '{name}'"
-        raise InvalidInput([Diagnostic("USE120", message, hint=did_you_mean(name, ids, kind="steps"))])
-    k = ids.index(name)
-    for block in task.spec.blocks:
+        hint = did_you_mean(name, [*ids, *(block.id for block in blocks)], kind="steps")
+        raise InvalidInput([Diagnostic("USE120", message, hint=hint)])
+    first, last = (k := ids.index(name), k + 1) if named is None else (named.first, named.last)
+    for n, block in enumerate(blocks):
         edge = (block.first if option == "--from" else block.last - 1) if block.kind == "parallel" else None
-        if block.kind in ("if", "parallel") and block.first <= k < block.last and k != edge:
-            message = f"{option}: step '{name}' is inside `{block.kind}` '{block.id}', which is not done step by step"
-            hint = f"name a step before it or behind it{'' if edge is None else f', or {ids[edge]!r}'}"
-            raise InvalidInput([Diagnostic("USE122", message, task.file.place("steps", k), hint)])
-    return k
+        around = block.first <= first and last <= block.last and block is not named
+        inside = named is not None and n > at and named.first <= block.first and block.last <= named.last
+        if block.kind not in ("if", "parallel") or not around or inside:
+            continue
+        if (first if option == "--from" else last - 1) != edge:
+            what = "step" if named is None else "block"
+            message = f"{option}: {what} '{name}' is inside `{block.kind}` '{block.id}', which is not done step by step"
+            hint = f"name '{block.id}', or a step before it or behind it{'' if edge is None else f', or {ids[edge]!r}'}"
+            raise InvalidInput([Diagnostic("USE122", message, task.file.place("steps", first), hint)])
+    return first if option == "--from" else last - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +164,13 @@ class _StateOf:
     def _time(self, recording: Recording, step: str) -> float:
         """[s] When the step began; if it did not, when the step before it was done."""
         ran = {outcome.id: outcome for outcome in step_outcomes(recording, interrupted=True)}
-        if step in ran and (began := ran[step].started) is not None:
+        steps, blocks = self.task.spec.steps, self.task.spec.blocks
+        # Of a choice, the run of the log may have taken the other branch.
+        behind = max(
+            (block.last for block in blocks if block.kind == "if" and block.first == self.k), default=self.k + 1
+        )
+        inside = [ran[str(one.id)].started for one in steps[self.k : behind] if str(one.id) in ran]
+        if (began := min((time for time in inside if time is not None), default=None)) is not None:
             return began
         before = str(self.task.spec.steps[self.k - 1].id) if self.k else ""
         if before in ran and ran[before].outcome == "done" and (ended := ran[before].ended) is not None:
@@ -214,10 +228,12 @@ def _motions(recording: Recording, ran: set[str]) -> Iterator[dict[str, object]]
     try:
         plan = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
         steps = [step for step in plan.get("steps", ()) if step["id"] in ran]
-        for step in steps:
-            yield from step.get("motions", ())
+        motions = [motion for step in steps for motion in step.get("motions", ())]
     except (ValueError, KeyError, TypeError, AttributeError):
         return
+    if not all(isinstance(motion, dict) for motion in motions):
+        raise InvalidInput([Diagnostic("LOG103", f"its {PLAN_FILE} is damaged: a motion is not a mapping")])
+    yield from motions
 
 
 def _held(recording: Recording, contacts: tuple[Contact, ...], time: float, bodies: tuple[str, ...]) -> str:

@@ -21,6 +21,7 @@ from manipcli.spec import load
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.source.tree import Plain
+from manipcli.spec.structure.words import WORDS
 from manipcli.task.lint import lint
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import Plan
@@ -101,7 +102,7 @@ def kind_of(path: Path) -> load.FileKind | None:
 def words(kind: str) -> tuple[str, ...]:
     """The names in files (`steps`, `expectations`, `conditions`, `shapes`, `engines`), or the codes of `checks`."""
     known = {
-        "steps": STEPS.names,
+        "steps": (*STEPS.names, *WORDS),
         "expectations": (*CONDITIONS.names, *COMBINATIONS, *QUANTIFIERS),
         "conditions": (*CONDITIONS.names, *COMBINATIONS),
         "shapes": SHAPES,

@@ -34,6 +34,7 @@ from manipcli.task.task import Task
 
 DEFAULT_UNTIL_TIME: Final = 30.0
 """[s] Timeout of an `until` on a step without `timeout`."""
+OFF_PLAN: Final = "a step before it was re-planned"
 SQUEEZED: Final = 0.3
 """[s] Within this time after the hand closed, it presses on its object from opposite sides."""
 
@@ -123,7 +124,8 @@ class StepAttempt:
         if retry and planned_start.carried is None and planned.plan.end.carried is not None:
             now = replace(now, carried=None)  # a retried grasp may start with the hand closed on its object
         differences = self._measured.differences(planned_start, now, step)
-        replanned = retry or self.failed or (self._replans and bool(differences) and _moves(planned))
+        forced = retry or self.failed or self._off_plan(step, planned_start)
+        replanned = forced or (self._replans and bool(differences) and _moves(planned))
         if replanned:
             try:
                 with self._replanning:
@@ -132,16 +134,25 @@ class StepAttempt:
                 planned = replace(planned, plan=replace(plan, poured=poured, into=plan.into or planned.plan.into))
             except NotPlannable as refusal:
                 self._believed = now
-                forced = retry or self.failed or self._guards
+                forced = forced or self._guards
                 text = self._measured.refused(planned_start, now, refusal.cause, step, forced=forced)
                 return MotionEnd("failed", text)
-            why = "; ".join(differences) or ("retry" if retry else "the previous step failed")
+            why = "; ".join(differences) or (
+                "retry" if retry else "the previous step failed" if self.failed else OFF_PLAN
+            )
             why += note
             self._event("replanned", planned, "", why)
             self._report(f"re-planned: {why}", detail=True)
             self.failed = False
         found = "" if replanned or not differences else f"; at its start {'; '.join(differences)}"
         return (yield from self._guarded(planned, self._motions(step, planned, now, self._executor, limit), found))
+
+    def _off_plan(self, step: StepSpec, planned_start: PlanningState) -> bool:
+        """Whether a step was planned from another end than that of the plan before it, which was a forced re-plan.
+
+        Without it, `replan: false` would jump from the new end to the old one.
+        """
+        return not self._replans and bool(self._measured.differences(planned_start, self._believed, step))
 
     def _guarded(self, planned: PlannedStep, motions: Lane[MotionEnd], found: str = "") -> Lane[MotionEnd]:
         """The motions of a step, ended by alarms; a failure also reports what was `found`, and saturated joints."""

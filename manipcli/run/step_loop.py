@@ -13,7 +13,7 @@ from manipcli.plan.block_tree import Unit
 from manipcli.plan.motion import PlanningState
 from manipcli.run.effort_shortage import effort_shortage
 from manipcli.run.restore import RESUMED
-from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, StepAttempt, missing
+from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, OFF_PLAN, StepAttempt, missing
 from manipcli.simulate.executor import DONE, Alarmed, Lane, MotionEnd
 from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.retry import retried
@@ -83,7 +83,9 @@ class StepLoop(StepAttempt):
         steps = [self._task.spec.steps[planned.index] for planned in both]
         began, now = self._session.time, self._measured.situation(self._believed)
         differences = self._measured.differences(both[0].start, now, steps[0])
-        refusal, replanned = "", self.failed or (self._replans and bool(differences))
+        forced = self.failed or self._off_plan(steps[0], both[0].start)
+        reason = "the previous step failed" if self.failed else OFF_PLAN
+        refusal, replanned = "", forced or (self._replans and bool(differences))
         if replanned:
             try:
                 both = self.planned([tuple(planned.index for planned in both)], now)
@@ -94,7 +96,7 @@ class StepLoop(StepAttempt):
             self._begin(planned)
             self._event("step_started", planned, "", "")
             if replanned:
-                self._event("replanned", planned, "", "; ".join(differences) or "the previous step failed")
+                self._event("replanned", planned, "", "; ".join(differences) or reason)
         self.failed = False
 
         def lane(k: int) -> Lane[tuple[MotionEnd, float]]:

@@ -189,7 +189,10 @@ def _task_source(
 
     root, structure = flattened(root, scope, Expansion(model.verbs, reports, files, bodies, task), change)
     source = Source(name, root, "TASK", unknown=frozenset(scope.unknown), structure=structure)
-    found = [*in_text, *findings, *scope.findings, *reports.findings, *_duplicate_ids(source), *faults(source, model)]
+    of_steps = [*scope.findings, *reports.findings]
+    if any(finding.severity == "error" for finding in of_steps):  # what seems unused may be used where it is misspelt
+        of_steps = [finding for finding in of_steps if finding.code != "TASK272"]
+    found = [*in_text, *findings, *of_steps, *_duplicate_ids(source), *faults(source, model)]
     return source, [*distinct(found)]
 
 

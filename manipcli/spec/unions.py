@@ -291,7 +291,7 @@ def _check(
             if others[0] in below:
                 near = " or ".join(f"`{name}: {{{others[0]}: ...}}`" for name in reversed(names))
                 near = f"write {near}"
-            message = f"unknown {kind} '{escape(others[0])}', expected one of {listed(names, most=30)}"
+            message = f"unknown {kind} '{escape(others[0])}', expected one of {listed((*names, *more), most=40)}"
             raise problem("name", message, at=(others[0],), key=True, hint=near)
         if not found:
             raise problem("verb", f"{what} needs a {its}: one of {listed(names, most=30)}")

@@ -13,6 +13,7 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.spec.base import about
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.structure.words import WORDS
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.unions import controllers_model, task_model
 
@@ -38,7 +39,7 @@ def meanings(kind: str) -> Mapping[str, str]:
     kinds."""
     conditions = {member.name: about(member.spec) for member in CONDITIONS} | COMBINATIONS
     descriptions = {
-        "steps": {member.name: about(member.spec) for member in STEPS},
+        "steps": {member.name: about(member.spec) for member in STEPS} | {**WORDS},
         "conditions": conditions,
         "expectations": conditions | QUANTIFIERS,
         "engines": {member.name: _about_engine(member) for member in ENGINES},

@@ -62,7 +62,7 @@ def test_files_are_known_by_their_top_level_key(
 @pytest.mark.parametrize(
     ("kind", "some"),
     [
-        ("steps", {"move", "pick", "pour"}),
+        ("steps", {"move", "pick", "pour", "repeat", "if", "do"}),
         ("conditions", {"inside", "upright", "near"}),
         ("expectations", {"inside", "tracking", "duration", "step_done", "no_collision"}),
         ("engines", {"pybullet", "kinematic"}),

@@ -285,6 +285,13 @@ def test_what_an_expectation_speaks_of_and_is_not_there_is_told(
     assert hint is None or hint in (problem.hint or "")
 
 
+def test_the_hint_for_an_unknown_round_names_the_rounds() -> None:
+    (spec,) = expectations({**NEAR, "during": "b[7]"})
+    context = CheckContext(ROBOT, SCENE, ("b[0]/a", "b[1]/a"), blocks=("b", "b[0]", "b[0]/c[0]", "b[1]"))
+    (problem,) = expectation_problems(spec, context, CONDITIONS)
+    assert problem.hint == "rounds: b[0], b[1]"
+
+
 def test_where_the_steps_are_not_known_none_is_missed() -> None:
     (spec,) = expectations({**NEAR, "at": "bb"})
     assert expectation_problems(spec, CheckContext(ROBOT, SCENE), CONDITIONS) == ()

@@ -270,6 +270,42 @@ def test_a_part_does_not_begin_or_end_inside_a_branch(
             task_part(task, first=first, last=last, log=waves / "whole.mcap")
 
 
+@pytest.mark.parametrize(
+    ("kind", "first", "last", "part"),
+    [
+        ("sequence", "b", None, (1, None)),
+        ("sequence", "b", "b", (1, 3)),
+        ("sequence", None, "a", (0, 3)),
+        ("if", "b", None, (1, None)),
+        ("if", "a", "b", (1, 3)),
+        ("parallel", "b", "b", (1, 3)),
+        ("if", "inner", None, None),
+        ("if", None, "inner", None),
+        ("parallel", "inner", None, (1, None)),
+        ("parallel", None, "inner", None),
+    ],
+)
+def test_a_block_stands_for_its_first_and_its_last_step(
+    waves: Path, kind: BlockKind, first: str | None, last: str | None, part: tuple[int, int | None] | None
+) -> None:
+    """Block `a` has only `b`, with the steps `down` and `other`; `inner` has only `down`."""
+    task = load_task(waves / "waves.yaml")
+    blocks = (
+        BlockSpec(id="a", kind="sequence", word="repeat", first=1, last=3),
+        BlockSpec(id="b", kind=kind, word=kind, first=1, last=3, split=2, parent=0),
+        BlockSpec(id="inner", kind="sequence", word="do", first=1, last=2, parent=1),
+    )
+    spec = task.spec.model_copy(update={"blocks": blocks})
+    task = replace(task, file=replace(task.file, spec=spec))
+    if part is None:
+        with pytest.raises(InvalidInput, match=f"block 'inner' is inside `{kind}` 'b'"):
+            task_part(task, first=first, last=last, log=waves / "whole.mcap")
+    else:
+        found = task_part(task, first=first, last=last, log=waves / "whole.mcap")
+        assert (found.first, found.last) == part
+        assert found.until == ("" if last is None else "other")
+
+
 def test_a_damaged_state_is_refused(whole: tuple[Path, Verdict, Recording], placed: tuple[Path, Verdict]) -> None:
     content = read_recording(placed[0]).attachments[START_STATE]
     state = StartState.from_json(content)
@@ -322,3 +358,12 @@ def test_a_log_whose_state_was_damaged_is_not_verified(waves: Path, rewrite_log:
     rewrite_log(log, bad, metadata=lambda name, values: {**values, "from": "none"} if name == "part" else values)
     with pytest.raises(InvalidInput, match="names step 'none', which its task does not have"):
         verify_log(bad)
+
+
+def test_a_log_whose_plan_has_a_motion_that_is_none_is_refused(waves: Path, rewrite_log: Any, tmp_path: Path) -> None:
+    def bad(name: str, data: bytes) -> bytes:
+        return data.replace(b'"motions": [', b'"motions": [5, ') if name == "plan.json" else data
+
+    log = rewrite_log(waves / "whole.mcap", tmp_path / "bad.mcap", attachment=bad)
+    with pytest.raises(InvalidInput, match="plan"):
+        task_part(load_task(waves / "waves.yaml"), first="last", last=None, log=log)

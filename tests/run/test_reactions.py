@@ -263,3 +263,26 @@ def test_what_cannot_be_meant_is_told_before_the_run(run: Run, text: str, place:
     told = "\n".join(map(str, refusal.value.findings))
     assert f"small.yaml:{place}" in told, told
     assert words in told, told
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        "  - move: {to: {pitch: 0.5}}\n",
+        "  - wait: 0.1 s\n  - move: {to: {pitch: 0.5}}\n",
+        "  - if: {at_pose: {pose: up, within: 3}}\n    then: [{wait: 0.1 s}, {move: {to: {pitch: 0.5}}}]\n"
+        "  - move: {to: up}\n",
+    ],
+)
+def test_without_replanning_no_step_jumps_to_its_old_start_after_a_retry_to_another_end(
+    run: Run, tmp_path: Path, rest: str
+) -> None:
+    """The second attempt ends at 0.8 rad instead of 0.2 rad; no joint is faster than a motion can be."""
+    first = (
+        "  - move: {to: {pitch: 4 * $near}}\n    until: {not: {at_pose: {pose: up, within: 0.5}}}\n    timeout: 1 s\n"
+    )
+    verdict = run(f"replan: false\nsteps:\n{first}    on_fail: {{retry: 1, with: {{near: 0.2}}}}\n{rest}")
+    assert verdict.verdict == "passed"
+    recording = read_recording(tmp_path / "small.mcap")
+    position = np.concatenate([span.states.position for span in recording.spans])
+    assert np.abs(np.diff(position, axis=0)).max() < 0.05

@@ -38,14 +38,14 @@ def run(
         typer.Option(
             "--from",
             metavar="STEP",
-            help="Begin at STEP, with the state of an earlier run; the log is runs/<task>@from.mcap.",
+            help="Begin at STEP (or a block), with the state of an earlier run; the log is runs/<task>@from.mcap.",
         ),
     ] = None,
     state: Annotated[
         Path | None,
         typer.Option("--state", metavar="LOG", help="Log with the state before --from [default: runs/<task>.mcap]."),
     ] = None,
-    until: Annotated[str | None, typer.Option("--until", metavar="STEP", help="End after STEP.")] = None,
+    until: Annotated[str | None, typer.Option("--until", metavar="STEP", help="End after STEP (or a block).")] = None,
     report_file: ReportFile = None,
     junit: JunitFile = None,
     seed: Seed = None,

@@ -41,7 +41,7 @@ def flattened(root: Node, scope: Scope, expansion: Expansion, change: Change) ->
     if isinstance(entry.node, SequenceNode) and not entry.node.items and not _is_complete(scope, expansion):
         place = entry.node.place
         return root.with_node("steps", _placeholder(place)), Structure(scope=scope, complete=False)
-    if not is_structured(entry.node):
+    if not is_structured(entry.node, expansion.verbs):
         change(())
         return root.with_node("steps", mapped(entry.node, scope.computed, ("steps",))), Structure(scope=scope)
     expanded = expansion.whole(entry.node, scope)

@@ -85,7 +85,10 @@ def _equal(node: Node) -> bool:
         if not isinstance(value, ScalarNode) or value.value is None:
             raise Undecidable(value, f"`equal` compares numbers, words and true or false, not {shown(value)}")
     first, second = (value.value for value in values if isinstance(value, ScalarNode))
-    if isinstance(first, bool) or isinstance(second, bool):
+    if isinstance(first, bool) != isinstance(second, bool):
+        message = f"cannot compare {shown(values[0])} with {shown(values[1])}: only one of them is true or false"
+        raise Undecidable(values[1], message, "write true and false without quotes")
+    if isinstance(first, bool):
         return first is second
     a, b = _quantity(first), _quantity(second)
     if a is None or b is None:

@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Final
 
+<<<<<<< HEAD
 from manipcli.core.text import did_you_mean, escape, nearest
+=======
+from manipcli.core.text import did_you_mean, escape, listed, nearest
+>>>>>>> M3
 from manipcli.spec.condition import ID
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode
 from manipcli.spec.step import StepSpec
@@ -53,10 +57,12 @@ class Misplaced:
     hint: str | None
 
 
-def is_structured(steps: Node) -> bool:
-    """Whether a list of steps has an item with a key of structure."""
+def is_structured(steps: Node, verbs: Collection[str] = ()) -> bool:
+    """Whether a list of steps has an item with a key of structure; with the `verbs`, also with a misspelt word."""
     return not isinstance(steps, ScalarNode) and any(
-        isinstance(item, MappingNode) and not _KEYS.isdisjoint(item.entries) for item in _items(steps)
+        isinstance(item, MappingNode)
+        and (not _KEYS.isdisjoint(item.entries) or (bool(verbs) and misplaced(item, verbs) is not None))
+        for item in _items(steps)
     )
 
 
@@ -123,7 +129,7 @@ def _beside(key: str, word: str, wanted: Collection[str]) -> str | None:
 def _without_word(others: list[str], verbs: Collection[str]) -> Misplaced | None:
     key = next((key for key in others if key in _OWNER), None)
     if key is None:
-        return None
+        return _misspelt(others, verbs)
     word = _OWNER[key]
     verb = next((other for other in others if other in verbs), None)
     misspelt = next((other for other in others if other not in _OWNER and other not in verbs), None)
@@ -144,6 +150,17 @@ def _without_word(others: list[str], verbs: Collection[str]) -> Misplaced | None
 def other_word(key: str) -> str | None:
     """Hint for a word of another language: how its counterpart is written; None for other words."""
     return _usual(SYNONYMS[key]) if key in SYNONYMS else None
+
+
+def _misspelt(others: list[str], verbs: Collection[str]) -> Misplaced | None:
+    """A misspelt word of structure in an item without a verb: what stands in it is not read as a step."""
+    if not others or any(key in verbs for key in others):
+        return None
+    key, known = others[0], (*verbs, *WORDS)
+    if not any(near in WORDS for near in nearest(key, known)):
+        return None
+    message = f"unknown verb '{escape(key)}', expected one of {listed(known, most=40)}"
+    return Misplaced(203, key, message, did_you_mean(key, known))
 
 
 def _usual(word: str) -> str:

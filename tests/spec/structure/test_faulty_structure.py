@@ -20,6 +20,7 @@ FAULTY = (
     (205, "6:39", "expected a string", "[{sequence: [{wait: 1 s}], id: 5}, {wait: 0}]"),
     (263, "6:30", "a value is missing", "[{repeat: {each: {x: [null]}, steps: [{wait: $x}]}}]"),
     (270, "6:8", "no step is left", "[{if: {equal: [1, 2]}, then: [{wait: 1 s}]}]"),
+    (270, "6:29", "only one of them is true or false", "[{if: {equal: [true, 'true']}, then: [{wait: 1 s}]}]"),
     (262, "6:10", "`then` is missing", "[{if: {equal: [$color, red]}, else: [{wait: 1 s}]}]"),
     (261, "6:21", "`then` belongs to `if`", "[{wait: 1 s, then: [{wait: 1 s}]}]"),
     (261, "6:10", "`then` without `if`", "[{then: [{wait: 1 s}]}]"),
@@ -183,6 +184,7 @@ def test_blocks_are_no_key() -> None:
     assert [finding.code for finding in refused.value.findings] == ["TASK201"]
 
 
+<<<<<<< HEAD
 @pytest.mark.parametrize("values", ["[red, Blue]", "[red, red]"])
 def test_a_condition_that_holds_in_a_round_is_no_warning(values: str) -> None:
     steps = f"[{{repeat: {{each: {{x: {values}}}, steps: [{{if: {{equal: [$x, red]}}, then: [{{wait: 1 s}}]}}]}}}}]"
@@ -192,3 +194,20 @@ def test_a_condition_that_holds_in_a_round_is_no_warning(values: str) -> None:
 def test_a_switch_of_the_task_is_no_warning() -> None:
     steps = "[{repeat: {times: 2, steps: [{if: {equal: [$color, blue]}, then: [{wait: 1 s}]}, {wait: 1 s}]}}]"
     assert load_task_text(f"{HEAD}steps: {steps}\n", "t.yaml", model=task_spec()).findings == ()
+=======
+@pytest.mark.parametrize(
+    ("steps", "told"),
+    [
+        ("[{repeat_: {each: {x: [1, 2]}, steps: [{wait: $x}]}}]", "sequence, repeat, if, parallel, do, include"),
+        ("[{wait: 1 s}, {sequense: [{wait: $y}]}]", "unknown verb 'sequense'"),
+        ("[{repeat: {each: {base: [1, 2]}, steps: [{wait: $bass}]}}]", "unknown parameter '$bass'"),
+    ],
+)
+def test_what_only_follows_from_a_misspelt_word_or_name_is_not_reported(steps: str, told: str) -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        load_task_text(f"{HEAD}steps: {steps}\n", "t.yaml", model=task_spec())
+    (finding,) = refusal.value.findings
+    assert told in finding.message
+    assert finding.hint is not None
+    assert finding.hint.startswith("did you mean '")
+>>>>>>> M3
