@@ -206,10 +206,6 @@ def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Sea
         named.append((("during",) if isinstance(spec.during, str) else ("during", k), name))
     for loc, name in named:
         if context.steps is not None and name not in context.steps:
-<<<<<<< HEAD
-            known = (*context.steps, *context.blocks, *((END,) if loc == ("at",) else ()))
-            found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
-=======
             blocks = () if loc == ("at",) else context.blocks  # a block that ends with a branch has no last step
             known = (*context.steps, END) if loc == ("at",) else (*context.steps, *blocks)
             rounds = [block for block in blocks if block.startswith(f"{name.rpartition('[')[0]}[")]
@@ -217,7 +213,6 @@ def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Sea
             near = f"rounds: {listed(rounds)}" if rounds and name.endswith("]") else None
             hint = near or did_you_mean(name, known, kind="steps")
             found.append(Problem(loc, f"the task has no step '{name}'", hint))
->>>>>>> M3
     if not found and context.in_order:
         found += _too_early(spec, named, context.steps)
     if not found and spec.at is None and spec.during is None and spec.quantifier is None:

@@ -8,11 +8,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Final
 
-<<<<<<< HEAD
-from manipcli.core.text import did_you_mean, escape, nearest
-=======
 from manipcli.core.text import did_you_mean, escape, listed, nearest
->>>>>>> M3
 from manipcli.spec.condition import ID
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode
 from manipcli.spec.step import StepSpec

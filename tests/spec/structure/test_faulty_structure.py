@@ -184,7 +184,6 @@ def test_blocks_are_no_key() -> None:
     assert [finding.code for finding in refused.value.findings] == ["TASK201"]
 
 
-<<<<<<< HEAD
 @pytest.mark.parametrize("values", ["[red, Blue]", "[red, red]"])
 def test_a_condition_that_holds_in_a_round_is_no_warning(values: str) -> None:
     steps = f"[{{repeat: {{each: {{x: {values}}}, steps: [{{if: {{equal: [$x, red]}}, then: [{{wait: 1 s}}]}}]}}}}]"
@@ -194,7 +193,8 @@ def test_a_condition_that_holds_in_a_round_is_no_warning(values: str) -> None:
 def test_a_switch_of_the_task_is_no_warning() -> None:
     steps = "[{repeat: {times: 2, steps: [{if: {equal: [$color, blue]}, then: [{wait: 1 s}]}, {wait: 1 s}]}}]"
     assert load_task_text(f"{HEAD}steps: {steps}\n", "t.yaml", model=task_spec()).findings == ()
-=======
+
+
 @pytest.mark.parametrize(
     ("steps", "told"),
     [
@@ -210,4 +210,3 @@ def test_what_only_follows_from_a_misspelt_word_or_name_is_not_reported(steps: s
     assert told in finding.message
     assert finding.hint is not None
     assert finding.hint.startswith("did you mean '")
->>>>>>> M3
