@@ -91,6 +91,8 @@ def kind_of(path: Path, *, types: Collection[str] | None = None) -> FileKind:
     if not isinstance(root, MappingNode):
         raise InvalidInput([Diagnostic("USE104", _NONE, Place(str(path), 1, 1))])
     if "task" in root.entries or "steps" in root.entries:
+        if types is not None:
+            refuse_other_kind(root, str(path), "task")  # a sub-task
         return "task"
     # In a file of ROS `robot` may be a namespace.
     named = "robot" in root.entries and not isinstance(root.get("robot"), MappingNode)

@@ -18,6 +18,7 @@ FILES = {
     "controllers/ros1.yaml": "arm_controller: {type: effort_controllers/JointTrajectoryController}\n",
     "controllers/ros2.yaml": "controller_manager: {ros__parameters: {}}\n",
     ".hidden/c.yaml": "task: c\n",
+    "tasks/sub.yaml": "params: {x: {type: number}}\nsteps: [{wait: $x}]\n",
     "broken.yaml": "task: [\n",
     "other.yaml": "- 1\n",
     "docker-compose.yml": "services: {db: {image: a/b, volumes: [{type: bind}]}}\n",
