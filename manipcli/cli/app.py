@@ -35,6 +35,7 @@ from manipcli.cli.commands import (
     replay,
     run,
     schema,
+    serve,
     test,
     tune,
     view,
@@ -93,6 +94,7 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "plot": plot.plot,
     "view": view.view,
     "replay": replay.replay,
+    "serve": serve.serve,
     "list": list_.list_,
     "schema": schema.schema,
 }
