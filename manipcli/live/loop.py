@@ -25,7 +25,6 @@ from manipcli.run.observer import SILENT, Observer
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
-
 STARTED: Final = "the controllers hold, and obey commands"
 
 
@@ -41,7 +40,7 @@ class Outside:
         feed: takes what clients see.
         pace: of the loop.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        ready: called when the scene is open and settled.
+        ready: called before the scene is opened; commands wait until it has settled.
         failure: why the simulation failed; "" if it did not.
     """
 
@@ -60,6 +59,7 @@ def simulate_live(
 
     A session that ends as asked, also by a signal, is complete.
     """
+    outside.ready()  # before the scene is open: from there on stdout is stderr, for the engine
     try:
         with open_session(task, plan, manager) as session:
             live = Live(live_world(task, plan, session), manager.controllers, session.period)
@@ -70,7 +70,6 @@ def simulate_live(
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             obedience = Obedience(session, recorder, observer.goal)
             try:
-                outside.ready()
                 outside.pace.start()
                 while _obeyed(session.ticks, obedience, outside):
                     session.tick()

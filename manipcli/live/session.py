@@ -63,7 +63,7 @@ def served(
         task, manager: of the session.
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        announce: called with the URL when the scene is open.
+        announce: called with the URL when clients can connect.
         late: called once with a text if the simulation is slower than asked.
 
     Raises:
