@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any, Final
 
 MAX_FRAME: Final = 1 << 20
 """Largest frame [byte]; a larger one closes the connection."""
 MAX_DEPTH: Final = 32
 """Deepest nesting of a frame."""
+_BRACKETS = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}]', re.DOTALL)
+"""A text, or a bracket; an open text ends with the frame, so that the search is linear."""
 
 
 class BadFrame(ValueError):
@@ -23,7 +26,7 @@ def read_frame(frame: str | bytes) -> dict[str, Any]:
     """
     if not isinstance(frame, str):
         raise BadFrame("binary frames are not supported; send JSON as text")
-    if _depth(frame) > MAX_DEPTH:
+    if _too_deep(frame):
         raise BadFrame(f"the JSON is nested deeper than {MAX_DEPTH}")
     try:
         found = json.loads(frame, parse_constant=_refuse)
@@ -40,20 +43,14 @@ def _refuse(word: str) -> None:
     raise BadFrame(f"{word} is not JSON")
 
 
-def _depth(text: str) -> int:
-    """An upper bound of the nesting: the brackets opened more than closed, also those in texts."""
+def _too_deep(text: str) -> bool:
+    """Whether brackets outside of texts are nested deeper than the limit."""
     if text.count("[") + text.count("{") <= MAX_DEPTH:
-        return 0
-    deepest = depth = 0
-    quoted = escaped = False
-    for letter in text:
-        if quoted:
-            quoted, escaped = escaped or letter != '"', letter == "\\" and not escaped
-        elif letter == '"':
-            quoted = True
-        elif letter in "[{":
-            depth += 1
-            deepest = max(deepest, depth)
-        elif letter in "]}":
-            depth -= 1
-    return deepest
+        return False
+    depth = 0
+    for found in _BRACKETS.finditer(text):
+        first = text[found.start()]
+        depth += 1 if first in "[{" else -1 if first in "]}" else 0
+        if depth > MAX_DEPTH:
+            return True
+    return False
