@@ -37,6 +37,7 @@ from manipcli.cli.commands import (
     schema,
     serve,
     test,
+    topic,
     tune,
     view,
 )
@@ -95,6 +96,7 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "view": view.view,
     "replay": replay.replay,
     "serve": serve.serve,
+    "topic": topic.topic,
     "list": list_.list_,
     "schema": schema.schema,
 }

@@ -119,7 +119,7 @@ def test_without_the_token_a_client_only_reads(tmp_path: Path) -> None:
         switched = await reader.call("/controller_manager/switch_controller", deactivate_controllers=["arm_controller"])
         assert switched["result"] is False
         for options in ({"origin": "http://evil.example"}, {"additional_headers": {"Host": "evil.example"}}):
-            with pytest.raises(InvalidStatus, match="HTTP 40[03]"):
+            with pytest.raises(InvalidStatus, match=r"HTTP 40[03]"):
                 await connect(plain, **options)  # type: ignore[arg-type]
         with pytest.raises(InvalidStatus, match="401"):
             await connect(f"{plain}?token=wrong")
