@@ -212,3 +212,21 @@ def test_a_large_frame_closes_the_connection(tmp_path: Path) -> None:
             await client.socket.recv()
 
     serving(tmp_path, use)
+
+
+def test_the_hand_closes_by_its_action(tmp_path: Path) -> None:
+    async def use(url: str) -> None:
+        client = await opened(url)
+        action = "/hand_controller/gripper_cmd"
+        for id_, name, expected in (("a", [], 4), ("b", ["thumb"], 6)):
+            args = {"command": {"name": name, "position": [0.3]}}
+            await client.send(op="send_action_goal", id=id_, action=action, args=args)
+            result = await client.until(op="action_result", id=id_)
+            assert result["status"] == expected
+            if expected == 4:
+                assert result["values"]["reached_goal"] is True
+                assert result["values"]["state"]["position"] == pytest.approx([0.3] * 6, abs=0.05)
+            else:
+                assert result["values"]["error_code"] == -2
+
+    serving(tmp_path, use)
