@@ -13,6 +13,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from manipcli import pipeline
+from manipcli.live import server
 from manipcli.live.source import recorded_commands
 from manipcli.record.foreign.topics import open_topics
 from tests.live.sessions import HOME, opened, serving, trajectory
@@ -228,5 +229,20 @@ def test_the_hand_closes_by_its_action(tmp_path: Path) -> None:
                 assert result["values"]["state"]["position"] == pytest.approx([0.3] * 6, abs=0.05)
             else:
                 assert result["values"]["error_code"] == -2
+
+    serving(tmp_path, use)
+
+
+def test_a_client_that_never_reads_is_disconnected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "UNREAD", 0.3)
+
+    async def use(url: str) -> None:
+        deaf = await connect(url, max_queue=1)
+        with pytest.raises(ConnectionClosed):
+            while True:  # each is answered with the whole description
+                await deaf.send(json.dumps({"op": "subscribe", "topic": "/robot_description"}))
+                await asyncio.sleep(0.002)
+        good = await opened(url)
+        assert (await good.call("/rosapi/nodes"))["result"] is True
 
     serving(tmp_path, use)
