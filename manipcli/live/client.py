@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from manipcli.core.text import did_you_mean
 from manipcli.live import command as words
+from manipcli.live.budget import RATE, Budget
 from manipcli.live.command import Answer, Command
+from manipcli.live.fields import MAX_NAME, Refused, check_type, near, number_of, text_of, topic_of
 from manipcli.live.frames import BadFrame, read_frame
 from manipcli.live.interface import goal_type, request_type
 from manipcli.live.outbox import MAX_QUEUE, Outbox, Subscription
@@ -22,10 +24,6 @@ from manipcli.record.json_message import BadMessage, definition, from_json
 MAX_SUBSCRIPTIONS: Final = 100
 MAX_GOALS: Final = 100
 """Goals and services of one client that wait for an answer."""
-RATE: Final = 500.0
-BURST: Final = 1000.0
-"""Operations per second of wall time, and those at once."""
-MAX_NAME: Final = 256
 LEVELS: Final = ("none", "error", "warning", "info")
 QUEUE: Final = 10
 """Default of `queue_length`."""
@@ -40,10 +38,6 @@ class Services:
     put: Callable[[Command], bool]
     in_network: Callable[[Callable[[], None]], None]
     subscribed: Callable[[], None]
-
-
-class Refused(ValueError):
-    """An operation that is not carried out."""
 
 
 class Client:
@@ -65,7 +59,7 @@ class Client:
         self._calls = 0
         self._sent = 0
         self._level = "warning"
-        self._budget, self._filled = BURST, time.monotonic()
+        self._budget = Budget()
         self._warned = 0.0
         self._operations: dict[str, Callable[[dict[str, Any]], None]] = {
             "advertise": self._advertise,
@@ -86,7 +80,7 @@ class Client:
         frame: dict[str, Any] = {}
         try:
             frame = read_frame(text)
-            op = _text(frame, "op")
+            op = text_of(frame, "op")
             if op not in self._operations:
                 raise Refused(f"unknown op '{op[:60]}'; {did_you_mean(op[:60], self._operations, kind='ops')}")
             self._operations[op](frame)
@@ -114,10 +108,7 @@ class Client:
 
     def _within_rate(self) -> bool:
         now = time.monotonic()
-        self._budget = min(BURST, self._budget + (now - self._filled) * RATE)
-        self._filled = now
-        if self._budget >= 1.0:
-            self._budget -= 1.0
+        if self._budget.spend(now):
             return True
         if now - self._warned > 1.0:
             self._warned = now
@@ -125,23 +116,23 @@ class Client:
         return False
 
     def _set_level(self, frame: dict[str, Any]) -> None:
-        level = _text(frame, "level")
+        level = text_of(frame, "level")
         if level not in LEVELS:
             raise Refused(f"unknown level '{level[:60]}'; expected {', '.join(LEVELS)}")
         self._level = level
 
     def _advertise(self, frame: dict[str, Any]) -> None:
-        topic = _topic(frame)
-        _check_type(topic, self._input(topic), frame)
+        topic = topic_of(frame)
+        check_type(topic, self._input(topic), frame)
 
     def _input(self, topic: str) -> str:
         kind = self._offer.received.get(topic)
         if kind is None:
-            raise Refused(f"topic '{topic}' takes no messages; {_near(topic, self._offer.received)}")
+            raise Refused(f"topic '{topic}' takes no messages; {near(topic, self._offer.received)}")
         return kind
 
     def _publish(self, frame: dict[str, Any]) -> None:
-        topic = _topic(frame)
+        topic = topic_of(frame)
         message = from_json(definition(self._input(topic)), frame.get("msg", {}))
 
         def refused(answer: Answer) -> None:
@@ -163,15 +154,15 @@ class Client:
             raise Refused("too many commands wait for the next tick")
 
     def _subscribe(self, frame: dict[str, Any]) -> None:
-        topic = _topic(frame)
+        topic = topic_of(frame)
         kind = self._offer.published.get(topic)
         if kind is None:
-            raise Refused(f"topic '{topic}' is not published; {_near(topic, self._offer.published)}")
-        _check_type(topic, kind, frame)
+            raise Refused(f"topic '{topic}' is not published; {near(topic, self._offer.published)}")
+        check_type(topic, kind, frame)
         if topic not in self.outbox.subscriptions and len(self.outbox.subscriptions) >= MAX_SUBSCRIPTIONS:
             raise Refused(f"more than {MAX_SUBSCRIPTIONS} subscriptions")
-        throttle = _number(frame, "throttle_rate", 0.0) / 1000.0
-        length = int(min(_number(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE
+        throttle = number_of(frame, "throttle_rate", 0.0) / 1000.0
+        length = int(min(number_of(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE
         self.outbox.subscriptions[topic] = Subscription(topic, throttle, deque(maxlen=length))
         last = self._services.publisher.latched(topic)
         if last is not None:
@@ -179,18 +170,18 @@ class Client:
         self._services.subscribed()
 
     def _unsubscribe(self, frame: dict[str, Any]) -> None:
-        self.outbox.subscriptions.pop(_topic(frame), None)
+        self.outbox.subscriptions.pop(topic_of(frame), None)
         self._services.subscribed()
 
     def _call_service(self, frame: dict[str, Any]) -> None:
-        name = "/" + _text(frame, "service").lstrip("/")
+        name = "/" + text_of(frame, "service").lstrip("/")
         request = frame.get("args", {})
         if name.startswith("/rosapi/"):
             self._respond(frame, Answer(True, self._services.rosapi.call(name, request)))
             return
         kind = self._offer.services.get(name)
         if kind is None:
-            raise Refused(f"unknown service '{name[:80]}'; {_near(name, [*self._offer.services, *self._rosapi_names])}")
+            raise Refused(f"unknown service '{name[:80]}'; {near(name, [*self._offer.services, *self._rosapi_names])}")
         if self._calls >= MAX_GOALS:
             raise Refused(f"more than {MAX_GOALS} services wait for a response")
         message = from_json(definition(request_type(kind)), request if request != [] else {})
@@ -212,11 +203,11 @@ class Client:
         self._answer({**found, "id": frame["id"]} if isinstance(frame.get("id"), str) else found)
 
     def _send_goal(self, frame: dict[str, Any]) -> None:
-        name = "/" + _text(frame, "action").lstrip("/")
+        name = "/" + text_of(frame, "action").lstrip("/")
         kind = self._offer.actions.get(name)
         if kind is None:
-            raise Refused(f"unknown action '{name[:80]}'; {_near(name, self._offer.actions)}")
-        _check_type(name, kind, {"type": frame.get("action_type")})
+            raise Refused(f"unknown action '{name[:80]}'; {near(name, self._offer.actions)}")
+        check_type(name, kind, {"type": frame.get("action_type")})
         asked = frame.get("id")
         if not isinstance(asked, str) or not asked or len(asked) > MAX_NAME:
             raise Refused("send_action_goal needs an id, a text")
@@ -247,40 +238,7 @@ class Client:
         self._answer({**found, "id": frame["id"]} if isinstance(frame.get("id"), str) else found)
 
     def _cancel_goal(self, frame: dict[str, Any]) -> None:
-        own = self._goals.get(_text(frame, "id"))
+        own = self._goals.get(text_of(frame, "id"))
         if own is None:
-            raise Refused(f"goal '{_text(frame, 'id')[:60]}' is not active")
-        self._put(words.CANCEL_GOAL, "/" + _text(frame, "action").lstrip("/"), own, {}, words.nobody)
-
-
-def _text(frame: Mapping[str, Any], key: str) -> str:
-    value = frame.get(key)
-    if not isinstance(value, str) or not value or len(value) > MAX_NAME or "\0" in value or not value.isprintable():
-        raise Refused(f"'{key}' must be a text of 1 to {MAX_NAME} characters")
-    return value
-
-
-def _topic(frame: Mapping[str, Any]) -> str:
-    return "/" + _text(frame, "topic").lstrip("/")
-
-
-def _number(frame: Mapping[str, Any], key: str, default: float) -> float:
-    value = frame.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1e9:
-        raise Refused(f"'{key}' must be a number from 0 to 1e9")
-    return float(value)
-
-
-def _check_type(name: str, kind: str, frame: Mapping[str, Any]) -> None:
-    """
-    Raises:
-        Refused: the frame names another type; `std_msgs/String` is `std_msgs/msg/String`.
-    """
-    given = frame.get("type")
-    short = kind.replace("/msg/", "/").replace("/action/", "/")
-    if given is not None and given not in (kind, short, ""):
-        raise Refused(f"'{name}' is of type {kind}, not {str(given)[:80]}")
-
-
-def _near(name: str, known: Iterable[str]) -> str:
-    return did_you_mean(name[:80], known) or "there is none"
+            raise Refused(f"goal '{text_of(frame, 'id')[:60]}' is not active")
+        self._put(words.CANCEL_GOAL, "/" + text_of(frame, "action").lstrip("/"), own, {}, words.nobody)
