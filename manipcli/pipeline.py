@@ -31,6 +31,7 @@ from manipcli.model.robot import LinkInertial, RobotModel
 from manipcli.model.self_collision import SelfCollisionMatrix
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
+from manipcli.preflight.editor_schema import updated_schema
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
@@ -45,6 +46,7 @@ from manipcli.run.prepared import Prepared
 from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.task.controller_rows import checked_controllers, controllers_of
+from manipcli.task.explanation import Explanation, explained
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
 from manipcli.task.part import LIVE
@@ -60,6 +62,7 @@ __all__ = [
     "check_files",
     "compare_runs",
     "controllers_of",
+    "explain_task",
     "inertials",
     "judge_log",
     "kind_of",
@@ -74,6 +77,7 @@ __all__ = [
     "self_collisions",
     "simulation_of",
     "unplanned",
+    "updated_schema",
     "verify_log",
     "words",
 ]
@@ -88,6 +92,16 @@ def inertials(
         InvalidInput: all errors of the file.
     """
     return load_sight(path, package_path=package_path, allow_outside=allow_outside).robot.inertials
+
+
+def explain_task(path: Path, **options: Unpack[FileOptions]) -> tuple[Explanation, tuple[Diagnostic, ...]]:
+    """A task in English, with the origin of each value, and the warnings about its files. Nothing is planned.
+
+    Raises:
+        InvalidInput: all errors of the files.
+    """
+    task = load_task(path, **options)
+    return explained(task), task.warnings
 
 
 def self_collisions(

@@ -12,6 +12,7 @@ cannot lift a protection, and its paths, relative to it, stay below its folder.
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from manipcli.core.text import did_you_mean, escape, shorten
 
 OWN: Final = "manipcli.toml"
 PROJECT: Final = "pyproject.toml"
-REFUSED: Final = ("force", "allow-outside", "help", "version")
+REFUSED: Final = ("force", "allow-outside", "allow-env", "help", "version")
 """Options that a person gives: they lift a protection."""
 LARGEST: Final = 1_000_000
 """[bytes] A larger file is not read."""
@@ -190,7 +191,10 @@ class _Reader:
                 )
             elif key not in everywhere:
                 known = [*everywhere, *self._options]
-                self._error("", key, f"there is no option or command '{escape(key)}'", did_you_mean(key, known))
+                hint = did_you_mean(key, known)
+                if key == "tool" and self._file.path.name == OWN:
+                    hint = f"in {OWN} write `[check]` instead of `[tool.manipcli.check]`"
+                self._error("", key, f"there is no option or command '{escape(key)}'", hint)
             else:
                 yield "", key, value
         for section, table in self._file.table.items():
@@ -219,9 +223,9 @@ class _Reader:
         return None
 
     def _path(self, section: str, key: str, word: str) -> str | None:
-        folder = self._file.path.parent.resolve()
+        folder = Path(os.path.realpath(self._file.path.parent))
         try:
-            path = (folder / word).resolve()
+            path = Path(os.path.realpath(folder / word))
             below = path.is_relative_to(folder)
         except (OSError, ValueError):
             below = False

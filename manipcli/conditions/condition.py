@@ -77,6 +77,7 @@ class CheckContext:
         steps: the ids of its steps; None: unknown.
         in_order: True if `steps` is complete and in order; else it holds every possible id, unordered.
         self_collision: whether links of the robot collide with each other in the simulation.
+        blocks: the ids of its blocks.
     """
 
     robot: RobotModel
@@ -84,6 +85,7 @@ class CheckContext:
     steps: tuple[str, ...] | None = None
     in_order: bool = True
     self_collision: bool = True
+    blocks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +119,8 @@ class Condition(Generic[S]):
             `absent` is None.
         check: (spec, context) -> every unknown name in the spec.
         absent: (spec, world) -> why it cannot be evaluated in this world, or None.
+        clause: (spec, robot) -> the condition in English, as a statement without a capital and a full stop: `'ball' is
+            inside 'tray'`. `core/prose.py` has the parts.
         scope: the default time of an expectation.
         example: in YAML.
         stateless: True if it uses only contacts and steps, which are known at every tick, also in a log with fewer
@@ -130,6 +134,7 @@ class Condition(Generic[S]):
     open: Callable[[S, World], Monitor]
     check: Callable[[S, CheckContext], tuple[Problem, ...]]
     absent: Callable[[S, World], str | None]
+    clause: Callable[[S, RobotModel], str]
     example: str
     scope: Scope = "end"
     stateless: bool = False
@@ -173,7 +178,11 @@ def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) ->
     if name in known:
         return ()
     word = "a movable body of the scene" if movable else "in the scene"
-    return (Problem(loc, f"'{name}' is not {word}", did_you_mean(name, known)),)
+    body, _, part = name.partition("/")
+    apart = (
+        f"name the body, '{body}'; where the step has `part`, add `part: {part}`" if part and body in known else None
+    )
+    return (Problem(loc, f"'{name}' is not {word}", apart or did_you_mean(name, known)),)
 
 
 def unknown_group(robot: RobotModel, name: str | None, loc: Loc) -> tuple[Problem, ...]:

@@ -62,14 +62,20 @@ def write_cached(kind: str, key: str, content: bytes) -> None:
 
 
 def _file(kind: str, key: str) -> Path | None:
-    """The file of an entry; None without a cache folder.
+    """The file of an entry; None without a cache folder."""
+    folder = cache_folder()
+    return None if folder is None else folder / kind / key
+
+
+def cache_folder() -> Path | None:
+    """The folder of all entries; None without a home folder.
 
     Source: XDG Base Directory Specification: a relative XDG_CACHE_HOME is ignored.
     """
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
-        return named / "manipcli" / kind / key
+        return named / "manipcli"
     try:
-        return Path.home() / ".cache" / "manipcli" / kind / key
+        return Path.home() / ".cache" / "manipcli"
     except RuntimeError:  # no home folder
         return None

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
@@ -25,32 +26,43 @@ class OpenedFiles:
 
     def unchanged(self) -> bool:
         """Whether all stamps are the same now."""
-        return all(_stamp(path) == stamp for path, stamp in self.stamps)
+        return all(stamp(path) == before for path, before in self.stamps)
+
+
+_recording: list[dict[Path, Stamp]] = []
+"""The stamps of the calls that are being recorded."""
+
+
+@cache
+def _install() -> None:
+    """Adds the audit hook, once: Python keeps it until the process ends."""
+
+    def hook(event: str, arguments: tuple[object, ...]) -> None:
+        if event == "open" and _recording and isinstance(arguments[0], str | bytes):
+            path = Path(os.fsdecode(arguments[0])).absolute()
+            for stamps in _recording:
+                stamps.setdefault(path, stamp(path))
+
+    sys.addaudithook(hook)
 
 
 def opened_by(call: Callable[[], T]) -> tuple[T, OpenedFiles]:
     """Calls, and records every file that Python opens meanwhile, for reading or writing.
 
-    Python keeps an audit hook until the process ends, so this is for a process that calls it once. A file is stamped
-    before it is read: if it changes meanwhile, the stamp is that of the older content.
+    A file is stamped before it is read: if it changes meanwhile, the stamp is that of the older content.
     """
     stamps: dict[Path, Stamp] = {}
-    recording = True
-
-    def hook(event: str, arguments: tuple[object, ...]) -> None:
-        if event == "open" and recording and isinstance(arguments[0], str | bytes):
-            path = Path(os.fsdecode(arguments[0])).absolute()
-            stamps.setdefault(path, _stamp(path))
-
-    sys.addaudithook(hook)
+    _install()
+    _recording.append(stamps)
     try:
         result = call()
     finally:
-        recording = False
+        _recording[:] = [other for other in _recording if other is not stamps]
     return result, OpenedFiles(tuple(stamps.items()))
 
 
-def _stamp(path: Path) -> Stamp:
+def stamp(path: Path) -> Stamp:
+    """The stamp of a file now."""
     try:
         found = path.stat()
     except OSError:

@@ -206,7 +206,7 @@ def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Sea
         named.append((("during",) if isinstance(spec.during, str) else ("during", k), name))
     for loc, name in named:
         if context.steps is not None and name not in context.steps:
-            known = (*context.steps, END) if loc == ("at",) else context.steps
+            known = (*context.steps, *context.blocks, *((END,) if loc == ("at",) else ()))
             found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
     if not found and context.in_order:
         found += _too_early(spec, named, context.steps)

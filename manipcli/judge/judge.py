@@ -11,7 +11,7 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.evaluate import examine
-from manipcli.judge.outside import not_asked, unless_outside
+from manipcli.judge.outside import not_asked, of_part, unless_outside
 from manipcli.judge.part import PART, RunPart
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.steps import ENDED, RunStatus, block_outcomes, left_out, step_outcomes
@@ -53,18 +53,17 @@ def judge(
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")
     errors = _errors(recording, status)
-    steps = step_outcomes(recording, interrupted=bool(errors))
+    part = RunPart.from_metadata(recording.metadata[PART]) if PART in recording.metadata else None
+    steps = not_asked(step_outcomes(recording, interrupted=bool(errors)), part)
     examined = examine(
         recording,
-        (*expect, *implied),
+        (*(of_part(each, steps) for each in expect), *implied),
         robot=robot,
         scene=scene,
         seam=CONDITIONS,
         physics=run.get("physics", "") == "full",
         steps=steps,
     )
-    part = RunPart.from_metadata(recording.metadata[PART]) if PART in recording.metadata else None
-    steps = not_asked(steps, part)
     outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes[: len(expect)])
     unwritten = tuple(each for each in examined.outcomes[len(expect) :] if each.outcome != "not_evaluated")
     if part is not None:

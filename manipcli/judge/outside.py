@@ -2,6 +2,7 @@
 
 - Steps before its first and after its last step are not run, which is no failure.
 - An expectation that names such a step, in `during`, `at` or `step_done`, is not evaluated.
+- But one that must hold throughout several steps fails if it does in those that were run.
 - A `duration` without a step is that of the whole task, and is not evaluated.
 - What must hold at the end of the task is not evaluated if the run was asked to stop before.
 - `eventually` that does not hold in the part is not evaluated: it may hold in the rest.
@@ -43,13 +44,24 @@ def _why(part: RunPart, *, before: bool) -> str:
     return f"before '{part.first}', where this run starts" if before else f"after '{part.last}', where this run ends"
 
 
+def of_part(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> ExpectationSpec:
+    """The expectation, asked only of the steps of `during` that the run was asked to do, if it is asked of several."""
+    outside = {step.id for step in steps if step.excused}
+    inside = tuple(name for name in spec.steps if name not in outside)
+    if not inside or inside == spec.steps or spec.quantifier == "eventually":
+        return spec
+    return spec.model_copy(update={"during": inside})
+
+
 def unless_outside(
     outcome: ExpectationOutcome, spec: ExpectationSpec, part: RunPart, steps: Sequence[StepOutcome], seam: Seams
 ) -> ExpectationOutcome:
     """The outcome; not evaluated and excused if the expectation concerns more than the part."""
     outside = {step.id: step.text for step in steps if step.excused}
-    named = [*spec.steps, *([spec.at] if spec.at not in (None, END) else [])]
-    named += [leaf.body.step for leaf in leaves(spec.condition) if isinstance(leaf.body, StepDoneSpec)]
+    done = [leaf.body.step for leaf in leaves(spec.condition) if isinstance(leaf.body, StepDoneSpec)]
+    if outcome.outcome == "failed" and of_part(spec, steps) != spec and not outside.keys() & {*done}:
+        return outcome
+    named = [*spec.steps, *([spec.at] if spec.at not in (None, END) else []), *done]
     why = next((f"step '{name}' is {outside[name]}" for name in named if name in outside), "")
     if not why and not named and any(leaf.name == "duration" for leaf in leaves(spec.condition)):
         why = "it is about the duration of the whole task"

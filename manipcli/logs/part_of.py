@@ -134,7 +134,7 @@ class _StateOf:
         order = [recording.joint_names.index(name) for name in joints]
         bodies = tuple(body.name for body in self.task.scene.movable)
         rows = [recording.body_names.index(name) for name in bodies]
-        return StartState(
+        state = StartState(
             log=self.log.name,
             sha256=hashlib.sha256(self.log.read_bytes()).hexdigest(),
             step=step,
@@ -151,6 +151,9 @@ class _StateOf:
             held=_held(recording, contacts, time, bodies) if closed else "",
             closed=closed,
         )
+        if state.damage:
+            raise _damaged(self.log, f"has a damaged state at {time:.3f} s: {state.damage}")
+        return state
 
     def _time(self, recording: Recording, step: str) -> float:
         """[s] When the step began; if it did not, when the step before it was done."""

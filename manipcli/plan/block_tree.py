@@ -68,13 +68,17 @@ def block_tree(count: int, blocks: Sequence[BlockSpec]) -> tuple[Item, ...]:
 
 
 def clipped(items: Sequence[Item], kept: range) -> tuple[Item, ...]:
-    """The items with only the steps of `kept`, without blocks that have none of them."""
+    """The items with only the steps of `kept`, without blocks that have none of them.
+
+    A block without its last step does not come to its `until`.
+    """
     found: list[Item] = []
     for item in items:
         if isinstance(item, int):
             found += [item] if item in kept else []
         elif any(k in kept for k in steps_of((item,))):
-            found.append(Group(item.index, item.spec, clipped(item.parts, kept), clipped(item.other, kept)))
+            spec = item.spec if item.spec.last - 1 in kept else item.spec.model_copy(update={"until": None})
+            found.append(Group(item.index, spec, clipped(item.parts, kept), clipped(item.other, kept)))
     return tuple(found)
 
 

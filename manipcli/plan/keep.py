@@ -60,10 +60,12 @@ class KeepMember:
         name: the key in task files.
         open: (spec, planner, state) -> the constraint; None where the spec has none, or where it says nothing in this
             state (nothing is held).
+        clause: (spec) -> the constraint in English; called only where the spec has it.
     """
 
     name: str
     open: Callable[[KeepSpec, Planner, PlanningState], Kept | None]
+    clause: Callable[[KeepSpec], str]
 
 
 def reserving(keeps: tuple[Kept, ...], start: Array, end: Array) -> tuple[Kept, ...]:

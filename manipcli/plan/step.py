@@ -45,6 +45,8 @@ class StepMember(Generic[S]):
         check: (spec, robot, scene) -> the names and values in the spec that do not fit this robot and scene.
         uncommanded: (spec, robot, claims) -> what these controllers cannot carry out; called only if `check` finds
             nothing.
+        clause: (spec, robot) -> the step in English, as an order without a capital and a full stop: `lift 'cup' by 8 to
+            20 cm`. `core/prose.py` has the parts.
         request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
@@ -58,6 +60,7 @@ class StepMember(Generic[S]):
     candidates: Callable[[S, Planner, PlanningState], Candidates]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
+    clause: Callable[[S, RobotModel], str]
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
     moves: bool = True

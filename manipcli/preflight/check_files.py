@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from manipcli.conditions.members import CONDITIONS
@@ -22,6 +23,7 @@ from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.source.tree import Plain
 from manipcli.task.lint import lint
 from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import Plan
 from manipcli.task.robot_file import read_robot
 from manipcli.task.task import Task
 from manipcli.task.task_names import task_names
@@ -37,6 +39,7 @@ def check_files(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
     on_progress: Callable[[str], None] = lambda _: None,
+    on_plan: Callable[[Path, Plan], None] = lambda *_: None,
 ) -> tuple[Diagnostic, ...]:
     """The findings of all files, without duplicates; a task is checked with its robot and controllers files.
 
@@ -46,6 +49,7 @@ def check_files(
         package_path: folders with packages.
         allow_outside: whether a file may be outside of these folders.
         on_progress: receives what the planner tries, see `plan_task`.
+        on_plan: receives the plan of each task, and its file.
     """
 
     def of_task(path: Path) -> Task:
@@ -55,7 +59,9 @@ def check_files(
 
     return tuple(
         dict.fromkeys(
-            finding for path in paths for finding in _findings(path, of_task, package_path, allow_outside, on_progress)
+            finding
+            for path in paths
+            for finding in _findings(path, of_task, package_path, allow_outside, on_progress, partial(on_plan, path))
         )
     )
 
@@ -66,6 +72,7 @@ def _findings(
     package_path: Sequence[Path],
     allow_outside: bool,
     on_progress: Callable[[str], None],
+    on_plan: Callable[[Plan], None],
 ) -> tuple[Diagnostic, ...]:
     try:
         if path.suffix.lower() in DESCRIPTIONS:
@@ -73,7 +80,8 @@ def _findings(
         kind = load.kind_of(path)
         if kind == "task":
             task = of_task(path)
-            return (*task.findings, *lint(task), *preflight_findings(task, margins=True, on_progress=on_progress))
+            preflight = preflight_findings(task, margins=True, on_progress=on_progress, on_plan=on_plan)
+            return (*task.findings, *lint(task), *preflight)
         if kind == "controllers":
             return load.load_controllers(path, model=controllers_spec()).findings
         file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)

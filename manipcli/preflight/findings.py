@@ -20,6 +20,7 @@ def preflight_findings(
     checks: Seam[Check] = PREFLIGHT_CHECKS,
     margins: bool = False,
     on_progress: Callable[[str], None] = lambda _: None,
+    on_plan: Callable[[Plan], None] = lambda _: None,
 ) -> tuple[Diagnostic, ...]:
     """Warnings about gains, efforts, grasps and timeouts, with a value that works, each at its place in its file.
 
@@ -32,6 +33,7 @@ def preflight_findings(
         checks: the registry.
         margins: add a note with the margin of each grasp.
         on_progress: see `plan_task`.
+        on_plan: receives the plan.
     """
     found: list[Diagnostic] = []
     if plan is None:
@@ -39,6 +41,8 @@ def preflight_findings(
             plan = plan_task(task, on_progress=on_progress)
         except NotPlannable as refusal:
             found += refusal.findings
+    if plan is not None:
+        on_plan(plan)
     subject = Subject(task, plan)
     physics = ENGINES[task.spec.simulation.engine].physics == "full"
     for check in checks:

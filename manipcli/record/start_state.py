@@ -10,9 +10,14 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import escape
 
 START_STATE: Final = "start_state.json"
 """The attachment of a run that begins with the state of another run."""
+LARGEST: Final = 1e6
+"""No position, velocity or reference of a run that was not damaged is larger [SI]."""
+UNIT: Final = 1e-6
+"""Largest difference of the length of a quaternion from 1; logs have 64-bit numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +87,32 @@ class StartState:
                 held=str(read["held"]),
                 closed=bool(read["closed"]),
             )
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"has a damaged {START_STATE}") from error
-        n, m = len(state.joints), len(state.bodies)
-        shapes = (state.position.shape, state.velocity.shape, state.reference.shape)
-        known = (state.position, state.velocity, state.poses.ravel(), state.twists.ravel(), [state.time])
-        finite = bool(np.isfinite(np.concatenate(known)).all())
-        if shapes != ((n,),) * 3 or len(state.poses) != m or len(state.twists) != m or not finite:
-            raise ValueError(f"has a damaged {START_STATE}")
+        if state.damage:
+            raise ValueError(f"has a damaged {START_STATE}: {state.damage}")
         return state
+
+    @property
+    def damage(self) -> str:
+        """Why no run can begin with it: sizes, or numbers that no run reaches; "" if one can."""
+        n, m = len(self.joints), len(self.bodies)
+        sizes: list[tuple[Array, tuple[int, ...]]] = [
+            (self.position, (n,)), (self.velocity, (n,)), (self.reference, (n,)),
+            (self.poses, (m, 7)), (self.twists, (m, 6)),
+        ]  # fmt: skip
+        if any(values.shape != size for values, size in sizes):
+            return "its lists have different lengths"
+        known = [values for values, _ in sizes if values is not self.reference]
+        if not (np.isfinite(self.time) and all(np.isfinite(values).all() for values in known)):
+            return "a number is missing or not finite"
+        if any((np.abs(values) > LARGEST).any() for values, _ in sizes):
+            return f"a number is above {LARGEST:g}"
+        if (np.abs(np.linalg.norm(self.poses[:, 3:], axis=1) - 1.0) > UNIT).any():
+            return "a quaternion is not of length 1"
+        if self.held and self.held not in self.bodies:
+            return f"it holds '{escape(self.held)}', which is not one of its bodies"
+        return ""
 
 
 def _plain(value: object) -> object:

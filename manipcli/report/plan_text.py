@@ -49,6 +49,13 @@ def render_text(task: str, plan: Plan, *, every: bool = False) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
+def render_durations(plan: Plan) -> str:
+    """The planned duration of each step, and of the whole plan."""
+    times = [sum(motion.duration for motion in step.plan.motions) for step in plan.steps]
+    rows = [(step.id, step.verb, f"{time:.2f} s") for step, time in zip(plan.steps, times, strict=True)]
+    return table(("step", "verb", "planned"), [*rows, ("", "", f"{sum(times):.2f} s")], right=("planned",))
+
+
 def render_refused(candidates: Sequence[RefusedCandidates], *, every: bool = False) -> str:
     """The refused candidates by stage, the commonest first; "" if there are none.
 

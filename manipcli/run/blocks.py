@@ -79,7 +79,7 @@ class BlockLoop:
             began = loop.time
             own = None if spec.timeout is None else began + spec.timeout
             end = self._attempt(group, min((one for one in (own, limit) if one is not None), default=None))
-            if end.outcome != "done" and own is not None and loop.over(own):
+            if own is not None and (loop.time > own if end.outcome == "done" else loop.over(own)):
                 end = MotionEnd("timeout", end.text or f"its limit of {readable(own - began, 's')} was reached")
             loop.block_event("block_ended", group.index, end.outcome, end.text)
             if end.outcome == "done":

@@ -263,7 +263,11 @@ def _message(
     if kind == "extra_forbidden":
         return f"unknown key '{dotted((path[-1],))}'", hints.unknown_key(path, dict(first.tags), model)
     if kind == "missing":
-        return f"the key '{path[-1]}' is missing", _described(_field(first, model), path)
+        then = child(node_at(root, path[:-1]), "then") if path[-2:] == ("on_fail", "retry") else None
+        hint = _described(_field(first, model), path)
+        if isinstance(then, ScalarNode):
+            hint = f"without a retry write `on_fail: {then.value}`"
+        return f"the key '{path[-1]}' is missing", hint
     if "message" in context:
         hint = str(context.get("hint", "")) or None
         return str(context["message"]), hint or (_described(_field(first, model), path) if kind == "unit" else None)
@@ -346,6 +350,8 @@ def _no_match(branches: Sequence[_Complaint], node: Node, kinds: Sequence[object
     alternatives = wanted[0] if len(wanted) == 1 else f"{', '.join(wanted[:-1])}, or {wanted[-1]}"
     given = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
     hint = hints.its_key(node, kinds) or next(filter(None, given), None)
+    if hint is None and any(branch.error["type"] == "bool_type" for branch in branches):
+        hint = hints.of_type("bool_type", node, kinds, item=False)
     return f"expected {alternatives}, not {shown(node)}", hint
 
 

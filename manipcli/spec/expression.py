@@ -122,6 +122,8 @@ class _Parser:
             if match is None or match.lastgroup is None:
                 rest = shorten(self.text[position:].strip(), width=20)
                 hint = "write `$name`, or arithmetic: 2 * $tilt + 5 deg; write `$$` for a plain dollar sign"
+                if rest.startswith(("==", "!=")):
+                    hint = "write `{equal: [A, B]}`, or `{not: {equal: [A, B]}}`"
                 raise ExpressionError(f"cannot compute '{shorten(self.text)}': unexpected '{rest}'", hint, uncut=True)
             tokens.append((match.lastgroup, match.group(match.lastgroup)))
             position = match.end()
@@ -236,7 +238,8 @@ class Scope:
         local: names whose values are given in `each:` or `with:`, not in the task's `params:`.
         lost: parameters without a value, already reported.
         below: names that are not computed yet, beginning with the current one.
-        used: names of the task's parameters that were used; shared with inner scopes, as the next three are.
+        used: names of the task's parameters that were used; shared with inner scopes, as the next four are.
+        elsewhere: names in `each:` and `with:` of any scope.
         findings: errors of expressions.
         refused: places of invalid values.
         unknown: places of values that stay unknown.
@@ -249,6 +252,7 @@ class Scope:
         self.lost: frozenset[str] = frozenset()
         self.below: list[str] = []
         self.used: set[str] = set()
+        self.elsewhere: set[str] = set()
         self.findings: list[Diagnostic] = []
         self.refused = set(refused)
         self.unknown: set[Place] = set()
@@ -270,7 +274,8 @@ class Scope:
         scope.local = frozenset(given) if isolated else self.local.union(given)
         scope.lost = frozenset(lost) if isolated else self.lost.difference(given).union(lost)
         scope.below = list(below)
-        scope.used, scope.findings = self.used, self.findings
+        scope.used, scope.findings, scope.elsewhere = self.used, self.findings, self.elsewhere
+        scope.elsewhere.update(given)
         scope.refused, scope.unknown = self.refused, self.unknown
         return scope
 
@@ -315,7 +320,7 @@ class Scope:
         for name in names:
             node = self.nodes[name]
             if not isinstance(node, ScalarNode):
-                raise ExpressionError(f"the parameter '${name}' is {shown(node)}", f"use ${name} alone, not in a sum")
+                raise ExpressionError(f"the parameter '${name}' is {shown(node)}", alone(name, node))
             values[name] = node.value
         return values
 
@@ -333,9 +338,17 @@ class Scope:
                 if self.isolated:
                     known_here = f"a sub-task knows only its own `params`: declare '{name}' there, give it under `with`"
                     hint = did_you_mean(name, known, kind="params") if nearest(name, known) else known_here
+                if name in self.elsewhere and not self.isolated:
+                    hint = f"`${name}` is known only inside its `repeat` or sub-task"
                 if name == INDEX:
                     hint = f"`${INDEX}` counts the rounds of a `repeat`: it is known only inside its `steps`"
                 raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
+
+
+def alone(name: str, node: Node) -> str:
+    """Hint for a list or a mapping within an expression."""
+    hint = f"use ${name} alone: it has no value that can be computed with"
+    return f"{hint}, and `.` does not select a key" if isinstance(node, MappingNode) else hint
 
 
 def names_used(node: Node) -> frozenset[str]:

@@ -46,6 +46,12 @@ def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> s
         if isinstance(path[k], str) and key in shape.keys_of(shape.at(model, path[:k], tags)):
             return f"put `{key}` next to `{path[k]}`, not inside it"
     known = shape.keys_of(shape.at(model, path[:-1], tags))
+    if len(path) == 1 and key == "include":
+        return "put `include: FILE` inside `scene`, `frames` or `steps`"
+    top = shape.keys_of([model]) if len(path) == 2 else {}
+    inside = [name for name in top if name != path[0] and key in shape.keys_of(shape.at(model, (name,), tags))]
+    if len(inside) == 1 and key not in top:
+        return f"put `{key}` inside `{inside[0]}`"
     inside = [name for name in known if key in shape.keys_of(shape.at(model, (*path[:-1], name), tags))]
     if 0 < len(inside) <= 3:
         return f"put `{key}` inside {' or '.join(f'`{name}`' for name in inside)}"

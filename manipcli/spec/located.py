@@ -38,6 +38,8 @@ UNCOMPUTED: Final = ("TASK203", "TASK211")
 MISNAMED: Final = "TASK23"
 TWICE: Final = "YAML106"
 """Code of a duplicate key: its second value is dropped, so `UNNAMED` errors in the same file are dropped, too."""
+UNKNOWN_NAME: Final = 230
+"""Number of names of bodies, frames, steps and poses that do not exist."""
 UNNAMED: Final = ("TASK225", "TASK227", "TASK230")
 
 
@@ -96,9 +98,19 @@ class Source:
         """A diagnostic at the value (with `key`: at the key) at `path`; the code is the file's area and `number`."""
         place = self.key_place(*path) if key else self.place(*path)
         if not key:
-            hint = with_origin(hint, node_at(self.root, path))
+            node = node_at(self.root, path)
+            parameter = self._parameter(path, node) if number == UNKNOWN_NAME else None
+            hint = parameter or with_origin(hint, node)
         where = f"{dotted(self.in_file(path))}: " if path else ""
         return Diagnostic(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
+
+    def _parameter(self, path: Loc, node: Node) -> str | None:
+        """Hint for an unknown name that is a parameter without its dollar sign."""
+        name = node.value if isinstance(node, ScalarNode) and node.written is None else None
+        scope = self.structure.scope
+        if path[:1] == ("steps",) and isinstance(path[1], int) and path[1] < len(self.structure.steps):
+            scope = self.structure.steps[path[1]].scope
+        return f"write `${name}`: '{name}' is a parameter" if scope is not None and name in scope.nodes else None
 
     def in_file(self, path: Loc) -> Loc:
         """A path in this tree as it is in the file."""

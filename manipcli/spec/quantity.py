@@ -39,7 +39,8 @@ class Unit:
         symbols = " or ".join(dimension.symbol or "1" for dimension in self.dimensions)
         last = fitting_units(self.dimensions[0])[1 if len(fitting_units(self.dimensions[0])) > 1 else 0]
         example = f"5 {last}" if self.dimensions[0].symbol else last
-        return f"{self.name}: a number in {symbols}, or a string such as '{example}'"
+        number = f": a number in {symbols}" if symbols != "1" else ""
+        return f"{self.name}{number}, or a string such as '{example}'"
 
     @property
     def pattern(self) -> str:

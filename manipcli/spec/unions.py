@@ -34,7 +34,7 @@ from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.spec.step import StepSpec
-from manipcli.spec.structure.words import WORDS
+from manipcli.spec.structure.words import WORDS, other_word
 from manipcli.spec.task import TaskSpec
 
 
@@ -286,6 +286,8 @@ def _check(
         if not found and others:
             more = WORDS if kind == "verb" else ()
             near = did_you_mean(others[0], (*names, *more, *common), kind=kinds, most=3)
+            if kind == "verb":
+                near = other_word(others[0]) or near
             if others[0] in below:
                 near = " or ".join(f"`{name}: {{{others[0]}: ...}}`" for name in reversed(names))
                 near = f"write {near}"

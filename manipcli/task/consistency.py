@@ -101,6 +101,7 @@ def not_there(
         ids if complete else None,
         in_order=not kept and complete,
         self_collision=spec.simulation.self_collision,
+        blocks=tuple(block.id for block in spec.blocks),
     )
     of_steps = [*_of_steps(spec, context, claims)]
     of_steps += _of_blocks(spec, context)

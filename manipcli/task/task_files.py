@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -25,7 +26,7 @@ def finder(task: Path, *, package_path: Sequence[Path] = (), allow_outside: bool
         package_path: more folders.
         allow_outside: permits files anywhere.
     """
-    real = task.resolve()
+    real = Path(os.path.realpath(task))
     above = real.parents[: LEVELS_ABOVE + 1]
     project = next((folder for folder in above if any((folder / mark).exists() for mark in MARKS)), None)
     folders = [] if project is None or is_shared(project) else [project]

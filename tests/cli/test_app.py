@@ -296,7 +296,9 @@ def _motion() -> SimpleNamespace:
     trajectory = JointTrajectory.of_arrays(
         ("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1))
     )
-    return SimpleNamespace(step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0)
+    return SimpleNamespace(
+        step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0, branch="", beside=False
+    )
 
 
 def test_plan_names_the_joint_that_limits_and_writes_every_point(
@@ -304,15 +306,23 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
-    pipeline.plan_task = lambda _, **__: SimpleNamespace(
+    plan = SimpleNamespace(
         motions=(_motion(),),
-        steps=(),
+        steps=(SimpleNamespace(id="move_1", verb="move", candidate="", dropped=(), beside=False),),
+        every=(),
+        branches={},
+        combinations=(),
+        branch="",
+        items=(),
+        duration=2.0,
         path_kinds=lambda: ("straight",),
         clearances=lambda: (NEAR,),
         margins=lambda: (margins,),
         grasps=tuple,
         stated_clearances=tuple,
     )
+    plan.stretches = (plan,)
+    pipeline.plan_task = lambda _, **__: plan
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
     assert "j1 velocity, 60 % of the time" in (out := capsys.readouterr().out)
@@ -332,7 +342,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple)
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple, stretches=())
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
     assert "' does not exist" in capsys.readouterr().err
 
@@ -408,7 +418,7 @@ def test_what_is_on_a_full_disk_is_named_and_no_bug(
 
 def test_a_file_on_a_full_disk_is_named(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
-    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple)
+    pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple, stretches=())
     assert main(["plan", "t.yaml", "--csv", "/dev/full"]) == 3
     assert capsys.readouterr().err == "error[INT001]: /dev/full: the disk is full (No space left on device)\n"
 

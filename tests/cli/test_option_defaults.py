@@ -122,3 +122,25 @@ def test_a_bad_default_is_told_with_its_place(
     (tmp_path / "manipcli.toml").write_text('[list]\nformat = "xml"\n')
     assert app.main(["list", "steps"]) == ExitCode.USAGE
     assert f"hint: it is a default: --format xml ({tmp_path / 'manipcli.toml'}:2)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "text", ['[check-urdf]\nallow-env = ["HOME"]\n', 'allow-env = ["HOME"]\n', "[run]\nforce = true\n"]
+)
+def test_a_file_that_comes_with_a_task_opens_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], text: str
+) -> None:
+    """Not even the environment of the person who checks somebody's description."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.urdf.xacro").write_text('<robot name="$(env HOME)"><link name="a"/></robot>')
+    (tmp_path / "manipcli.toml").write_text(text)
+    assert app.main(["check-urdf", "a.urdf.xacro"]) == ExitCode.USAGE
+    assert "cannot be set here: it lifts a protection" in capsys.readouterr().err
+
+
+def test_the_table_of_a_project_in_the_own_file(tmp_path: Path) -> None:
+    (tmp_path / "manipcli.toml").write_text("[tool.manipcli.walk]\nsteps = 3\n")
+    with pytest.raises(InvalidInput) as raised:
+        defaults_of("walk", COMMANDS, folder=tmp_path)
+    (found,) = raised.value.findings
+    assert found.hint == "in manipcli.toml write `[check]` instead of `[tool.manipcli.check]`"

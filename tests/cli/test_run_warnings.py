@@ -35,7 +35,7 @@ def folder(pendulum: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> Pa
     for name, to in (("good", "up"), ("far", "{hinge: 3}")):
         (folder / f"{name}.yaml").write_text(
             f"task: {name}\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\n"
-            f"simulation: {{settle: 0}}\nsteps: [{{move: {{to: {to}}}}}]\n"
+            f"simulation: {{settle: 0}}\nsaturation: false\nsteps: [{{move: {{to: {to}}}}}]\n"
         )
     monkeypatch.chdir(folder)
     return folder

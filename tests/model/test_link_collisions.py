@@ -22,6 +22,7 @@ TETRAHEDRON = CORNERS[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
 
 def built(folder: Path, lines: str, base: str) -> tuple[RobotModel, tuple[Diagnostic, ...]]:
     (folder / "vendor" / "pkg").mkdir(parents=True, exist_ok=True)
+    (folder / "vendor" / "pkg" / "package.xml").write_text("<package><name>arm_pkg</name></package>")
     (folder / "vendor" / "pkg" / "here.stl").write_bytes(binary_stl(TETRAHEDRON))
     (folder / "own").mkdir(exist_ok=True)
     (folder / "own" / "r.urdf").write_text(f'<robot name="r"><link name="base">{base}</link></robot>')

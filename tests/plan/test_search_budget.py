@@ -98,7 +98,7 @@ controllers: {ROOT}/controllers/panda.yaml
 scene:
   table: {{box: {{size: [0.6, 0.8, 0.2]}}, pose: {{xyz: [0.55, 0, 0.1]}}, fixed: true}}
   block: {{box: {{size: [4 cm, 4 cm, 10 cm]}}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}}
-  roof: {{box: {{size: [0.3, 0.3, 2 cm]}}, pose: {{xyz: [0.5, 0.25, 0.3]}}, fixed: true}}
+  roof: {{box: {{size: [0.3, 0.3, 2 cm]}}, pose: {{xyz: [0.5, 0.25, 0.325]}}, fixed: true}}
 steps:
   - pick: {{object: block}}
   - lift: {{object: block}}

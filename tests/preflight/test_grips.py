@@ -136,7 +136,7 @@ def test_a_hand_on_the_position_interface_is_told_that_no_force_is_its_own(pick:
     pick.write_text(re.sub("controllers: .*", "controllers: c.yaml", pick.read_text()))
     force, limit = "steps.0.pick.grasp.force", "robot.limits.panda_finger_joint1.effort"
     (found,) = preflight_findings(load_task(pick, overrides=[f"{force}=1 N"]))
-    assert (found.code, found.severity) == ("CTRL171", "warning")
+    assert (found.code, found.severity) == ("CTRL173", "warning")
     assert found.message == (
         "panda_finger_joint1: presses with 10 N (its effort limit), step 'pick_1' asks for 1 N: under position "
         "commands `force` is only the contact force at which it stops"

@@ -28,6 +28,7 @@ def test_refused_candidates_are_grouped_and_the_one_taken_is_named() -> None:
         path_kinds=tuple,
         margins=tuple,
         grasps=tuple,
+        stated_clearances=tuple,
     )
     text = render_text("t", plan)
     assert "pick_1 takes candidate 92: from the top" in text and "wait_1" not in text

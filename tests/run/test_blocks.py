@@ -170,6 +170,30 @@ def test_a_group_ends_at_its_timeout_and_waits_for_its_until(run: Run) -> None:
     assert missed.text.startswith("sequence 'g' timed out: `until` did not hold by t = 0.300 s; at the end it fails by")
 
 
+def test_a_group_whose_steps_may_fail_still_ends_at_its_timeout(run: Run) -> None:
+    """Its limit cuts the steps off; that they may fail does not excuse the group."""
+    steps = "  - id: group\n    sequence:\n" + 2 * (LATE % "9 s" + "        on_fail: continue\n")
+    late = run(steps + "    timeout: 0.4 s\n  - wait: 0.1 s\n")
+    assert late.verdict == "failed"
+    assert by_id(late)["group"].outcome == "timeout"
+    assert late.text.startswith("sequence 'group' timed out: its limit of 400 ms was reached")
+    assert run(steps + "    timeout: 0.4 s\n    on_fail: continue\n  - wait: 0.1 s\n").verdict == "passed"
+    assert run(steps + "    timeout: 9 s\n  - wait: 0.1 s\n").verdict == "passed"
+
+
+def test_a_run_that_ends_inside_a_group_does_not_wait_for_its_until(tmp_path: Path) -> None:
+    file = tmp_path / "small.yaml"
+    steps = "      - {id: a, move: {to: {pitch: 0.2}}}\n      - {id: b, move: {to: {pitch: 0.6}}}\n"
+    until = "    until: {not: {at_pose: {pose: up, within: 0.5}}}\n    timeout: 6 s\n"
+    file.write_text(f"{HEAD}steps:\n  - id: g\n    sequence:\n{steps}{until}")
+    for last, moved in (("g/a", 0.2), ("g/b", 0.6)):
+        verdict = pipeline.run_task(file, log=tmp_path / "small.mcap", force=True, until=last).verdict
+        assert verdict.verdict == "passed", verdict.text
+        assert verdict.simulated_time < 3.0
+        states = read_recording(tmp_path / "small.mcap").states
+        assert states.position[-1, 0] == pytest.approx(moved, abs=1e-3)
+
+
 def test_with_more_than_eight_combinations_the_rest_is_planned_during_the_run(run: Run, tmp_path: Path) -> None:
     one = "  - if: {at_pose: {pose: up, within: 0.3}}\n    then:\n      - move: {to: {pitch: 0.5}}\n"
     one += "    else:\n      - move: {to: {pitch: 0.1}}\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -177,6 +178,21 @@ def test_expectations_about_other_steps_are_not_evaluated(
     assert same_again(log)
 
 
+@pytest.mark.parametrize(("within", "found"), [(2.0, "not_evaluated"), (0.01, "failed")])
+def test_what_must_hold_throughout_several_steps_fails_in_those_that_were_run(
+    waves: Path, tmp_path: Path, within: float, found: str
+) -> None:
+    """The rest of the steps cannot mend it; where it holds so far, they may still break it."""
+    task = waves / f"throughout_{found}.yaml"
+    expect = f"expect:\n  - always: {{at_pose: {{pose: up, within: {within}}}}}\n    during: [up, down]\n"
+    task.write_text(TASK.partition("expect:")[0] + expect)
+    verdict = run_task(task, log=tmp_path / "part.mcap", until="up").verdict
+    (one,) = verdict.expectations
+    assert (one.outcome, one.excused) == (found, found == "not_evaluated")
+    assert verdict.verdict == ("failed" if found == "failed" else "passed")
+    assert judge_log(tmp_path / "part.mcap") == verdict
+
+
 def same_again(log: Path) -> bool:
     verification = verify_log(log)
     return verification.messages.same and not verification.entries
@@ -261,6 +277,32 @@ def test_a_damaged_state_is_refused(whole: tuple[Path, Verdict, Recording], plac
     for bad in (b"", b"{}", content[:-10], content.replace(b'"position": [', b'"position": [0.0,')):
         with pytest.raises(ValueError, match="damaged"):
             StartState.from_json(bad)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("position", 10**400, "damaged"),
+        ("time", 10**400, "damaged"),
+        ("position", float("nan"), "a number is missing or not finite"),
+        ("reference", float("inf"), "a number is above 1e\\+06"),
+        ("poses", 1e300, "a number is above 1e\\+06"),
+        ("poses", 0.0, "a quaternion is not of length 1"),
+        ("held", "nobody", "it holds 'nobody', which is not one of its bodies"),
+    ],
+)
+def test_a_state_that_no_run_reaches_is_refused(
+    placed: tuple[Path, Verdict], key: str, value: object, told: str
+) -> None:
+    """A log is from anybody: its numbers must not reach an engine, nor its names a table of bodies."""
+    content = json.loads(read_recording(placed[0]).attachments[START_STATE])
+    old = content[key]
+    if isinstance(old, list):
+        old[0] = [value] * 7 if isinstance(old[0], list) else value
+    else:
+        content[key] = value
+    with pytest.raises(ValueError, match=told):
+        StartState.from_json(json.dumps(content).encode())
 
 
 def test_a_log_whose_state_was_damaged_is_not_verified(waves: Path, rewrite_log: Any, tmp_path: Path) -> None:

@@ -66,7 +66,9 @@ def test_json_is_one_object_with_every_documented_name(pour_run: Any) -> None:
 
 
 def test_progress_goes_to_stderr_and_no_banner_anywhere(pour_run: Any) -> None:
-    lines = pour_run.ran.err.splitlines()
+    ids = ["pick_1", "lift_1", "pour_1", "place_1", "move_1", "wait_1"]
+    planned, lines = (pour_run.ran.err.splitlines()[part] for part in (slice(6), slice(6, None)))
+    assert planned == [f"planning step {k} of 6, '{one}'" for k, one in enumerate(ids, start=1)]
     assert [line.split(" (")[0] for line in lines] == [
         "[1/6] pick_1: done", "[2/6] lift_1: done", "[3/6] pour_1: done", "[4/6] place_1: done", "[5/6] move_1: done",
         "[6/6] wait_1: done",

@@ -286,3 +286,20 @@ def test_a_key_is_not_told_to_stand_next_to_a_number_of_a_list() -> None:
     assert hint is not None
     assert "next to" not in hint
     assert "below" in hint
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("planner: {effort: 4}", "put `effort` inside `plan`"),
+        ("saturation: off", "write false"),
+        ("frames: {f: {parnt: world}}", "did you mean 'parent'"),
+    ],
+)
+def test_a_key_of_another_block_and_a_word_for_false(line: str, hint: str) -> None:
+    with pytest.raises(InvalidInput) as error:
+        load_task_text(
+            f"task: t\nrobot: r.yaml\ncontrollers: c.yaml\n{line}\nsteps: [{{wait: 0}}]\n", "t", model=task_spec()
+        )
+    (finding,) = error.value.findings
+    assert finding.hint is not None and hint in finding.hint

@@ -17,7 +17,7 @@ from manipcli.spec.source.yaml import parse
 ROOT = Path(__file__).parents[2]
 POUR = ROOT / "tasks" / "pour.yaml"
 SOUND = sorted([*(ROOT / "tasks").glob("*.yaml"), *(ROOT / "examples").glob("*/task.yaml")])
-GONE = object()
+GONE = "<gone>"
 
 
 def read(path: Path) -> Any:

@@ -78,6 +78,7 @@ def test_bom_and_crlf_are_accepted() -> None:
         ("a: [1, 2\nb: 3", "YAML100", 2, 2, "a '[' is not closed, or a ',' is missing (it opens at line 1, column 4)"),
         ("a: {b: 1\n", "YAML100", 1, 4, "a '{' is not closed"),
         ("a: b: c", "YAML100", 1, 5, "unexpected ':'"),
+        ("- do: f\n    with: {a: 1}", "YAML100", 2, 9, "unexpected ':'"),
         ("a:\n  - 1\n b: 2", "YAML100", 3, 2, "does not fit the indentation"),
         ("a: @x", "YAML100", 1, 4, "'@' cannot begin a value"),
         (b"\xff\xfea\0:\0 \x001\0", "YAML101", 1, 1, "UTF-16"),
@@ -233,3 +234,14 @@ def test_a_reader_that_goes_on_stops_where_the_text_is_no_yaml(text: str) -> Non
     first, second = caught.value.findings
     assert (first.code, second.code[:4]) == ("YAML111", "YAML")
     assert not told
+
+
+@pytest.mark.parametrize(
+    ("text", "deeper"), [("- do: f\n    with: 1", True), ("- do: f\n  with: a: 1", False), ("a: b: c", False)]
+)
+def test_a_key_deeper_than_a_value_is_hinted_at(text: str, deeper: bool) -> None:
+    try:
+        found = parse(text, "f.yaml")[1]
+    except InvalidInput as invalid:
+        found = list(invalid.findings)
+    assert any("indent this line" in (each.hint or "") for each in found) == deeper

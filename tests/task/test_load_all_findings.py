@@ -461,3 +461,32 @@ def test_a_name_that_a_launch_file_completes_is_not_called_absent(tmp_path: Path
     whole = (ROOT / "controllers" / "arm7_hand3.yaml").read_text()
     text = whole.replace("[joint_1,", '["$(var prefix)joint_1",', 1).replace("type: gripper", "type: griper")
     assert {one[1] for one in of_controllers(tmp_path, text)} == {"CTRL217", "CTRL203"}
+
+
+def test_hints_on_names_know_parameters_parts_and_blocks(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+scene:
+  cup: {cup: {radius: 36 mm, height: 110 mm}, mass: 150 g, pose: {}}
+steps:
+  - id: r
+    repeat:
+      each: {thing: [cup]}
+      steps: [{pick: {object: thing, grasp: {posture: wrap}}}, {lift: {object: $thing}}, {wait: 1 s}]
+  - pick: {object: cup/rim, grasp: {posture: wrap}}
+expect:
+  - step_done: {step: r}
+  - at_rest: {object: cup}
+    during: r[1]
+""",
+    )
+    hints = (
+        "write `$thing`: 'thing' is a parameter",
+        "name the body, 'cup'; where the step has `part`, add `part: rim`",
+        "name a step in it: r[0]/pick_1, r[0]/lift_1, r[0]/wait_1",
+        "did you mean 'r[0]'?",
+    )
+    assert [(line, text[text.index(hint) :]) for (line, _, text), hint in zip(found, hints, strict=False)] == [
+        (10, hints[0]), (11, hints[1]), (13, hints[2]), (15, hints[3])
+    ]  # fmt: skip

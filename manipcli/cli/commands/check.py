@@ -9,7 +9,6 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed
-from manipcli.cli.progress import PlanningProgress
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 UNREADABLE: Final = {"USE101", "USE102", "USE103"}
@@ -29,6 +28,14 @@ def check(
         ),
     ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Fail on warnings, too.")] = False,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch",
+            help="Check after each change of a file, show the planned durations, and keep the schema that a task names "
+            "for editors current; until Ctrl-C.",
+        ),
+    ] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -44,9 +51,28 @@ def check(
     to compare joints and gains.
     """
     from manipcli import pipeline
+    from manipcli.cli.progress import PlanningProgress
     from manipcli.report import json, text
     from manipcli.report.inertials import render_table
 
+    if watch and collisions:
+        raise InvalidInput([Diagnostic("USE059", "--collisions and --watch exclude each other")])
+    if watch:
+        from manipcli.cli.watched_check import watch_files
+
+        try:
+            watch_files(
+                files,
+                overrides=tuple(overrides or ()),
+                seed=seed,
+                sample=sample,
+                package_path=tuple(package_path or ()),
+                allow_outside=allow_outside,
+                format_=format_,
+                strict=strict,
+            )
+        except KeyboardInterrupt:
+            return ExitCode.PASSED
     if collisions:
         return _self_collisions(files, format_, tuple(package_path or ()), allow_outside=allow_outside)
     with PlanningProgress() as progress:

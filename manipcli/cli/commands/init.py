@@ -74,6 +74,7 @@ def init(
             if value:
                 raise InvalidInput([Diagnostic("USE089", f"{word} has no effect: {NO_ROBOT}", hint="add --robot FILE")])
         write_files(folder, _common(folder) | _example() | _schemas() | _wheel(), force=force)
+        _name(folder, "tasks/pick_place.yaml", (), allow_outside=allow_outside)
         _print_notes(folder)
         console.talk(f"next: {enter(folder)}manipcli test")
         return ExitCode.PASSED
@@ -96,6 +97,7 @@ def init(
     own = {name: text.encode() for name, text in made.files.items()}
     common = _common(folder, robot="robot.yaml", task=made.task_file)
     write_files(folder, common | own | _schemas() | _wheel(), force=force)
+    _name(folder, made.task_file, tuple(package_path or ()), allow_outside=allow_outside)
     console.result("")
     for line in made.summary:
         console.result(line)
@@ -152,3 +154,10 @@ def _schemas() -> dict[str, bytes]:
     from manipcli.report.json import dumps
 
     return {path: f"{dumps(pipeline.schema(kind))}\n".encode() for path, kind in SCHEMAS.items()}
+
+
+def _name(folder: Path, task: str, package_path: tuple[Path, ...], *, allow_outside: bool) -> None:
+    """Adds the names of the task to the schema that it names."""
+    from manipcli import pipeline
+
+    pipeline.updated_schema(folder / task, folder=folder, package_path=package_path, allow_outside=allow_outside)

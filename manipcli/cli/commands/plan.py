@@ -11,7 +11,6 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import check_outputs
-from manipcli.cli.progress import PlanningProgress
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, NotPlannable
 
 if TYPE_CHECKING:
@@ -59,6 +58,7 @@ def plan(
     plan, shows the refused candidates by stage; with --why after a longer search, and all of them.
     """
     from manipcli import pipeline
+    from manipcli.cli.progress import PlanningProgress
 
     if folder is not None and export is None:
         raise InvalidInput([Diagnostic("USE084", "--to has no effect without --export")])

@@ -134,7 +134,7 @@ def run(
         written = report.log
         if to_stdout:
             report = replace(report, log="stdout" if report.log is not None else None)
-            console.talk(text.render_run(report, verbose=verbose))
+            console.error(text.render_run(report, verbose=verbose))
         else:
             console.result(json.render_run(report) if format_ == "json" else text.render_run(report, verbose=verbose))
         if outputs.wanted and written is not None:

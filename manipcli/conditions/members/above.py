@@ -12,7 +12,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import rotate_inverse
+from manipcli.core.prose import amount, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
 from manipcli.spec.names import BodyName
@@ -82,6 +84,11 @@ def check(spec: AboveSpec, context: CheckContext) -> tuple[Problem, ...]:
     return problems
 
 
+def clause(spec: AboveSpec, robot: RobotModel) -> str:
+    gap = f" by at least {amount(spec.by, 'm')}" if spec.by else ""
+    return f"{named(spec.object)} is above {named(spec.of)}{gap}, its centre over it"
+
+
 ABOVE = Condition(
     name="above",
     spec=AboveSpec,
@@ -89,5 +96,6 @@ ABOVE = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    clause=clause,
     example="above: {object: cup, of: tray, by: 5 cm}",
 )

@@ -12,6 +12,7 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import wrapped
+from manipcli.core.prose import amount, named
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.description.elements import Joint
@@ -113,6 +114,12 @@ def check(spec: AtPoseSpec, context: CheckContext) -> tuple[Problem, ...]:
     return tuple(problems)
 
 
+def clause(spec: AtPoseSpec, robot: RobotModel) -> str:
+    who = "the robot" if spec.group is None else f"the group {named(spec.group)}"
+    slide = "" if spec.slide is None else f", and {amount(spec.slide, 'm')} of sliding joints"
+    return f"{who} is in the pose {named(spec.pose)}, each joint within {amount(spec.within, 'rad')}{slide}"
+
+
 AT_POSE = Condition(
     name="at_pose",
     spec=AtPoseSpec,
@@ -120,5 +127,6 @@ AT_POSE = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: None,
+    clause=clause,
     example="at_pose: {pose: home, within: 2 deg}",
 )

@@ -11,7 +11,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import cross, rotate
+from manipcli.core.prose import amount, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
 from manipcli.spec.names import BodyName
@@ -49,6 +51,10 @@ def check(spec: AtRestSpec, context: CheckContext) -> tuple[Problem, ...]:
     return unknown_body(context.scene, spec.object, ("object",))
 
 
+def clause(spec: AtRestSpec, robot: RobotModel) -> str:
+    return f"{named(spec.object)} is at rest, slower than {amount(spec.below, 'm/s')}"
+
+
 AT_REST = Condition(
     name="at_rest",
     spec=AtRestSpec,
@@ -56,5 +62,6 @@ AT_REST = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
+    clause=clause,
     example="at_rest: {object: cup}",
 )

@@ -13,7 +13,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair
+from manipcli.core.prose import amount, listing, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.spec.base import Model, or_short, problem
 from manipcli.spec.names import MARK, PartName
@@ -107,6 +109,23 @@ def check(spec: NoCollisionSpec | CollisionSpec, context: CheckContext) -> tuple
     return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(context, pair, ("pairs", k)))
 
 
+def _pairs(spec: PairsSpec, touches: str) -> str:
+    """`the robot touches 'desk' or 'tray', or 'cup' touches 'desk'`: pairs grouped by their first part."""
+    others: dict[str, list[str]] = {}
+    for a, b in spec.pairs:
+        others.setdefault(named(a), []).append("itself" if a == b else named(b))
+    return "; or ".join(f"{a} {touches} {listing(b, 'or')}" for a, b in others.items())
+
+
+def no_collision_clause(spec: NoCollisionSpec, robot: RobotModel) -> str:
+    pairs = _pairs(spec, "does not touch").replace("; or ", "; ")
+    return f"{pairs}, with more than {amount(spec.below, 'N')}" if spec.below else pairs
+
+
+def collision_clause(spec: CollisionSpec, robot: RobotModel) -> str:
+    return f"{_pairs(spec, 'touches')} with {amount(spec.above, 'N')} or more"
+
+
 NO_COLLISION = Condition(
     name="no_collision",
     spec=NoCollisionSpec,
@@ -115,6 +134,7 @@ NO_COLLISION = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world),
     scope="always",
+    clause=no_collision_clause,
     example="no_collision: {pairs: [[robot, desk], [robot, tray]]}",
     stateless=True,
 )
@@ -125,6 +145,7 @@ COLLISION = Condition(
     open=monitor_collision,
     check=check,
     absent=lambda spec, world: untouchable(world),
+    clause=collision_clause,
     example="collision: [robot, desk]",
     stateless=True,
 )

@@ -13,7 +13,9 @@ from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair, is_part, unknown_part
 from manipcli.core.geometry import Array
+from manipcli.core.prose import amount, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.spec.base import Model, problem
 from manipcli.spec.names import PartName
@@ -140,6 +142,19 @@ def check(spec: ContactForceSpec, context: CheckContext) -> tuple[Problem, ...]:
     return unknown_part(context, spec.of or "", ("of",))
 
 
+def clause(spec: ContactForceSpec, robot: RobotModel) -> str:
+    between = f"on {named(spec.of)}" if spec.of is not None else ""
+    if spec.pair is not None:
+        between = f"between {named(spec.pair[0])} and {named(spec.pair[1])}"
+    limits = [
+        f"{word} {amount(limit, 'N')}"
+        for word, limit in (("above", spec.above), ("below", spec.below))
+        if limit is not None
+    ]
+    mean = "" if spec.mean_over is None else f", averaged over {amount(spec.mean_over, 's')}"
+    return f"the contact force {between} is {' and '.join(limits)}{mean}"
+
+
 CONTACT_FORCE = Condition(
     name="contact_force",
     spec=ContactForceSpec,
@@ -148,6 +163,7 @@ CONTACT_FORCE = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world),
     scope="always",
+    clause=clause,
     example="contact_force: {pair: [robot, cup], below: 20 N}",
     stateless=True,
 )

@@ -10,6 +10,8 @@ from pydantic import Field
 from manipcli.conditions.condition import Condition, Monitor, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
+from manipcli.core.prose import amount
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Time
 
@@ -47,6 +49,10 @@ def monitor(spec: TimeTakenSpec, world: World) -> Monitor:
     return look
 
 
+def clause(spec: TimeTakenSpec, robot: RobotModel) -> str:
+    return f"less than {amount(spec.below, 's')} of simulated time have passed"
+
+
 DURATION = Condition(
     name="duration",
     spec=TimeTakenSpec,
@@ -54,5 +60,6 @@ DURATION = Condition(
     open=monitor,
     check=lambda spec, context: (),
     absent=lambda spec, world: None,
+    clause=clause,
     example="duration: {below: 60 s}",
 )

@@ -11,7 +11,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
+from manipcli.core.prose import amount, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import GroupName
 from manipcli.spec.quantity import Energy
@@ -66,6 +68,11 @@ def check(spec: EnergySpec, context: CheckContext) -> tuple[Problem, ...]:
     return unknown_group(context.robot, spec.group, ("group",))
 
 
+def clause(spec: EnergySpec, robot: RobotModel) -> str:
+    who = "the joints" if spec.group is None else f"the joints of group {named(spec.group)}"
+    return f"{who} have done less than {amount(spec.below, 'J')} of work"
+
+
 ENERGY = Condition(
     name="energy",
     spec=EnergySpec,
@@ -73,5 +80,6 @@ ENERGY = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: effortless(world),
+    clause=clause,
     example="energy: {below: 50 J}",
 )

@@ -18,8 +18,10 @@ from manipcli.conditions.condition import (
 )
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
+from manipcli.core.prose import amount, named
 from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import MovableName
 from manipcli.spec.quantity import Force
@@ -57,6 +59,10 @@ def check(spec: GraspedSpec, context: CheckContext) -> tuple[Problem, ...]:
     return unknown_body(context.scene, spec.object, ("object",), movable=True) + unpinched(context, "grasped")
 
 
+def clause(spec: GraspedSpec, robot: RobotModel) -> str:
+    return f"at least two links press on {named(spec.object)} with {amount(spec.above, 'N')} or more each"
+
+
 GRASPED = Condition(
     name="grasped",
     spec=GraspedSpec,
@@ -64,6 +70,7 @@ GRASPED = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: untouchable(world),
+    clause=clause,
     example="grasped: {object: cup}",
     stateless=True,
 )

@@ -12,8 +12,10 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotate_inverse
+from manipcli.core.prose import named
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState, body_pose
 from manipcli.scene.scene import Interior, Scene
 from manipcli.shapes.primitives import Box, Cylinder
@@ -120,6 +122,10 @@ def check(spec: Spec, context: CheckContext) -> tuple[Problem, ...]:
     return tuple(problems)
 
 
+def clause(spec: InsideSpec | OutsideSpec, robot: RobotModel) -> str:
+    return f"{named(spec.object)} is {'inside' if isinstance(spec, InsideSpec) else 'outside'} {named(spec.of)}"
+
+
 INSIDE = Condition(
     name="inside",
     spec=InsideSpec,
@@ -127,6 +133,7 @@ INSIDE = Condition(
     open=partial(monitor, sign=1.0),
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    clause=clause,
     example="inside: {object: ball, of: tray}",
 )
 OUTSIDE = Condition(
@@ -136,5 +143,6 @@ OUTSIDE = Condition(
     open=partial(monitor, sign=-1.0),
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    clause=clause,
     example="outside: {object: ball, of: cup}",
 )

@@ -11,6 +11,7 @@ from pydantic import Field
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World, effortless, unknown_group
 from manipcli.conditions.robustness import Measured, Robustness
 from manipcli.conditions.state_window import StateWindow
+from manipcli.core.prose import listing, named, share
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
@@ -141,6 +142,12 @@ def absent(spec: LimitsSpec, world: World) -> str | None:
     return f"{reason}; use `of: [{', '.join(others)}]`" if others else reason
 
 
+def clause(spec: LimitsSpec, robot: RobotModel) -> str:
+    who = "all joints" if spec.group is None else f"the joints of group {named(spec.group)}"
+    spare = f" with {share(spec.spare)} to spare" if spec.spare else ""
+    return f"{who} stay within their limits of {listing(spec.of)}{spare}"
+
+
 LIMITS = Condition(
     name="limits",
     spec=LimitsSpec,
@@ -149,5 +156,6 @@ LIMITS = Condition(
     check=check,
     absent=absent,
     scope="always",
+    clause=clause,
     example="limits: {group: arm, of: [velocity, effort], spare: 10 %}",
 )

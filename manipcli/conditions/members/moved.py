@@ -13,7 +13,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotation_between
+from manipcli.core.prose import amount, listing, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model, problem
 from manipcli.spec.names import MovableName
 from manipcli.spec.quantity import AngleTolerance, Length
@@ -114,6 +116,17 @@ def check(spec: MovedSpec | UnmovedSpec, context: CheckContext) -> tuple[Problem
     return unknown_body(context.scene, spec.object, ("object",), movable=True)
 
 
+def moved_clause(spec: MovedSpec, robot: RobotModel) -> str:
+    by = [] if spec.by is None else [f"moved by at least {amount(spec.by, 'm')}"]
+    by += [] if spec.rotation is None else [f"rotated by at least {amount(spec.rotation, 'rad')}"]
+    return f"{named(spec.object)} has {listing(by)} from its start"
+
+
+def unmoved_clause(spec: UnmovedSpec, robot: RobotModel) -> str:
+    turned = "" if spec.rotation is None else f", and rotated by at most {amount(spec.rotation, 'rad')}"
+    return f"{named(spec.object)} has moved by at most {amount(spec.within, 'm')} from its start{turned}"
+
+
 MOVED = Condition(
     name="moved",
     spec=MovedSpec,
@@ -121,6 +134,7 @@ MOVED = Condition(
     open=monitor_moved,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
+    clause=moved_clause,
     example="moved: {object: block, by: 5 cm}",
 )
 UNMOVED = Condition(
@@ -131,5 +145,6 @@ UNMOVED = Condition(
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
     scope="always",
+    clause=unmoved_clause,
     example="unmoved: {object: vase, within: 2 mm, rotation: 1 deg}",
 )

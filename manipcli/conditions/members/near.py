@@ -13,8 +13,10 @@ from manipcli.conditions.frames import WORDS, carrier, frame_pose, unknown_frame
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotate
+from manipcli.core.prose import amount, named, point
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
@@ -102,6 +104,14 @@ def bodies(spec: NearSpec, scene: Scene) -> tuple[str, ...]:
     return tuple(carrier(scene, name) for name in (spec.object, target) if name != START)
 
 
+def clause(spec: NearSpec, robot: RobotModel) -> str:
+    to = f"the point {point(spec.to)}" if isinstance(spec.to, tuple) else f"the origin of {named(spec.to)}"
+    if spec.to == "start":
+        to = "where it was at the start"
+    frame = "" if spec.frame in (None, "world") else f" in the frame of {named(str(spec.frame))}"
+    return f"the origin of {named(spec.object)} is within {amount(spec.within, 'm')} of {to}{frame}"
+
+
 NEAR = Condition(
     name="near",
     spec=NearSpec,
@@ -109,5 +119,6 @@ NEAR = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, bodies(spec, world.scene)),
+    clause=clause,
     example="near: {object: cup, to: start, within: 2 cm}",
 )

@@ -11,7 +11,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between
+from manipcli.core.prose import named, share
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import BodyName, MovableName
 from manipcli.spec.quantity import Share
@@ -60,6 +62,10 @@ def check(spec: RestsOnSpec, context: CheckContext) -> tuple[Problem, ...]:
     return problems
 
 
+def clause(spec: RestsOnSpec, robot: RobotModel) -> str:
+    return f"{named(spec.object)} rests on {named(spec.of)} with at least {share(spec.share)} of its weight"
+
+
 RESTS_ON = Condition(
     name="rests_on",
     spec=RestsOnSpec,
@@ -67,5 +73,6 @@ RESTS_ON = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: untouchable(world),
+    clause=clause,
     example="rests_on: {object: cup, of: desk}",
 )

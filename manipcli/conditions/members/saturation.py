@@ -12,6 +12,7 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow, StepTime
 from manipcli.core.geometry import Array
+from manipcli.core.prose import listing, named, share
 from manipcli.core.text import did_you_mean
 from manipcli.model.motor_limits import EffortLimits
 from manipcli.model.robot import RobotModel
@@ -120,6 +121,13 @@ def check(spec: SaturationSpec, context: CheckContext) -> tuple[Problem, ...]:
     return found
 
 
+def clause(spec: SaturationSpec, robot: RobotModel) -> str:
+    who = "each joint with an effort limit" if spec.group is None else f"each joint of group {named(spec.group)}"
+    if spec.joints is not None:
+        who = f"each of the joints {listing([named(name) for name in spec.joints])}"
+    return f"{who} is at its effort limit for less than {share(spec.below)} of a step"
+
+
 SATURATION = Condition(
     name="saturation",
     spec=SaturationSpec,
@@ -128,6 +136,7 @@ SATURATION = Condition(
     check=check,
     absent=lambda spec, world: effortless(world),
     scope="always",
+    clause=clause,
     example="saturation: {group: arm, below: 20 %}",
     live=False,
 )

@@ -24,6 +24,7 @@ from manipcli.conditions.condition import (
 from manipcli.conditions.robustness import Mask, Robustness, least, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, matrix_from_quat
+from manipcli.core.prose import amount, named
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pinch_force
@@ -152,6 +153,13 @@ def check(spec: SlipSpec, context: CheckContext) -> tuple[Problem, ...]:
     return problems
 
 
+def clause(spec: SlipSpec, robot: RobotModel) -> str:
+    turned = "" if spec.rotation is None else f" and rotated by at most {amount(spec.rotation, 'rad')}"
+    return (
+        f"since its grasp, {named(spec.object)} has slipped in the hand by at most {amount(spec.within, 'm')}{turned}"
+    )
+
+
 SLIP = Condition(
     name="slip",
     spec=SlipSpec,
@@ -160,5 +168,6 @@ SLIP = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world) or unmoving(world, (spec.object,)),
     scope="always",
+    clause=clause,
     example="slip: {object: cup, within: 5 mm, rotation: 5 deg}",
 )

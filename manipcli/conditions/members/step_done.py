@@ -8,7 +8,9 @@ from pydantic import Field
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import ROUNDING, StateWindow
-from manipcli.core.text import did_you_mean
+from manipcli.core.prose import named
+from manipcli.core.text import did_you_mean, listed
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import StepName
 
@@ -50,7 +52,14 @@ def check(spec: StepDoneSpec, context: CheckContext) -> tuple[Problem, ...]:
     """An unknown step."""
     if context.steps is None or spec.step in context.steps:
         return ()
+    if spec.step in context.blocks:
+        inside = [step for step in context.steps if step.startswith((f"{spec.step}/", f"{spec.step}["))]
+        return (Problem(("step",), f"'{spec.step}' is a block, not a step", f"name a step in it: {listed(inside)}"),)
     return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, context.steps)),)
+
+
+def clause(spec: StepDoneSpec, robot: RobotModel) -> str:
+    return f"step {named(spec.step)} is done"
 
 
 STEP_DONE = Condition(
@@ -60,6 +69,7 @@ STEP_DONE = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: None if spec.step in world.steps else f"the recording has no step '{spec.step}'",
+    clause=clause,
     example="step_done: {step: lift_1}",
     stateless=True,
 )

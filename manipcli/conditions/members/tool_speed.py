@@ -11,6 +11,7 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Transform
+from manipcli.core.prose import amount, named
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
@@ -64,6 +65,11 @@ def check(spec: ToolSpeedSpec, context: CheckContext) -> tuple[Problem, ...]:
     return ()
 
 
+def clause(spec: ToolSpeedSpec, robot: RobotModel) -> str:
+    who = "the tool" if spec.link is None else f"link {named(spec.link)}"
+    return f"{who} moves slower than {amount(spec.below, 'm/s')}"
+
+
 TOOL_SPEED = Condition(
     name="tool_speed",
     spec=ToolSpeedSpec,
@@ -72,5 +78,6 @@ TOOL_SPEED = Condition(
     check=check,
     absent=lambda spec, world: None,
     scope="always",
+    clause=clause,
     example="tool_speed: {below: 1.5 m/s}",
 )

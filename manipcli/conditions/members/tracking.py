@@ -9,7 +9,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Measured, Robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, wrapped
+from manipcli.core.prose import amount, listing, named
 from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.names import GroupName
 from manipcli.spec.quantity import JointTolerance
@@ -87,6 +89,12 @@ def absent(spec: TrackingSpec, world: World) -> str | None:
     return None
 
 
+def clause(spec: TrackingSpec, robot: RobotModel) -> str:
+    units = sorted({robot.joint(name).unit for name in robot.group(spec.group).joints}, reverse=True)
+    within = listing([amount(spec.within, unit) for unit in units], "or")
+    return f"each joint of group {named(spec.group)} is within {within} of its controller's reference"
+
+
 TRACKING = Condition(
     name="tracking",
     spec=TrackingSpec,
@@ -95,5 +103,6 @@ TRACKING = Condition(
     check=check,
     absent=absent,
     scope="always",
+    clause=clause,
     example="tracking: {group: arm, within: 0.05 rad}",
 )

@@ -11,7 +11,9 @@ from manipcli.conditions.condition import CheckContext, Condition, Monitor, Prob
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import rotate
+from manipcli.core.prose import amount, named
 from manipcli.core.text import distinguished
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
 from manipcli.spec.names import BodyName
@@ -48,6 +50,10 @@ def check(spec: UprightSpec, context: CheckContext) -> tuple[Problem, ...]:
     return unknown_body(context.scene, spec.object, ("object",))
 
 
+def clause(spec: UprightSpec, robot: RobotModel) -> str:
+    return f"{named(spec.object)} is upright within {amount(spec.within, 'rad')}"
+
+
 UPRIGHT = Condition(
     name="upright",
     spec=UprightSpec,
@@ -55,5 +61,6 @@ UPRIGHT = Condition(
     open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
+    clause=clause,
     example="upright: {object: cup, within: 5 deg}",
 )

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.prose import amount, named
 from manipcli.core.units import readable
 from manipcli.plan.held_frame import held_points, points_of
 from manipcli.plan.keep import NEAR, RESERVE, KeepMember, Kept
@@ -40,4 +41,8 @@ def _top(body: Body, planner: Planner, state: PlanningState) -> float:
     return float(max(planner.body_pose(state, body.name).apply(corner)[2] for corner in corners))
 
 
-MEMBER = KeepMember("above", opened)
+def clause(spec: KeepSpec) -> str:
+    return f"the held object (else the tool) is at least {amount(spec.by or 0.0, 'm')} above {named(str(spec.above))}"
+
+
+MEMBER = KeepMember("above", opened, clause)

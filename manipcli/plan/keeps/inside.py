@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.prose import named, point
 from manipcli.core.units import readable
 from manipcli.plan.held_frame import held_points, points_of
 from manipcli.plan.keep import RESERVE, KeepMember, Kept
@@ -36,4 +37,11 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
     return Kept("inside", lambda q: room(q).min(axis=1), text, reserve=RESERVE)
 
 
-MEMBER = KeepMember("inside", opened)
+def clause(spec: KeepSpec) -> str:
+    assert spec.inside is not None
+    box, frame = spec.inside.box, spec.inside.frame
+    where = "" if frame is None else f" in the frame of {named(frame)}"
+    return f"the held object (else the tool) is in a box of {point(box.size)} around {point(box.centre)}{where}"
+
+
+MEMBER = KeepMember("inside", opened, clause)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.prose import amount
 from manipcli.plan.held_frame import tilts
 from manipcli.plan.keep import POURING, KeepMember, Kept
 from manipcli.plan.motion import PlanningState
@@ -45,4 +46,8 @@ def opened(spec: KeepSpec, planner: Planner, state: PlanningState) -> Kept | Non
     )
 
 
-MEMBER = KeepMember("slosh", opened)
+def clause(spec: KeepSpec) -> str:
+    return f"gravity and acceleration together act within {amount(spec.slosh or 0.0, 'rad')} of the held object's axis"
+
+
+MEMBER = KeepMember("slosh", opened, clause)

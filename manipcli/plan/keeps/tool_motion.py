@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from manipcli.core.geometry import Transform
+from manipcli.core.prose import amount
 from manipcli.plan.keep import KeepMember, Kept
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
@@ -29,5 +30,13 @@ def _tool(planner: Planner) -> tuple[str, Transform]:
     return link, Transform.identity() if tool is None else tool.X_LT
 
 
-SPEED = KeepMember("tool_speed", _speed)
-ACCELERATION = KeepMember("tool_acceleration", _acceleration)
+def _speed_clause(spec: KeepSpec) -> str:
+    return f"the tool moves at {amount(spec.tool_speed or 0.0, 'm/s')} or slower"
+
+
+def _acceleration_clause(spec: KeepSpec) -> str:
+    return f"the tool accelerates with {amount(spec.tool_acceleration or 0.0, 'm/s^2')} or less"
+
+
+SPEED = KeepMember("tool_speed", _speed, _speed_clause)
+ACCELERATION = KeepMember("tool_acceleration", _acceleration, _acceleration_clause)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from manipcli.core.geometry import Array
+from manipcli.core.prose import amount
 from manipcli.plan.held_frame import tilts
 from manipcli.plan.keep import POURING, KeepMember, Kept
 from manipcli.plan.motion import PlanningState
@@ -49,4 +50,8 @@ def _within(limit: float, planner: Planner, state: PlanningState, *, derived: bo
     )
 
 
-MEMBER = KeepMember("upright", opened)
+def clause(spec: KeepSpec) -> str:
+    return f"the held object is upright within {amount(spec.upright or 0.0, 'rad')}"
+
+
+MEMBER = KeepMember("upright", opened, clause)

@@ -18,9 +18,11 @@ from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc, NotPlannable
-from manipcli.core.text import did_you_mean
+from manipcli.core.prose import amount
+from manipcli.core.text import did_you_mean, number_of
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unfollowed
+from manipcli.plan.clauses import joint_values
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import GoalTolerances, JointTolerance, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -183,11 +185,19 @@ def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Pr
     return unfollowed(claims, names, (*at, "joint_names"))
 
 
+def clause(spec: FollowSpec, robot: RobotModel) -> str:
+    names, points, _ = spec.message
+    timed = "as fast as the limits allow" if spec.retime else f"in {amount(points[-1].seconds, 's')}"
+    end = joint_values(robot, names, points[-1].positions)
+    return f"follow a trajectory of {number_of(len(points), 'point')} {timed}, until {end}"
+
+
 MEMBER = StepMember(
     name="follow",
     spec=FollowSpec,
     candidates=single(plan),
     check=check,
     uncommanded=uncommanded,
+    clause=clause,
     part=lambda *_: "arm",
 )

@@ -10,6 +10,7 @@ from typing import Literal
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem, unknown_body
+from manipcli.core.prose import amount, named
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.motion import PlanningState, StepPlan
@@ -71,12 +72,22 @@ def uncommanded(spec: GraspSpec, robot: RobotModel, claims: Claims) -> tuple[Pro
     return tool + unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
+def clause(spec: GraspSpec, robot: RobotModel) -> str:
+    what = "" if spec.object is None else f" around {named(spec.object)}"
+    until = ", or until it reaches that pose" if spec.until == "posture" else ""
+    return (
+        f"close the hand{what} towards its pose {named(spec.posture)} until each finger presses with "
+        f"{amount(spec.force, 'N')}{until}"
+    )
+
+
 MEMBER = StepMember(
     name="grasp",
     spec=GraspSpec,
     candidates=single(plan),
     check=check,
     uncommanded=uncommanded,
+    clause=clause,
     moves=False,
     part=lambda spec, *_: "hand" if spec.object is None else "both",
 )

@@ -13,10 +13,12 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
+from manipcli.core.prose import between, named
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
+from manipcli.plan.clauses import at_share
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -73,4 +75,10 @@ def uncommanded(spec: LiftSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("object",))
 
 
-MEMBER = StepMember(name="lift", spec=LiftSpec, candidates=candidates, check=check, uncommanded=uncommanded)
+def clause(spec: LiftSpec, robot: RobotModel) -> str:
+    return f"lift {named(spec.object)} straight up by {between(spec.by, 'm')}{at_share(spec.velocity_scaling, 0.5)}"
+
+
+MEMBER = StepMember(
+    name="lift", spec=LiftSpec, candidates=candidates, check=check, uncommanded=uncommanded, clause=clause
+)

@@ -25,9 +25,11 @@ from pydantic import Field, field_validator, model_validator
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.conditions.frames import unknown_frame
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.prose import amount, listing, named, point
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
+from manipcli.plan.clauses import at_share, joint_values
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -289,12 +291,51 @@ def part(spec: MoveSpec, robot: RobotModel, hand: Sequence[str]) -> Part:
     return "arm" if not any(inside) else "hand" if all(inside) else "both"
 
 
+def clause(spec: MoveSpec, robot: RobotModel) -> str:
+    touch = f"; the hand may touch {listing([named(body) for body in spec.touch])}" if spec.touch else ""
+    return f"move {_destination(spec, robot)}{_along(spec)}{at_share(spec.velocity_scaling, 1.0)}{touch}"
+
+
+def _destination(spec: MoveSpec, robot: RobotModel) -> str:
+    if isinstance(spec.to, str):
+        return f"to the pose {named(spec.to)}"
+    if spec.to is not None:
+        return f"the joints so that {joint_values(robot, list(spec.to), list(spec.to.values()))}"
+    frame = "" if spec.frame == "world" else f" in the frame of {named(spec.frame)}"
+    within = "" if spec.tolerance is None else f", within {amount(spec.tolerance.distance, 'm')}"
+    if spec.pose is None:
+        pointing = "" if spec.pointing is None else f", its z axis along {point(spec.pointing, '')}"
+        return f"the tool to the point {point(spec.point or ())}{frame}{pointing}{within}"
+    turned = ""
+    if spec.pose.rpy is not None:
+        turned = f" with roll, pitch, yaw {point(spec.pose.rpy, 'rad')}"
+    elif spec.pose.quat_xyzw is not None:
+        turned = f" with the quaternion {point(spec.pose.quat_xyzw, '')} (x, y, z, w)"
+    if spec.tolerance is not None:
+        within += f" and {amount(spec.tolerance.rotation, 'rad')}"
+        about = spec.tolerance.about
+        if about is not None:
+            axis = f"its {about.axis} axis" if isinstance(about.axis, str) else f"the axis {point(about.axis, '')}"
+            within += f", rotated about {axis} by at most {amount(about.within, 'rad')}"
+    return f"the tool to {point(spec.pose.xyz)}{frame}{turned}{within}"
+
+
+def _along(spec: MoveSpec) -> str:
+    if isinstance(spec.path, ToolPathSpec):
+        if spec.path.arc is not None:
+            return f", on an arc through {point(spec.path.arc.via)}"
+        corners = [f"{point(via.xyz)} (rounded from {amount(via.radius, 'm')} before it)" for via in spec.path.via]
+        return f", past {listing(corners)} without stopping"
+    return {"linear": " on a straight line", "joint": " on a straight line in joint space"}.get(spec.path, "")
+
+
 MEMBER = StepMember(
     name="move",
     spec=MoveSpec,
     candidates=candidates,
     check=check,
     uncommanded=uncommanded,
+    clause=clause,
     guarded=lambda spec: spec.guarded,
     part=part,
 )

@@ -20,10 +20,12 @@ from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.conditions.frames import fixed_frame, unknown_part
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
+from manipcli.core.prose import amount, between, named
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates, first
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.clauses import approached, at_share
 from manipcli.plan.face_frames import clear_of, face_frames
 from manipcli.plan.grasp_frames import Direction, GraspFrame, GraspFrames, first_fitting, part_alone
 from manipcli.plan.grasp_margin import carries
@@ -380,4 +382,19 @@ def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     )
 
 
-MEMBER = StepMember(name="pick", spec=PickSpec, candidates=candidates, check=check, uncommanded=uncommanded)
+def clause(spec: PickSpec, robot: RobotModel) -> str:
+    approach, grasp = spec.approach, spec.grasp
+    part = "" if spec.part is None else f" by its part {named(spec.part)}"
+    height = "" if grasp.height is None else f" {amount(grasp.height, 'm')} above its bottom"
+    until = ", or until it is in that pose" if grasp.until == "posture" else ""
+    return (
+        f"pick {named(spec.object)}{part}{approached(approach.from_, approach.pitch, approach.yaw, approach.frame)}: "
+        f"open the hand (pose {named(spec.open)}), approach straight over {between(approach.distance, 'm')}, and close "
+        f"the hand (pose {named(grasp.posture)}){height} until each finger presses with {amount(grasp.force, 'N')}"
+        f"{until}{at_share(spec.velocity_scaling, 1.0)}"
+    )
+
+
+MEMBER = StepMember(
+    name="pick", spec=PickSpec, candidates=candidates, check=check, uncommanded=uncommanded, clause=clause
+)

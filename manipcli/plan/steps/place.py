@@ -15,11 +15,13 @@ import numpy as np
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.prose import amount, between, named
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.clauses import at_share
 from manipcli.plan.free_motion import line_blocked
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -29,7 +31,7 @@ from manipcli.plan.prediction import put
 from manipcli.plan.ranges import spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.pick import backed_off, slopes
-from manipcli.plan.steps.place_spec import PlaceSpec, RegionSpec, check
+from manipcli.plan.steps.place_spec import PlaceSpec, RegionSpec, check, where
 from manipcli.plan.steps.placed import goal, in_region, located
 from manipcli.scene.scene import Body
 
@@ -304,4 +306,15 @@ def uncommanded(spec: PlaceSpec, robot: RobotModel, claims: Claims) -> tuple[Pro
     return unmoved_tool(claims, robot, ("object",)) + unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="place", spec=PlaceSpec, candidates=candidates, check=check, uncommanded=uncommanded)
+def clause(spec: PlaceSpec, robot: RobotModel) -> str:
+    yaw = "" if spec.yaw is None else f" with a yaw of {amount(spec.yaw, 'rad')}"
+    return (
+        f"place {named(spec.object)} {where(spec)}{yaw}: lower it straight from {between(spec.clearance, 'm')} above, "
+        f"open the hand (pose {named(spec.posture)}), and withdraw it by {between(spec.retreat, 'm')}"
+        f"{at_share(spec.velocity_scaling, 0.5)}"
+    )
+
+
+MEMBER = StepMember(
+    name="place", spec=PlaceSpec, candidates=candidates, check=check, uncommanded=uncommanded, clause=clause
+)

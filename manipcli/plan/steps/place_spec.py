@@ -22,6 +22,7 @@ from pydantic import Field, field_validator, model_validator
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.conditions.frames import carrier, fixed_frame, unknown_part
 from manipcli.core.errors import Loc
+from manipcli.core.prose import amount, named, point, shortest
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.place_goals import UPRIGHT, floor_of
@@ -166,6 +167,31 @@ class PlaceSpec(Model):
         if self.region is not None:
             return False
         return self.at == "start" or (self.at is None and self.support is None)
+
+
+def where(spec: PlaceSpec) -> str:
+    """The place in English: `on the middle of 'red'`, `at [0.5, 0.2] m on 'table'`."""
+    support = "" if spec.support is None else f"{'on' if spec.onto is not None else 'in'} {named(spec.support)}"
+    if spec.region is not None:
+        box, frame = spec.region.box, spec.region.frame
+        sides = shortest(box.size, "m", " x ", "{}")
+        origin = "" if frame in (None, "world") else f" of {named(str(frame))}"
+        return f"{support}, with its frame in a rectangle of {sides} around {point(box.centre)}{origin}"
+    if spec.at_start:
+        return "where it was at the start"
+    if spec.at is None:
+        return f"{'on' if spec.onto is not None else 'in'} the middle of {named(str(spec.support))}"
+    if isinstance(spec.at, RelationSpec):
+        return f"{_relative(spec.at, spec.part)}{support and f', {support}'}"
+    return f"at {point(spec.at if isinstance(spec.at, tuple) else ())} {support}"
+
+
+def _relative(at: RelationSpec, part: str | None) -> str:
+    if at.side is not None:
+        sides = {"left": "to the left of", "right": "to the right of", "front": "in front of", "behind": "behind"}
+        return f"{sides[at.side]} {named(at.of)}, with a gap of {amount(at.gap or 0.0, 'm')}"
+    own = "" if part is None else f" with its part {named(part)}"
+    return f"{own.lstrip()}{own and ' '}at {point(at.xyz or ())} in the frame of {named(at.of)}"
 
 
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

@@ -28,11 +28,13 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.prose import amount, between, named
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
+from manipcli.plan.clauses import at_share
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -174,4 +176,16 @@ def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("object",))
 
 
-MEMBER = StepMember(name="pour", spec=PourSpec, candidates=candidates, check=check, uncommanded=uncommanded)
+def clause(spec: PourSpec, robot: RobotModel) -> str:
+    side = "before" if spec.offset > 0.0 else "beyond"
+    offset = f" and {amount(abs(spec.offset), 'm')} {side} its centre" if spec.offset else ""
+    return (
+        f"pour from {named(spec.object)} into {named(spec.into)}: hold the lip {between(spec.clearance, 'm')} above "
+        f"its rim{offset}, tilt it by {amount(spec.tilt, 'rad')}, wait {amount(spec.dwell, 's')}, and "
+        f"tilt it back{at_share(spec.velocity_scaling, 0.5)}"
+    )
+
+
+MEMBER = StepMember(
+    name="pour", spec=PourSpec, candidates=candidates, check=check, uncommanded=uncommanded, clause=clause
+)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.core.prose import named
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unmoved_hand
 from manipcli.plan.motion import PlanningState, StepPlan
@@ -43,12 +44,17 @@ def uncommanded(spec: ReleaseSpec, robot: RobotModel, claims: Claims) -> tuple[P
     return unmoved_hand(claims, robot, spec.posture, ("posture",))
 
 
+def clause(spec: ReleaseSpec, robot: RobotModel) -> str:
+    return f"open the hand to its pose {named(spec.posture)} and let go"
+
+
 MEMBER = StepMember(
     name="release",
     spec=ReleaseSpec,
     candidates=single(plan),
     check=check,
     uncommanded=uncommanded,
+    clause=clause,
     moves=False,
     part=lambda *_: "hand",
 )

@@ -15,6 +15,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from manipcli.conditions.condition import Problem
+from manipcli.core.prose import listing, named
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unknown_controller
 from manipcli.plan.motion import Motion, PlanningState, StepPlan, Strictness, Switch
@@ -96,6 +97,14 @@ def uncommanded(spec: SwitchControllersSpec, robot: RobotModel, claims: Claims) 
     )
 
 
+def clause(spec: SwitchControllersSpec, robot: RobotModel) -> str:
+    lists = (("activate", spec.activate or spec.to), ("deactivate", spec.deactivate))
+    doing = [f"{word} {listing([named(name) for name in names])}" for word, names in lists if names]
+    others = ", and deactivate the others on their joints" if spec.to else ""
+    best = ", as far as possible" if spec.strictness == "best_effort" else ""
+    return f"between two control ticks, {listing(doing)}{others}{best}"
+
+
 MEMBER = StepMember(
     name="switch_controllers",
     spec=SwitchControllersSpec,
@@ -104,5 +113,6 @@ MEMBER = StepMember(
     part=lambda *_: "nothing",
     check=check,
     uncommanded=uncommanded,
+    clause=clause,
     request=request,
 )

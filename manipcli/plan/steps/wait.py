@@ -12,6 +12,8 @@ from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from manipcli.core.prose import amount
+from manipcli.model.robot import RobotModel
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -43,12 +45,17 @@ def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
     return builder.plan()
 
 
+def clause(spec: WaitSpec, robot: RobotModel) -> str:
+    return f"hold still for {amount(spec.duration, 's')}" if spec.duration else "hold still"
+
+
 MEMBER = StepMember(
     name="wait",
     spec=WaitSpec,
     candidates=single(plan),
     check=lambda *_: (),
     uncommanded=lambda *_: (),
+    clause=clause,
     moves=False,
     part=lambda *_: "nothing",
 )

@@ -52,7 +52,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
             lower = f"limits.{name}.effort: {digits(1.05 * shared * grasp.force)}"
             hint = f"use effort commands, or lower the effort limit (robot file, {lower})"
             place = task.controllers_file.place("controllers", hand.controller, "command_interface")
-            yield Diagnostic("CTRL171", message, place, hint, "warning")
+            yield Diagnostic("CTRL173", message, place, hint, "warning")
 
 
 def _effort_each(task: Task, plan: Plan, grasp: Grasp, name: str) -> float:
@@ -64,4 +64,4 @@ def _effort_each(task: Task, plan: Plan, grasp: Grasp, name: str) -> float:
     return closing_rate(plan.planner, grasp.end, name, touched_parts(plan.planner, grasp.end))
 
 
-CHECK = Check(name="position_grips", codes=("CTRL171",), findings=findings, needs_plan=True)
+CHECK = Check(name="position_grips", codes=("CTRL173",), findings=findings, needs_plan=True)

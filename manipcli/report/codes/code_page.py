@@ -15,6 +15,7 @@ from importlib.resources import files
 from typing import Final, Literal, cast, get_args
 
 from manipcli.description.lint.checks import CHECKS
+from manipcli.report.codes.xml_lines import broken
 
 Kind = Literal["task", "robot", "controllers", "urdf", "xacro", "srdf", "command", "python", "situation"]
 """What an example is: keys of a file, which stand in a complete one; a whole description; a command line; Python; or
@@ -55,7 +56,9 @@ class CodePage:
 def code_pages() -> dict[str, CodePage]:
     """The pages of all codes, in their order."""
     found: dict[str, CodePage] = {
-        check.code: CodePage(check.code, check.summary, "", check.reason, _kind_of(check.bad), check.bad, "")
+        check.code: CodePage(
+            check.code, check.summary, "", check.reason, _kind_of(check.bad), broken(check.bad, width=0), ""
+        )
         for check in CHECKS
     }
     for file in files("manipcli.report.codes").iterdir():
@@ -91,8 +94,13 @@ def render_text(page: CodePage) -> str:
     blocks = [f"{page.code}: {page.title}", page.what, page.why]
     for title, example in (("This gets it:", page.bad), ("This does not:", page.good)):
         if example:
-            blocks.append("\n".join([title, *(f"    {line}".rstrip() for line in example.split("\n"))]))
+            blocks.append(_indented(title, example))
+    blocks += [_indented(f"with {name}:", text.strip()) for name, text in page.files.items()]
     return "\n\n".join(block for block in blocks if block)
+
+
+def _indented(title: str, text: str) -> str:
+    return "\n".join([title, *(f"    {line}".rstrip() for line in text.split("\n"))])
 
 
 def render_markdown(page: CodePage) -> str:

@@ -176,8 +176,16 @@ def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Diagnostic:
                 excerpt = lines[line]
             else:
                 message += f" (it opens at line {opened.line + 1}, column {opened.column + 1})"
+        if message == "unexpected ':'" and line > 0 and _is_deeper(excerpt, lines[line - 1]):
+            hint = "indent this line as the line above it, which has a value already; or quote the text"
         return _syntax(message, hint, excerpt, Place(name, line + 1, column + 1))
     return _syntax(problem, None, excerpt, Place(name, line + 1, column + 1))
+
+
+def _is_deeper(line: str, above: str) -> bool:
+    """Whether a line with a key is indented deeper than the key of the line above, which has a value."""
+    key, upper = (re.match(r"(\s*(?:- +)*)[\w$-]+:(?: +(\S))?", each) for each in (line, above))
+    return key is not None and upper is not None and upper[2] is not None and len(key[1]) > len(upper[1])
 
 
 def _syntax(message: str, hint: str | None, excerpt: str, place: Place) -> Diagnostic:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from manipcli.core.errors import Loc
-from manipcli.core.text import did_you_mean, escape, listed
+from manipcli.core.text import did_you_mean, escape, listed, nearest
 from manipcli.spec.expression import Scope, names_used
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, mapped, shown
 from manipcli.spec.structure.params import Param, Wrong, check, declared
@@ -41,9 +41,11 @@ def arguments(
             message = f"the steps do not use `${param.name}`"
             reports.at(272, ("params", param.name), node, message, hint.replace("name", param.name), "warning")
     missing = [param for param in params if param.type and param.name not in given.entries and not param.default]
-    if missing:
-        named = listed([f"`{param.name}` ({param.type})" for param in missing])
-        hint = f"add `with: {{{missing[0].name}: ...}}`; it is declared at {missing[0].place}"
+    misspelt = {near for name in given.entries if name not in known for near in nearest(name, known)}
+    absent = [param for param in missing if param.name not in misspelt]
+    if absent:
+        named = listed([f"`{param.name}` ({param.type})" for param in absent])
+        hint = f"add `with: {{{absent[0].name}: ...}}`; it is declared at {absent[0].place}"
         reports.at(267, (*at, "with"), item.entries["do"].node, f"no value for {named}", hint)
     return _values(
         params,

@@ -12,11 +12,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from manipcli.core.errors import Loc
+from manipcli.core.errors import Loc, Place
 from manipcli.core.text import escape
 from manipcli.spec.block import BlockKind
 from manipcli.spec.condition import ID, ID_HINT
-from manipcli.spec.expression import Scope, is_expression
+from manipcli.spec.expression import Scope, is_expression, names_used
 from manipcli.spec.source.tree import (
     MappingNode,
     Node,
@@ -35,7 +35,7 @@ from manipcli.spec.structure.ids import own_ids
 from manipcli.spec.structure.include import Inclusion
 from manipcli.spec.structure.reports import Reports
 from manipcli.spec.structure.rounds import rounds_of, written_scope
-from manipcli.spec.structure.static import Undecidable, decided
+from manipcli.spec.structure.static import Undecidable, decided, without_parameter
 
 MOST_STEPS: Final = 2000
 """Steps of a task, and rounds and list items that are expanded without a step."""
@@ -89,11 +89,17 @@ class Expansion:
     blocks: list[BlockDraft] = field(default_factory=list)
     dropped: list[FlatStep] = field(default_factory=list)
     visited: int = 0
+    decided: dict[Place, tuple[MappingNode, Loc, bool]] = field(default_factory=dict)
+    """Every `if` on a value of `each`, and whether it holds in a round."""
 
     def whole(self, steps: Node, scope: Scope) -> Expanded:
         """Expands the steps of a task."""
         with suppress(TooMuch):
             self.list_of_steps(steps, ("steps",), _Context(scope, self.task))
+        for item, at, holds in self.decided.values():
+            if not holds and self.steps:
+                message, hint = "the condition holds in no round", "compare with a value of `each`, spelt as there"
+                self.reports.at_key(275, at, item, "if", message, hint, "warning")
         blocks = tuple(block for block in self.blocks if block.last > block.first)
         return Expanded(tuple(self.steps), blocks, tuple(self.dropped))
 
@@ -101,7 +107,14 @@ class Expansion:
         """Expands a list of steps at the end of the flat list."""
         if not isinstance(node, SequenceNode):
             assert node is not None
-            hint = "begin each step with '- '" if isinstance(node, MappingNode) else "write `[{VERB: {...}}, ...]`"
+            hint = "write `[{VERB: {...}}, ...]`"
+            if isinstance(node, MappingNode):
+                is_step = any(key in self.verbs or key in words.WORDS for key in node.entries)
+                hint = (
+                    "begin each step with '- '"
+                    if is_step
+                    else f"write `{words.FORMS.get(str(at[-1]), f'{at[-1]}: [STEP, ...]')}`"
+                )
             self.reports.at(262, at, node, f"expected a list of steps, not {shown(node)}", hint)
             return
         if not node.items and not empty:
@@ -221,6 +234,10 @@ class Expansion:
             self.reports.at_key(261, (*at, "if"), written, inside, f"`{inside}` belongs next to `if`", hint)
             return
         condition = mapped(written, scope.computed, (*at, "if"))
+        if (word := without_parameter(written, scope.names)) is not None:
+            message = f"`equal` compares the word '{word[1]}', not the parameter"
+            self.reports.at(270, (*at, "if"), word[0], message, f"write `${word[1]}`")
+            return
         try:
             holds = _is_refused(condition, scope) or decided(condition)
         except Undecidable as error:
@@ -237,6 +254,9 @@ class Expansion:
         if missing and holds is not False:
             self.reports.at_key(262, at, item, "if", "`then` is missing", f"write `{words.FORMS['if']}`, or use `not`")
             return
+        if isinstance(holds, bool) and not scope.isolated and names_used(written) & scope.local:
+            before = self.decided.get(item.place, (item, at, False))
+            self.decided[item.place] = (item, at, holds or before[2])
         kind: BlockKind = "sequence" if isinstance(holds, bool) else "if"
         with self.block(own, kind, "if", at, item, context) as (draft, index):
             then = context.inside(index, f"{own}/", reserved=(words.ELSE,))

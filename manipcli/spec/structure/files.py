@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
-from manipcli.core.text import did_you_mean, escape, shorten
+from manipcli.core.text import did_you_mean, escape, nearest, shorten
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, counted, shown
 from manipcli.spec.structure.reports import Reports
 
@@ -47,10 +47,10 @@ Parse = Callable[[Path, str], tuple[Node | None, list[Diagnostic]]]
 
 def within(folder: Path) -> Find:
     """Finds files in a folder and below, symbolic links resolved."""
-    root = folder.resolve()
+    root = Path(os.path.realpath(folder))
 
     def find(name: str, base: Path) -> Path:
-        found = (base.parent / name).resolve()
+        found = Path(os.path.realpath(base.parent / name))
         if not found.is_relative_to(root):
             raise Refused(f"'{escape(name)}' is outside the folder of the task")
         if not found.exists():
@@ -93,6 +93,7 @@ class Files:
     uses: int = 0
     values: int = 0
     stamped: dict[tuple[Path, tuple[Place, ...]], MappingNode] = field(default_factory=dict)
+    by_calls: dict[tuple[Place, ...], TaskFile] = field(default_factory=dict)
 
     def read(self, named: Node, at: str, user: TaskFile, keys: Sequence[str]) -> tuple[TaskFile, MappingNode] | None:
         """The file that a node names, and its tree; None with findings.
@@ -100,13 +101,16 @@ class Files:
         Args:
             named: the node with the name.
             at: the path of the node, for messages.
-            user: the file with the node.
+            user: the file with the list of steps; a node that an `include` inserted there belongs to its fragment.
             keys: its permitted top-level keys.
         """
         what = "sub-task" if keys is SUB_TASK else "fragment"
         place = named.place
+        user = self.by_calls.get(place.calls, user)
         if not isinstance(named, ScalarNode) or not isinstance(named.value, str) or not named.value.strip():
-            self.reports.add(Diagnostic("TASK264", f"{at}: expected the name of a file, not {shown(named)}", place))
+            hint = "write `do: FILE.yaml, with: {NAME: VALUE}`" if keys is SUB_TASK else "write `include: FILE.yaml`"
+            message = f"{at}: expected the name of a file, not {shown(named)}"
+            self.reports.add(Diagnostic("TASK264", message, place, hint))
             return None
         if "$" in named.value:
             hint = "choose between files with `if`"
@@ -120,7 +124,7 @@ class Files:
         except (OSError, ValueError, RuntimeError):
             self.reports.add(Diagnostic("TASK264", f"{at}: '{shorten(named.value)}' is not a name of a file", place))
             return None
-        chain = user.chain or (user.path.resolve(),)
+        chain = user.chain or (Path(os.path.realpath(user.path)),)
         if path in chain:
             self.reports.add(
                 Diagnostic("TASK264", f"{at}: '{escape(named.value)}' uses itself", place, "remove this use")
@@ -132,6 +136,7 @@ class Files:
         file = TaskFile(
             path, _shown(named.value, user), (*user.calls, Place(place.file, place.line, place.column)), (*chain, path)
         )
+        self.by_calls[file.calls] = file
         root = self.tree(file, f"{at}: ", place, what, keys)
         return None if root is None else (file, root)
 
@@ -189,7 +194,10 @@ def _wrong_key(key: str, what: str, keys: Sequence[str]) -> tuple[str, str | Non
         return "a fragment has no `params`: it uses those of the task", "use the file with `do:` instead"
     if key in FRAGMENT:
         return f"a {what} has no `{key}`", f"include the file in `{key}:` of the task"
-    return f"unknown key '{escape(key)}' in a {what}", did_you_mean(key, keys)
+    hint = did_you_mean(key, keys, kind="keys")
+    if keys is FRAGMENT and not nearest(key, keys):
+        hint = "put bodies below `scene:`, frames below `frames:` and steps below `steps:`"
+    return f"unknown key '{escape(key)}' in a {what}", hint
 
 
 def _shown(name: str, user: TaskFile) -> str:

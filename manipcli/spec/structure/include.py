@@ -85,7 +85,8 @@ class Inclusion:
         section = found[1].get(key)
         if section is None:
             message = f"{dotted(at)}: the fragment has no `{key}`"
-            hint = f"begin it with `{key}:`"
+            others = [f"`{other}`" for other in (*NAMED, "steps") if other in found[1].entries]
+            hint = f"include it in {' or '.join(others)}: it has that block" if others else f"begin it with `{key}:`"
             self.files.reports.add(Diagnostic("TASK265", message, named.place, hint))
             return None
         return found[0], section

@@ -17,6 +17,7 @@
 | 272 | a parameter of `each` or of a sub-task that nothing uses (warning) |
 | 273 | a body or frame that two files have |
 | 274 | `parallel` without exactly two steps |
+| 275 | an `if` on a value of `each` that holds in no round (warning) |
 """
 
 from __future__ import annotations

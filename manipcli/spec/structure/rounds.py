@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final
 
 from manipcli.core.errors import Loc
-from manipcli.core.text import did_you_mean, escape, listed
+from manipcli.core.text import did_you_mean, escape, listed, nearest
 from manipcli.spec.expression import INDEX, NAME, Scope, names_used
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child, mapped, shown
 from manipcli.spec.structure import words
@@ -27,7 +27,7 @@ def rounds_of(
         return ()
     for key in block.entries:
         if key not in words.INSIDE:
-            reports.at_key(261, at, block, key, *_in_repeat(key, verbs))
+            reports.at_key(261, at, block, key, *_in_repeat(key, block, verbs))
             return ()
     steps = block.get("steps")
     if steps is None:
@@ -117,16 +117,24 @@ def _warn(name: str, each: MappingNode, at: Loc, scope: Scope, used: Collection[
     if name in scope.names:
         message = f"`{name}` hides the parameter of the same name"
         reports.at_key(271, at, each, name, message, "choose another name", "warning")
-    if name not in used:
+    if name not in used and not _misspelt(name, each, used, scope):
         message = f"`${name}` is not used in the steps of this `repeat`"
         reports.at_key(272, at, each, name, message, "remove it, or use it", "warning")
 
 
-def _in_repeat(key: str, verbs: Collection[str]) -> tuple[str, str | None]:
+def _misspelt(name: str, each: MappingNode, used: Collection[str], scope: Scope) -> bool:
+    """Whether the steps use an unknown name that is near to this one; that is an error of its own."""
+    unknown = [other for other in used if other not in each.entries and other not in scope.names and other != INDEX]
+    return bool(nearest(name, unknown))
+
+
+def _in_repeat(key: str, block: MappingNode, verbs: Collection[str]) -> tuple[str, str | None]:
     """Message and hint for an unknown key under `repeat`."""
     if key in words.COMMON:
         return f"`{key}` belongs next to `repeat`, not inside it", f"indent `{key}` as `repeat`"
     if key in verbs or key in words.WORDS:
         return f"`{key}` is a step: it belongs in the list `steps`", f"write `steps: [{{{key}: ...}}]`"
     hint = did_you_mean(key, words.INSIDE, kind="keys of `repeat`")
+    if isinstance(block.entries[key].node, SequenceNode) and not nearest(key, words.INSIDE):
+        hint = f"put its values below `each`: `each: {{{escape(key)}: [...]}}`"
     return f"unknown key '{escape(key)}' in `repeat`", hint

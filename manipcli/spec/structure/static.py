@@ -7,11 +7,12 @@ and `not` combine it, also with conditions that are asked in the run: of these, 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from manipcli.core.units import NUMBER, Quantity, UnitError
-from manipcli.spec.expression import quantity_of
-from manipcli.spec.source.tree import MappingNode, Node, Scalar, ScalarNode, SequenceNode, shown
+from manipcli.spec.expression import names_used, quantity_of
+from manipcli.spec.source.tree import MappingNode, Node, Scalar, ScalarNode, SequenceNode, child, shown
 
 EQUAL: Final = "equal"
 ROUNDING: Final = 1e-9
@@ -26,6 +27,15 @@ class Undecidable(Exception):
         self.message = message
         self.hint = hint
         super().__init__(message)
+
+
+def without_parameter(condition: Node, names: Collection[str]) -> tuple[ScalarNode, str] | None:
+    """A value of an `equal` without parameters that is the name of one: probably its `$` is missing."""
+    values = child(condition, EQUAL)
+    if not isinstance(values, SequenceNode) or names_used(values):
+        return None
+    words = ((v, v.value) for v in values.items if isinstance(v, ScalarNode) and isinstance(v.value, str))
+    return next(((node, word) for node, word in words if word in names), None)
 
 
 def decided(condition: Node) -> bool | Node:

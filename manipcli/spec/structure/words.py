@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Final
 
-from manipcli.core.text import did_you_mean, escape
+from manipcli.core.text import did_you_mean, escape, nearest
 from manipcli.spec.condition import ID
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode
 from manipcli.spec.step import StepSpec
@@ -32,6 +32,15 @@ _KEYS: Final = frozenset({*WORDS, *_OWNER})
 ELSE: Final = "else"
 LISTS: Final = ("sequence", "then", "else", "parallel")
 """Keys that hold a list of steps."""
+SYNONYMS: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("loop", "for", "foreach", "for_each", "while"), "repeat"),
+    **dict.fromkeys(("when", "case", "choose", "switch", "unless"), "if"),
+    **dict.fromkeys(("call", "use", "subtask", "sub_task"), "do"),
+    **dict.fromkeys(("group", "block", "serial"), "sequence"),
+    **dict.fromkeys(("concurrent", "together", "both"), "parallel"),
+    **dict.fromkeys(("import", "insert"), "include"),
+}
+"""Words of other languages, and the word here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,18 +95,29 @@ def misplaced(item: MappingNode, verbs: Collection[str]) -> Misplaced | None:
         if key == word or key in wanted:
             continue
         if key in WORDS or key in verbs:
-            hint = f"write a list item for each, or put the step in the list of `{word}`"
+            hint = "write a list item for each"
+            if word not in ("do", "include"):
+                hint += f", or put the step in it: `{FORMS[word].replace('STEP, ...', f'{{{key}: ...}}')}`"
             return Misplaced(260, key, f"an item has one verb or word, not both '{word}' and '{key}'", hint)
         if _OWNER.get(key) == word:
-            return Misplaced(261, key, f"`{key}` belongs inside `{word}`", f"indent `{key}` below `{word}:`")
+            hint = f"indent `{key}` below `{word}:`" if isinstance(item.get(word), MappingNode) else _usual(word)
+            return Misplaced(261, key, f"`{key}` belongs inside `{word}`", hint)
         if key in _OWNER:
             return Misplaced(261, key, f"`{key}` belongs to `{_OWNER[key]}`, not to `{word}`", _usual(_OWNER[key]))
         if key in StepSpec.model_fields:
             hint = "an included file keeps its own keys" if word == "include" else f"write `{key}` at the steps in it"
             return Misplaced(261, key, f"`{key}` cannot be next to `{word}`", hint)
-        near = did_you_mean(key, wanted, kind=f"keys next to `{word}`")
-        return Misplaced(261, key, f"unknown key '{escape(key)}' next to `{word}`", near or _usual(word))
+        return Misplaced(261, key, f"unknown key '{escape(key)}' next to `{word}`", _beside(key, word, wanted))
     return None
+
+
+def _beside(key: str, word: str, wanted: Collection[str]) -> str | None:
+    """Hint for an unknown key next to a word."""
+    if word == "if" and key in ("elif", "elseif", "else_if", "elsif"):
+        return "write `else: [{if: {CONDITION}, then: [...]}]`"
+    if word == "do" and not nearest(key, wanted):
+        return f"put a parameter of the sub-task below `with`: `with: {{{escape(key)}: ...}}`"
+    return did_you_mean(key, wanted, kind=f"keys next to `{word}`") or _usual(word)
 
 
 def _without_word(others: list[str], verbs: Collection[str]) -> Misplaced | None:
@@ -113,13 +133,22 @@ def _without_word(others: list[str], verbs: Collection[str]) -> Misplaced | None
     if verb is not None:
         return Misplaced(261, key, f"`{key}` belongs to `{word}`, not to the verb `{verb}`", _usual(word))
     if misspelt is not None:
-        near = did_you_mean(misspelt, [word], kind="words")
-        return Misplaced(260, misspelt, f"unknown verb '{escape(misspelt)}'", near)
-    return Misplaced(261, key, f"`{key}` without `{word}`", _usual(word))
+        near = did_you_mean(misspelt, [word]) if nearest(misspelt, [word]) else None
+        return Misplaced(
+            260, misspelt, f"unknown verb '{escape(misspelt)}'", near or other_word(misspelt) or _usual(word)
+        )
+    hint = _usual(word) + (f"; for a group write `{FORMS['sequence']}`" if key == "steps" else "")
+    return Misplaced(261, key, f"`{key}` without `{word}`", hint)
+
+
+def other_word(key: str) -> str | None:
+    """Hint for a word of another language: how its counterpart is written; None for other words."""
+    return _usual(SYNONYMS[key]) if key in SYNONYMS else None
 
 
 def _usual(word: str) -> str:
-    return f"write `{FORMS[word]}`"
+    each = " or `repeat: {each: {NAME: [...]}, steps: [...]}`" if word == "repeat" else ""
+    return f"write `{FORMS[word]}`{each}"
 
 
 FORMS: Final[Mapping[str, str]] = {

@@ -113,6 +113,40 @@ FAULTY = (
     (207, "6:58", "it is given at t.yaml:6:35", "[{repeat: {each: {x: [1 s, 2 kg]}, steps: [{wait: $x}]}}]"),
     (264, "6:14", "cannot be read", "[{do: sub.yaml}]"),
     (261, "6:29", "cannot be next to `include`", "[{include: own.yaml, id: x}]"),
+    (203, "6:10", "write `repeat: {times: 3", "[{loop: {times: 2, steps: [{wait: 1 s}]}}]"),
+    (260, "6:10", "write `repeat: {times: 3", "[{while: {at_rest: {object: a}}, steps: [{wait: 1 s}]}]"),
+    (260, "6:10", "write `do: FILE.yaml", "[{call: put.yaml, with: {object: a}}]"),
+    (203, "6:10", "write `if: {CONDITION}", "[{when: {at_rest: {object: a}}}]"),
+    (261, "6:21", "write `repeat: {times: 3", "[{repeat: 3, steps: [{wait: 1 s}]}]"),
+    (261, "6:10", "write `sequence: [STEP", "[{steps: [{wait: 1 s}], id: g}]"),
+    (260, "6:10", "`repeat: {times: 3, steps", "[{wait: 1 s, repeat: 3}]"),
+    (261, "6:19", "`each: {block: [...]}`", "[{repeat: {block: [a], steps: [{pick: {object: $block}}]}}]"),
+    (
+        261,
+        "6:59",
+        "write `else: [{if:",
+        "[{if: {at_rest: {object: a}}, then: [{wait: 1 s}], elif: [{wait: 1 s}]}]",
+    ),
+    (262, "6:20", "write `sequence: [STEP", "[{sequence: {steps: [{wait: 1 s}]}}]"),
+    (262, "6:20", "write `parallel: [STEP, STEP]`", "[{parallel: {arm: {move: {to: home}}, hand: {release: {}}}}]"),
+    (261, "6:24", "`with: {object: ...}`", "[{do: put.yaml, object: a}]"),
+    (264, "6:14", "write `do: FILE.yaml", "[{do: {file: put.yaml}}]"),
+    (270, "6:23", "write `$color`", "[{if: {equal: [color, red]}, then: [{wait: 1 s}]}, {wait: 1 s}]"),
+    (211, "6:14", "`{equal: [A, B]}`", "[{if: $color == red, then: [{wait: 1 s}]}]"),
+    (
+        203,
+        "6:80",
+        "known only inside its `repeat`",
+        "[{repeat: {each: {t: [1 s]}, steps: [{wait: $t}]}}, {wait: 2 s}, {wait: $t}]",
+    ),
+    (203, "6:63", "did you mean 'block'", "[{repeat: {each: {block: [a]}, steps: [{pick: {object: $blok}}]}}]"),
+    (
+        211,
+        "6:71",
+        "`.` does not select a key",
+        "[{repeat: {each: {block: [{name: a}]}, steps: [{pick: {object: $block.name}}]}}]",
+    ),
+    (202, "6:37", "write `on_fail: continue`", "[{wait: 1 s, id: w, on_fail: {then: continue}}]"),
 )
 
 
@@ -130,6 +164,11 @@ def test_a_fault_is_told_once_at_its_place(number: int, place: str, words: str, 
     ("number", "words", "steps"),
     [
         (271, "`color` hides the parameter", "[{repeat: {each: {color: [a]}, steps: [{pick: {object: $color}}]}}]"),
+        (
+            275,
+            "holds in no round",
+            "[{repeat: {each: {x: [Red, Blue]}, steps: [{if: {equal: [$x, red]}, then: [{wait: 1 s}]}]}}, {wait: 1 s}]",
+        ),
         (272, "`$x` is not used", "[{repeat: {each: {x: [1, 2]}, steps: [{wait: $index}]}}]"),
     ],
 )
@@ -142,3 +181,14 @@ def test_blocks_are_no_key() -> None:
     with pytest.raises(InvalidInput) as refused:
         load_task_text(f"{HEAD}blocks: []\nsteps: [{{wait: 0}}]\n", "t.yaml", model=task_spec())
     assert [finding.code for finding in refused.value.findings] == ["TASK201"]
+
+
+@pytest.mark.parametrize("values", ["[red, Blue]", "[red, red]"])
+def test_a_condition_that_holds_in_a_round_is_no_warning(values: str) -> None:
+    steps = f"[{{repeat: {{each: {{x: {values}}}, steps: [{{if: {{equal: [$x, red]}}, then: [{{wait: 1 s}}]}}]}}}}]"
+    assert load_task_text(f"{HEAD}steps: {steps}\n", "t.yaml", model=task_spec()).findings == ()
+
+
+def test_a_switch_of_the_task_is_no_warning() -> None:
+    steps = "[{repeat: {times: 2, steps: [{if: {equal: [$color, blue]}, then: [{wait: 1 s}]}, {wait: 1 s}]}}]"
+    assert load_task_text(f"{HEAD}steps: {steps}\n", "t.yaml", model=task_spec()).findings == ()

@@ -145,6 +145,33 @@ def test_a_body_in_two_files_is_told_with_both_places(tmp_path: Path) -> None:
     assert found.code == "TASK273" and f"{tmp_path / 'cell.yaml'}:1:9 has it already" in found.message
 
 
+def test_a_misspelt_value_is_not_missing_too(tmp_path: Path) -> None:
+    (found,) = refused(tmp_path, f"{SCENE}steps: [{{do: s.yaml, with: {{objct: a}}}}]\n", s=STACK)
+    assert found.hint == "did you mean 'object'?"
+
+
+def test_a_fragment_is_included_where_it_has_a_block(tmp_path: Path) -> None:
+    (found,) = refused(tmp_path, "steps: [{include: s.yaml}]\n", s=f"scene: {{a: {BODY}}}\n")
+    assert found.hint is not None and "include it in `scene`" in found.hint
+    (found,) = refused(tmp_path, "scene: {include: s.yaml}\nsteps: [{wait: 0}]\n", s=f"shelf: {BODY}\n")
+    assert found.hint is not None and "put bodies below `scene:`" in found.hint
+    (found,) = refused(tmp_path, "include: s.yaml\nsteps: [{wait: 0}]\n")
+    assert found.hint == "put `include: FILE` inside `scene`, `frames` or `steps`"
+
+
+def test_a_sub_task_of_a_fragment_is_relative_to_it_and_names_both_uses(tmp_path: Path) -> None:
+    (tmp_path / "cells").mkdir()
+    (tmp_path / "cells" / "f.yaml").write_text("steps: [{repeat: {times: 2, steps: [{do: s.yaml}]}}]\n")
+    (tmp_path / "cells" / "s.yaml").write_text("steps: [{wiat: 0}]\n")
+    (found,) = refused(tmp_path, "steps: [{include: cells/f.yaml}]\n")
+    inner = tmp_path / "cells" / "f.yaml"
+    assert found.place is not None and found.place.file == str(tmp_path / "cells" / "s.yaml")
+    assert found.place.expanded == f"used at {tmp_path / 't.yaml'}:4:19, then at {inner}:1:42"
+    (tmp_path / "cells" / "s.yaml").write_text("steps: [{include: f.yaml}]\n")
+    first, *_ = refused(tmp_path, "steps: [{include: cells/f.yaml}]\n")
+    assert "uses itself" in first.message
+
+
 def test_an_unused_parameter_is_a_warning(tmp_path: Path) -> None:
     task = loaded(tmp_path, "steps: [{do: s.yaml}]\n", s="params: {x: {type: time, default: 1}}\nsteps: [{wait: 0}]\n")
     assert [(finding.code, finding.severity) for finding in task.findings] == [("TASK272", "warning")]
