@@ -7,17 +7,21 @@ alone: the log is read back from its file before the file gets its name.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Unpack
 
+from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Diagnostic, InvalidInput, NotPlannable
 from manipcli.core.stopwatch import timed
 from manipcli.judge.agreement import compare
 from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import INTERRUPTED, Verdict
+from manipcli.live.loop import Outside, simulate_live
+from manipcli.live.session import LiveOptions, recorded_session, served
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
 from manipcli.logs.part_of import task_part
@@ -45,6 +49,7 @@ from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.explanation import Explanation, explained
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
+from manipcli.task.part import LIVE
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
 from manipcli.task.task import Task
 from manipcli.task.variants import overrides_of, simulation_of
@@ -249,6 +254,62 @@ def compare_runs(
     return ComparedRuns(compare(runs), tuple(reports))
 
 
+def serve_task(
+    path: Path,
+    live: LiveOptions,
+    *,
+    log: Path | None = None,
+    force: bool = False,
+    embed_meshes: bool = False,
+    progress: Progress = SILENT,
+    between: Callable[[], None],
+    announce: Callable[[str], None],
+    **options: Unpack[LoadOptions],
+) -> tuple[RunReport, str]:
+    """Opens the scene of a task, and lets clients command its controllers until the session ends.
+
+    Args:
+        path: the task file; its steps are not run.
+        live: how it is served.
+        log: path of the log; default `runs/<task>@live.mcap`, which is replaced.
+        force: replace `log` if it exists.
+        embed_meshes: see `run_task`.
+        progress: receives warnings.
+        between: called before each tick; raises KeyboardInterrupt to end the session.
+        announce: called with the URL when clients can connect.
+        options: how the task is loaded, see `LoadOptions`.
+
+    Returns:
+        The verdict on the log by the expectations of the task that need no step; and why the simulation failed, or "".
+
+    Raises:
+        InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
+        RecordingFailed: writing the log failed.
+    """
+    task, loading = timed(_load, path, progress, options, None)
+    task = replace(task, part=LIVE)
+    plan = plan_task(task)
+    where = log if log is not None else default_log(task)
+
+    def late(text: str) -> None:
+        progress.message(text, detail=False)
+
+    failures: list[str] = []
+
+    @contextmanager
+    def opened(manager: ControllerManager) -> Iterator[Outside]:
+        with served(task, manager, live, between=between, announce=announce, late=late) as outside:
+            yield outside
+        failures.append(outside.failure)
+
+    verdict, timing = _record(
+        task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress, live=opened
+    )
+    timing = replace(timing, load=loading)
+    report = RunReport(verdict, timing, log=str(where), warnings=task.warnings, meshes=mesh_files(task))
+    return report, failures[0]
+
+
 def verify_log(
     log: Path,
     *,
@@ -279,7 +340,13 @@ def verify_log(
     with TemporaryDirectory(prefix="manipcli-") as folder:
         repeated = Path(folder) / "repeated.mcap"
         verdict, _ = _record(
-            recorded.task, plan, repeated, overwrite=False, embed_meshes=recorded.embedded, progress=progress
+            recorded.task,
+            plan,
+            repeated,
+            overwrite=False,
+            embed_meshes=recorded.embedded,
+            progress=progress,
+            live=(lambda _: nullcontext(recorded_session(recording, log))) if recorded.task.part.live else None,
         )
         if any(finding.code == INTERRUPTED for finding in verdict.errors):
             raise KeyboardInterrupt
@@ -307,12 +374,25 @@ def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Pl
 
 
 def _record(
-    task: Task, plan: Plan, path: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress
+    task: Task,
+    plan: Plan,
+    path: Path,
+    *,
+    overwrite: bool,
+    embed_meshes: bool,
+    progress: Progress,
+    live: Callable[[ControllerManager], AbstractContextManager[Outside]] | None = None,
 ) -> tuple[Verdict, Timing]:
-    """Simulates into a log, which is judged before it gets its name."""
+    """Simulates into a log, which is judged before it gets its name; `live`: a session instead of steps."""
     manager = build_manager(task, plan.planner.kinematics)
-    with open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder:
-        end, simulating = timed(simulate, task, plan, manager, recorder, progress)
+    with (
+        nullcontext() if live is None else live(manager) as outside,
+        open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder,
+    ):
+        if outside is None:
+            end, simulating = timed(simulate, task, plan, manager, recorder, progress)
+        else:
+            end, simulating = timed(simulate_live, task, plan, manager, recorder, outside)
         recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
         verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))

@@ -35,7 +35,9 @@ from manipcli.cli.commands import (
     replay,
     run,
     schema,
+    serve,
     test,
+    topic,
     tune,
     view,
 )
@@ -93,6 +95,8 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "plot": plot.plot,
     "view": view.view,
     "replay": replay.replay,
+    "serve": serve.serve,
+    "topic": topic.topic,
     "list": list_.list_,
     "schema": schema.schema,
 }

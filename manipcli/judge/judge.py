@@ -165,7 +165,7 @@ def _verdict(found: Verdict, cause: str) -> tuple[VerdictWord, str]:
         if first not in ("", undone.text):
             why += f" (first attempt: {first})"
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
-    if not steps:
+    if not steps and not (found.part is not None and found.part.live):
         return "failed", "the recording has no steps"
     asked = [expectation for expectation in (*expectations, *found.implied) if not expectation.excused]
     unmet = next((expectation for expectation in asked if expectation.missed), None)

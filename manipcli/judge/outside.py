@@ -30,7 +30,7 @@ def not_asked(steps: tuple[StepOutcome, ...], part: RunPart | None) -> tuple[Ste
     last = ids.index(part.last) if part.last in ids else len(ids) - 1
     found = []
     for k, step in enumerate(steps):
-        if first <= k <= last:
+        if first <= k <= last and not part.live:
             found.append(step)
         else:
             why = _why(part, before=k < first)
@@ -39,6 +39,8 @@ def not_asked(steps: tuple[StepOutcome, ...], part: RunPart | None) -> tuple[Ste
 
 
 def _why(part: RunPart, *, before: bool) -> str:
+    if part.live:
+        return "not run in a live session"
     return f"before '{part.first}', where this run starts" if before else f"after '{part.last}', where this run ends"
 
 

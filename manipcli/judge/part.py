@@ -18,6 +18,7 @@ class RunPart:
         first, last: ids of its first and its last step; "" for those of the task.
         log, sha256, time: name and checksum of the log of the start state, and its time [s] there; "" and 0 for the
             start of the task.
+        live: whether it was a live session, which runs no step.
     """
 
     first: str = ""
@@ -25,9 +26,12 @@ class RunPart:
     log: str = ""
     sha256: str = ""
     time: float = 0.0
+    live: bool = False
 
     def __str__(self) -> str:
         """`part of the task: from 'place_1', in the state of pick.mcap at 5.20 s; not the uninterrupted run`."""
+        if self.live:
+            return "live session, without the steps of the task"
         words = []
         if self.first:
             words.append(
@@ -44,6 +48,7 @@ class RunPart:
         return {
             **({"from": self.first, **origin} if self.first else {}),
             **({"until": self.last} if self.last else {}),
+            **({"live": "true"} if self.live else {}),
             "text": str(self),
         }
 
@@ -56,5 +61,5 @@ class RunPart:
             time = 0.0
         return RunPart(
             values.get("from", ""), values.get("until", ""), values.get("origin", ""), values.get("origin_sha256", ""),
-            time,
+            time, "live" in values,
         )  # fmt: skip

@@ -18,6 +18,7 @@ CONTACTS = "/contacts"
 EVENTS = "/task/events"
 ROSOUT = "/rosout"
 MARKERS = "/markers"
+LIVE_COMMANDS = "/live/commands"
 
 # A quality of service profile as rosbag2 stores it: the last message is kept for late subscribers.
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
@@ -113,8 +114,8 @@ class Channel:
     definition: str = ""
 
 
-def channel_table(controllers: Sequence[Recorded]) -> tuple[Channel, ...]:
-    """All channels of a recording, in the order of their ids."""
+def channel_table(controllers: Sequence[Recorded], *, live: bool = False) -> tuple[Channel, ...]:
+    """All channels of a recording, in the order of their ids; `live`: also that of the commands of a live session."""
     rows: list[tuple[str, str, bool]] = [
         (ROBOT_DESCRIPTION, schemas.STRING, True),
         (TF_STATIC, schemas.TF_MESSAGE, True),
@@ -143,6 +144,8 @@ def channel_table(controllers: Sequence[Recorded]) -> tuple[Channel, ...]:
                 (controller.status_topic, schemas.GOAL_STATUS_ARRAY, True),
                 (controller.result_topic, result, False),
             ]
+    if live:
+        rows.append((LIVE_COMMANDS, schemas.LIVE_COMMAND, False))
     own = {sensor.topic: sensor.definition for sensor in controllers if isinstance(sensor, SensorChannel)}
     return tuple(
         Channel(k, topic, kind, latched, own.get(topic, "")) for k, (topic, kind, latched) in enumerate(rows, start=1)

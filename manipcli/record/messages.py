@@ -134,6 +134,16 @@ def log_message(ns: int, event: TaskEvent) -> bytes:
     return writer.data
 
 
+def live_command_message(ns: int, tick: int, op: str, name: str, id_: str, json: str) -> bytes:
+    """manipcli_msgs/LiveCommand."""
+    writer = CdrWriter()
+    writer.header(ns, WORLD)
+    writer.u32(tick)
+    for value in (op, name, id_, json):
+        writer.text(value)
+    return writer.data
+
+
 class ContactEncoder:
     """Encoder of manipcli_msgs/Contacts. The constant bytes of each pair are built once, because sets of pairs can
     alternate at the control rate while fingers close."""

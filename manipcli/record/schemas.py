@@ -21,6 +21,10 @@ LOG = "rcl_interfaces/msg/Log"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 CONTACTS = "manipcli_msgs/msg/Contacts"
 TASK_EVENT = "manipcli_msgs/msg/TaskEvent"
+CLOCK = "rosgraph_msgs/msg/Clock"
+JOINT_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+FLOAT64_MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+LIVE_COMMAND = "manipcli_msgs/msg/LiveCommand"
 
 _CONTACT = (
     "# Two touching parts: names of scene bodies, or robot/<link>; a <= b.\n"
@@ -153,6 +157,57 @@ DEFINITIONS: dict[str, str] = {
         "# Something happened in the task; `place` is where the step stands in its file (file:line:column).\n"
         "std_msgs/Header header\nstring kind\nstring step\nstring verb\nstring outcome\nstring text\nstring place\n"
     ),
+    "manipcli_msgs/LiveCommand": (
+        "# A command from outside, and the control tick at which it took effect, before the update of that tick.\n"
+        "std_msgs/Header header\nuint32 tick\n"
+        "# publish, send_action_goal, cancel_action_goal, call_service, or end: the session ends before this tick.\n"
+        "string op\n"
+        "# Topic, action or service.\n"
+        "string name\n"
+        "# Of an action goal: distinct in the session.\n"
+        "string id\n"
+        "# The message, the goal or the request as JSON.\n"
+        "string json\n"
+    ),
+    "rosgraph_msgs/Clock": "builtin_interfaces/Time clock\n",
+    "std_msgs/MultiArrayDimension": "string label\nuint32 size\nuint32 stride\n",
+    "std_msgs/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n",
+    "std_msgs/Float64MultiArray": "std_msgs/MultiArrayLayout layout\nfloat64[] data\n",
+    "trajectory_msgs/JointTrajectory": (
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points\n"
+    ),
+    "trajectory_msgs/MultiDOFJointTrajectory": (
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/MultiDOFJointTrajectoryPoint[] points\n"
+    ),
+    "control_msgs/JointTolerance": "string name\nfloat64 position\nfloat64 velocity\nfloat64 acceleration\n",
+    "control_msgs/JointComponentTolerance": (
+        "uint16 X_AXIS=1\nuint16 Y_AXIS=2\nuint16 Z_AXIS=3\nuint16 TRANSLATION=4\nuint16 ROTATION=5\n"
+        "string joint_name\nuint16 component\nfloat64 position\nfloat64 velocity\nfloat64 acceleration\n"
+    ),
+    "control_msgs/FollowJointTrajectory_Goal": (
+        "trajectory_msgs/JointTrajectory trajectory\ntrajectory_msgs/MultiDOFJointTrajectory multi_dof_trajectory\n"
+        "control_msgs/JointTolerance[] path_tolerance\n"
+        "control_msgs/JointComponentTolerance[] component_path_tolerance\n"
+        "control_msgs/JointTolerance[] goal_tolerance\n"
+        "control_msgs/JointComponentTolerance[] component_goal_tolerance\n"
+        "builtin_interfaces/Duration goal_time_tolerance\n"
+    ),
+    "control_msgs/ParallelGripperCommand_Goal": "sensor_msgs/JointState command\n",
+    "controller_manager_msgs/ChainConnection": "string name\nstring[] reference_interfaces\n",
+    "controller_manager_msgs/ControllerState": (
+        "string name\nstring state\nstring type\nbool is_async\nuint16 update_rate\nstring[] claimed_interfaces\n"
+        "string[] required_command_interfaces\nstring[] required_state_interfaces\nbool is_chainable\n"
+        "bool is_chained\nstring[] exported_state_interfaces\nstring[] reference_interfaces\n"
+        "controller_manager_msgs/ChainConnection[] chain_connections\n"
+    ),
+    "controller_manager_msgs/ListControllers_Request": "",
+    "controller_manager_msgs/ListControllers_Response": "controller_manager_msgs/ControllerState[] controller\n",
+    "controller_manager_msgs/SwitchController_Request": (
+        "string[] activate_controllers\nstring[] deactivate_controllers\nint32 strictness\n"
+        "int32 BEST_EFFORT=1\nint32 STRICT=2\nint32 AUTO=3\nint32 FORCE_AUTO=4\n"
+        "bool activate_asap\nbuiltin_interfaces/Duration timeout\n"
+    ),
+    "controller_manager_msgs/SwitchController_Response": "bool ok\nstring message\n",
 }
 
 CONTACTS_WITHOUT_POINTS = (

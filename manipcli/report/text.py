@@ -39,6 +39,16 @@ def render_run(report: RunReport, *, verbose: bool = False) -> str:
     return "\n".join(lines)
 
 
+def render_session(report: RunReport, failure: str) -> str:
+    """A live session: how long it was, the expectations of its task, and its log; `failure`: of the simulation."""
+    verdict = report.verdict
+    first = f"{FAIL} {verdict.task}: {failure}" if failure else f"{PASS} {verdict.task}: session ended"
+    lines = [f"{first} ({verdict.simulated_time:.2f} s simulated, {report.wall_time:.2f} s real)"]
+    if verdict.expectations:
+        lines += [f"expectations at its end: {verdict.text}", _expectations(verdict.expectations)]
+    return "\n".join([*lines, f"log: {report.log}"])
+
+
 def render_verdict(verdict: Verdict, log: str) -> str:
     """The verdict on a log."""
     return "\n".join([*_verdict(verdict, f"{verdict.simulated_time:.2f} s simulated"), f"log: {log}"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
@@ -92,6 +94,24 @@ def _run_steps(
     Raises:
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
+    with open_session(task, plan, manager) as session:
+        live = Live(live_world(task, plan, session), manager.controllers, session.period)
+        observer = Observer(recorder, live, progress, session.period)
+        session.restart_clock(observer)
+        run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
+        try:
+            BlockLoop(plan, run).run()
+        finally:
+            record_saturations(session, recorder)
+
+
+@contextmanager
+def open_session(task: Task, plan: Plan, manager: ControllerManager) -> Iterator[Session]:
+    """The world of a task in its engine, settled or in the state in which a part of the task begins.
+
+    Raises:
+        SimulationFailed: the world does not settle before the start.
+    """
     simulation, true = task.spec.simulation, task.true
     settings = engine_settings(task, plan)
     state = task.part.state
@@ -111,20 +131,18 @@ def _run_steps(
                 _settle(task, session)
             else:
                 restore_controllers(session, state)
-            live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
-            observer = Observer(recorder, live, progress, simulation.control_period)
-            session.restart_clock(observer)
-            run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
-            try:
-                BlockLoop(plan, run).run()
-            finally:
-                for kind, counts in saturations_of(session).to_metadata().items():
-                    recorder.metadata(kind, counts)
+            yield session
     finally:
         engine.close()
 
 
-def _world(task: Task, plan: Plan, session: Session) -> World:
+def record_saturations(session: Session, recorder: Recorder) -> None:
+    """Write the saturated ticks of each joint into the metadata of the log, at the end of a run."""
+    for kind, counts in saturations_of(session).to_metadata().items():
+        recorder.metadata(kind, counts)
+
+
+def live_world(task: Task, plan: Plan, session: Session) -> World:
     """The world of live conditions, equal to the one that judging builds from the log; now is time 0."""
     return World(
         task.robot,

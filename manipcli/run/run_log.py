@@ -47,7 +47,7 @@ YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/jso
 
 
 def default_log(task: Task) -> Path:
-    """`runs/<task>.mcap`, or `runs/<task>@from.mcap` of a run from a step on; creates the folder.
+    """`runs/<task>.mcap`, with `@from` for a run from a step on, `@live` for a live session; creates the folder.
 
     Raises:
         InvalidInput: the folder cannot be created.
@@ -57,7 +57,8 @@ def default_log(task: Task) -> Path:
     except OSError as error:
         message = f"cannot create folder '{RUNS}' for the log: {error.strerror}"
         raise InvalidInput([Diagnostic("LOG101", message, hint="choose another file with --log PATH")]) from error
-    return RUNS / (f"{task.name}.mcap" if task.part.state is None else f"{task.name}@from.mcap")
+    suffix = "@live" if task.part.live else "" if task.part.state is None else "@from"
+    return RUNS / f"{task.name}{suffix}.mcap"
 
 
 def variant_log(log: Path, variant: Variant) -> Path:
@@ -127,6 +128,7 @@ def open_log(
                 task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out
             ),
             overwrite=overwrite,
+            live=task.part.live,
         )
         yield recorder
     except RecordingFailed as failure:

@@ -18,17 +18,21 @@ class Part:
         last: index behind the last step; None: of all.
         until: id of the step after which the run was asked to stop; "": none.
         state: at the start; None: the start of the task.
+        live: a live session, which runs no step.
     """
 
     first: int = 0
     last: int | None = None
     until: str = ""
     state: StartState | None = None
+    live: bool = False
 
     @property
     def described(self) -> RunPart | None:
         """For log and verdict; None for a whole run."""
         state = self.state
+        if self.live:
+            return RunPart(live=True)
         if state is None:
             return RunPart(last=self.until) if self.until else None
         return RunPart(state.step, self.until, state.log, state.sha256, state.time)
@@ -36,3 +40,5 @@ class Part:
 
 WHOLE: Final = Part()
 """All steps, from the start of the task."""
+LIVE: Final = Part(last=0, live=True)
+"""No step, for a live session."""

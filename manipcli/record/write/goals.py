@@ -61,10 +61,10 @@ class GoalLog:
             writer.u8(goal.status)
         return writer.data
 
-    def feedback(self, ns: int, number: int, feedback: Feedback) -> bytes:
-        """The FeedbackMessage of the controller's action."""
+    def feedback(self, ns: int, number: int | None, feedback: Feedback) -> bytes:
+        """The FeedbackMessage of the controller's action; without a number, with an id of zeros."""
         writer = CdrWriter()
-        writer.octets(self._goals[number].id)
+        writer.octets(bytes(16) if number is None else self._goals[number].id)
         if self.channel.action == "gripper_cmd":
             self._joint_state(writer, ns, feedback)
             return writer.data

@@ -10,7 +10,7 @@ Times are nanoseconds of simulated time: round(tick * period * 1e9); log time = 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +25,7 @@ from manipcli.record.channels import TRANSIENT_LOCAL, Channel, ControllerChannel
 from manipcli.record.contents import RECORD, Contents
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.recording import TaskEvent
-from manipcli.record.schemas import schema_text
+from manipcli.record.schemas import ACTIONS, schema_text
 from manipcli.record.selection import EVERYTHING, Selection, word
 from manipcli.record.write.block import Block, Single
 from manipcli.record.write.container import Container
@@ -50,6 +50,10 @@ class Recorder:
         metadata: name -> key -> value, known before the run.
         selection: recorded topics and their rates.
         overwrite: replace a recording or partial recording at this path.
+        live: the recording is that of a live session, and has its commands.
+
+    Attributes:
+        listener: called with the topic, time [ns] and CDR bytes of each message that is not written at every tick.
 
     Raises:
         RecordingRefused: the path cannot or must not be written.
@@ -68,9 +72,11 @@ class Recorder:
         metadata: Mapping[str, Mapping[str, str]],
         selection: Selection = EVERYTHING,
         overwrite: bool = False,
+        live: bool = False,
     ) -> None:
+        self.listener: Callable[[str, int, bytes], None] = _nobody
         _check_names(path, robot, scene, [name for name, _, _ in attachments])
-        everything = channel_table(controllers)
+        everything = channel_table(controllers, live=live)
         table = [channel for channel in everything if selection.holds(channel)]
         self._period = period
         self._ids = {channel.topic: channel.id for channel in table}
@@ -143,6 +149,12 @@ class Recorder:
         self._single(topics.EVENTS, ns, messages.event_message(ns, event))
         self._single(topics.ROSOUT, ns, messages.log_message(ns, event))
 
+    def live_command(self, tick: int, *, op: str, name: str, id_: str, json: str) -> None:
+        """Record a command from outside that takes effect at `tick`."""
+        ns = self._ns(tick)
+        data = messages.live_command_message(ns, tick, op, name, id_, json)
+        self._single(topics.LIVE_COMMANDS, ns, data)
+
     def goal_sent(self, tick: int, controller: str) -> int:
         """Record that a controller accepted a goal before `tick`; returns its number in the log."""
         ns, goals = self._ns(tick), self._goals[controller]
@@ -154,6 +166,12 @@ class Recorder:
         """Record the feedback of a goal; ROS action servers publish it at 20 Hz."""
         ns, goals = self._ns(tick), self._goals[controller]
         self._single(goals.channel.feedback_topic, ns, goals.feedback(ns, number, feedback))
+
+    def feedback_message(self, tick: int, controller: str, feedback: Feedback) -> tuple[bytes, str]:
+        """The message of `goal_feedback` without a goal id, and its type; it is not recorded."""
+        goals = self._goals[controller]
+        kind, _ = ACTIONS[goals.channel.action]
+        return goals.feedback(self._ns(tick), None, feedback), kind
 
     def goal_ended(self, tick: int, controller: str, number: int, result: GoalResult, feedback: Feedback) -> None:
         """Record the end of a goal; `feedback`: final state of the joints."""
@@ -237,11 +255,16 @@ class Recorder:
         return round(tick * self._period * 1e9)
 
     def _single(self, topic: str, ns: int, data: bytes) -> None:
+        self.listener(topic, ns, data)
         channel = self._ids.get(topic)
         if channel is None:  # left out
             return
         self._sequences[channel] += 1
         self._singles.append(Single(ns, channel, message_record(channel, self._sequences[channel], ns, data)))
+
+
+def _nobody(topic: str, ns: int, data: bytes) -> None:
+    """Listens to nothing."""
 
 
 def _declare(container: Container, table: Sequence[Channel]) -> None:

@@ -1,0 +1,104 @@
+"""What leaves the control loop: copies of its state at 100 Hz, and the messages that the log gets at events.
+
+The loop only copies numbers, and only while somebody subscribes to them; the thread of the network encodes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from manipcli.control.controller import ControllerOutput
+from manipcli.core.geometry import Array
+from manipcli.model.state import Contact, WorldState
+from manipcli.simulate.session import Observer
+
+SAMPLE_PERIOD: Final = 0.01
+"""[s] Simulated time between two samples."""
+KEPT_SAMPLES: Final = 50
+KEPT_MESSAGES: Final = 1000
+"""Samples and messages that wait for the thread of the network; the oldest are dropped."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The state of one tick; `rows`: those of each controller, None while it is inactive."""
+
+    tick: int
+    numbers: Array
+    rows: tuple[Array | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A message of the log in CDR."""
+
+    topic: str
+    data: bytes
+
+
+class Feed:
+    """An observer of the session that also serves the network.
+
+    Args:
+        period: [s] of the control loop.
+
+    Attributes:
+        observer: the observer that sees each tick first.
+        wanted: whether somebody subscribes to a topic of samples.
+        tick_now: the last tick.
+        dropped: samples and messages that nobody took in time.
+    """
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+        self.observer: Observer | None = None
+        self.wanted = False
+        self.tick_now = 0
+        self.dropped = 0
+        self._every = max(1, round(SAMPLE_PERIOD / period))
+        self._samples: deque[Sample] = deque()
+        self._events: deque[Event] = deque()
+        self._wake: Callable[[], object] = threading.Event().set
+
+    def listen(self, wake: Callable[[], object]) -> None:
+        """Call `wake`, in the thread of the control loop, when there is something to take."""
+        self._wake = wake
+
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
+        if self.observer is not None:
+            self.observer.tick(tick, state, outputs)
+        self.tick_now = tick
+        if not self.wanted or tick % self._every:
+            return
+        rows = tuple(None if output is None else output.rows.copy() for output in outputs)
+        self._put(self._samples, KEPT_SAMPLES, Sample(tick, state.numbers.copy(), rows))
+
+    def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
+        if self.observer is not None:
+            self.observer.contacts(tick, contacts)
+
+    def message(self, topic: str, ns: int, data: bytes) -> None:
+        """Takes each message that the recorder writes at an event."""
+        self._put(self._events, KEPT_MESSAGES, Event(topic, data))
+
+    def _put(self, queue: deque[Sample] | deque[Event], kept: int, item: Sample | Event) -> None:
+        if len(queue) >= kept:
+            queue.popleft()
+            self.dropped += 1
+        queue.append(item)  # type: ignore[arg-type]
+        self._wake()
+
+    def take(self) -> tuple[list[Event], list[Sample]]:
+        """All that waits; called in the thread of the network."""
+        found: tuple[list[Event], list[Sample]] = ([], [])
+        for queue, items in ((self._events, found[0]), (self._samples, found[1])):
+            try:
+                while True:
+                    items.append(queue.popleft())  # type: ignore[arg-type]
+            except IndexError:
+                pass
+        return found

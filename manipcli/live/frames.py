@@ -1,0 +1,56 @@
+"""Frames of a client: JSON objects within limits of size and depth."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any, Final
+
+MAX_FRAME: Final = 1 << 20
+"""Largest frame [byte]; a larger one closes the connection."""
+MAX_DEPTH: Final = 32
+"""Deepest nesting of a frame."""
+_BRACKETS = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}]', re.DOTALL)
+"""A text, or a bracket; an open text ends with the frame, so that the search is linear."""
+
+
+class BadFrame(ValueError):
+    """A frame that is not a JSON object within the limits."""
+
+
+def read_frame(frame: str | bytes) -> dict[str, Any]:
+    """The JSON object of a text frame.
+
+    Raises:
+        BadFrame: a binary frame, invalid or too deep JSON, NaN or infinity, or something else than an object.
+    """
+    if not isinstance(frame, str):
+        raise BadFrame("binary frames are not supported; send JSON as text")
+    if _too_deep(frame):
+        raise BadFrame(f"the JSON is nested deeper than {MAX_DEPTH}")
+    try:
+        found = json.loads(frame, parse_constant=_refuse)
+    except BadFrame:
+        raise
+    except ValueError as error:  # also for numbers of too many digits
+        raise BadFrame(f"invalid JSON: {str(error)[:120]}") from None
+    if not isinstance(found, dict):
+        raise BadFrame(f"the frame is a {type(found).__name__}; expected an object with an op")
+    return found
+
+
+def _refuse(word: str) -> None:
+    raise BadFrame(f"{word} is not JSON")
+
+
+def _too_deep(text: str) -> bool:
+    """Whether brackets outside of texts are nested deeper than the limit."""
+    if text.count("[") + text.count("{") <= MAX_DEPTH:
+        return False
+    depth = 0
+    for found in _BRACKETS.finditer(text):
+        first = text[found.start()]
+        depth += 1 if first in "[{" else -1 if first in "]}" else 0
+        if depth > MAX_DEPTH:
+            return True
+    return False

@@ -1,0 +1,96 @@
+"""Control loop of a live session: commands of a source, one tick, the wait for the next.
+
+The same loop serves clients and simulates a session again from its log; only the source of commands differs. What
+enters between two ticks depends on nothing else, so both give the same messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import SimulationFailed
+from manipcli.judge.steps import RunStatus
+from manipcli.live.command import END, Command
+from manipcli.live.feed import Feed
+from manipcli.live.obey import Obedience
+from manipcli.live.pace import Pace
+from manipcli.live.source import Source
+from manipcli.record.write.recorder import Recorder
+from manipcli.run.execute import SimulationEnd, live_world, open_session, record_saturations
+from manipcli.run.live_conditions import Live
+from manipcli.run.observer import SILENT, Observer
+from manipcli.task.plan_task import Plan
+from manipcli.task.task import Task
+
+STARTED: Final = "the controllers hold, and obey commands"
+
+
+def _never() -> None: ...
+
+
+@dataclass(slots=True)
+class Outside:
+    """What a session has outside of the simulation.
+
+    Attributes:
+        source: of its commands.
+        feed: takes what clients see.
+        pace: of the loop.
+        between: called before each tick; raises KeyboardInterrupt to end the session.
+        ready: called before the scene is opened; commands wait until it has settled.
+        failure: why the simulation failed; "" if it did not.
+    """
+
+    source: Source
+    feed: Feed
+    pace: Pace
+    between: Callable[[], None] = field(default=_never)
+    ready: Callable[[], None] = field(default=_never)
+    failure: str = ""
+
+
+def simulate_live(
+    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, outside: Outside
+) -> SimulationEnd:
+    """Open the scene and hold, obeying commands, until the session ends or the simulation fails.
+
+    A session that ends as asked, also by a signal, is complete.
+    """
+    outside.ready()  # before the scene is open: from there on stdout is stderr, for the engine
+    try:
+        with open_session(task, plan, manager) as session:
+            live = Live(live_world(task, plan, session), manager.controllers, session.period)
+            observer = Observer(recorder, live, SILENT, session.period)
+            outside.feed.observer = observer
+            session.restart_clock(outside.feed)
+            recorder.listener = outside.feed.message
+            recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
+            obedience = Obedience(session, recorder, observer.goal)
+            try:
+                outside.pace.start()
+                while _obeyed(session.ticks, obedience, outside):
+                    session.tick()
+                    obedience.after_tick()
+                    outside.pace.wait()
+            finally:
+                record_saturations(session, recorder)
+    except SimulationFailed as failure:
+        outside.failure = str(failure)
+        return SimulationEnd(RunStatus.FAILED, outside.failure, 0.0)
+    return SimulationEnd(RunStatus.COMPLETE, "", 0.0)
+
+
+def _obeyed(tick: int, obedience: Obedience, outside: Outside) -> bool:
+    """Carry out the commands of a tick; False where the session ends. It has at least one tick."""
+    if tick == 0:
+        return all(obedience.obey(command) for command in outside.source.take(tick))
+    try:
+        outside.between()
+        over = outside.pace.over
+    except KeyboardInterrupt:
+        over = True
+    commands = [Command(END, "")] if over else outside.source.take(tick)
+    return all(obedience.obey(command) for command in commands)

@@ -1,0 +1,82 @@
+"""What waits to be sent to one client: bounded for each topic, the oldest message is dropped."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Final
+
+MAX_QUEUE: Final = 100
+"""Longest queue of a topic that a client can ask for."""
+MAX_ANSWERS: Final = 2000
+"""Answers that wait; a client that does not read them is disconnected."""
+
+
+@dataclass(slots=True)
+class Subscription:
+    """One topic of one client.
+
+    Attributes:
+        topic: its name.
+        throttle: [s] least wall time between two messages.
+        waiting: texts, at most as many as the client asked for.
+        dropped: texts that were replaced by later ones.
+    """
+
+    topic: str
+    throttle: float
+    waiting: deque[str]
+    dropped: int = 0
+    next: float = 0.0
+
+    def offer(self, text: str, now: float) -> bool:
+        """Queue a text unless it comes too early after the last one; `now`: wall time [s]."""
+        if now < self.next:
+            return False
+        self.next = max(self.next + self.throttle, now - self.throttle) if self.throttle else 0.0
+        if len(self.waiting) == self.waiting.maxlen:
+            self.dropped += 1
+        self.waiting.append(text)
+        return True
+
+
+@dataclass(slots=True)
+class Outbox:
+    """Answers, then messages of topics in turn.
+
+    Attributes:
+        subscriptions: by topic.
+        full: whether the client has not read its answers.
+    """
+
+    subscriptions: dict[str, Subscription] = field(default_factory=dict)
+    full: bool = False
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+    _answers: deque[str] = field(default_factory=deque)
+
+    def answer(self, text: str) -> None:
+        """Queue an answer; answers are never dropped."""
+        if len(self._answers) >= MAX_ANSWERS:
+            self.full = True
+        else:
+            self._answers.append(text)
+        self.ready.set()
+
+    def publish(self, topic: str, text: str, now: float) -> None:
+        """Queue a message for a subscriber."""
+        subscription = self.subscriptions.get(topic)
+        if subscription is not None and subscription.offer(text, now):
+            self.ready.set()
+
+    def take(self) -> list[str]:
+        """All answers, and the next message of each topic."""
+        self.ready.clear()
+        found = [*self._answers]
+        self._answers.clear()
+        for subscription in [*self.subscriptions.values()]:
+            if subscription.waiting:
+                found.append(subscription.waiting.popleft())
+                if subscription.waiting:
+                    self.ready.set()
+        return found

@@ -1,0 +1,86 @@
+"""`manipcli serve` and `manipcli topic`: the address on stdout, one message that moves the arm, ends and refusals."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from manipcli.cli.app import main
+from manipcli.record.read.reading import read_recording
+from tests.conftest import RunCli
+from tests.live.sessions import ROOT, SMALL
+
+TOPIC, TYPE = "/arm_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory"
+MESSAGE = (
+    "{joint_names: [joint_1, joint_2, joint_3, joint_4, joint_5, joint_6, joint_7], "
+    "points: [{positions: [0.1, 0.1, 0, -1.6, 0, -0.1, 0], time_from_start: {sec: 0, nanosec: 500000000}}]}"
+)
+
+
+def test_a_published_message_moves_the_arm_and_a_signal_ends_the_session_well(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "small.yaml").write_text(SMALL)
+    command = [sys.executable, "-m", "manipcli", "serve", "small.yaml", "--port", "0", "--speed", "max"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        assert url.startswith("ws://127.0.0.1:")
+        assert main(["topic", "list", "--url", url]) == 0
+        assert TOPIC in capfd.readouterr().out
+        assert main(["topic", "pub", "--once", TOPIC, TYPE, MESSAGE, "--url", url]) == 0
+        reader = url.partition("?")[0]
+        assert main(["topic", "pub", "--once", TOPIC, TYPE, MESSAGE, "--url", reader]) == 1
+        assert "may only read" in capfd.readouterr().err
+        assert main(["topic", "pub", "--once", TOPIC, TYPE, "{joint_names: [elbow]}", "--url", url]) == 1
+        assert main(["topic", "echo", "--once", "/joint_states", "--url", reader]) == 0
+        assert '"joint_1"' in capfd.readouterr().out
+        process.send_signal(signal.SIGTERM)
+        out, told = process.communicate(timeout=60)
+    assert process.returncode == 0, told
+    assert "session ended" in out
+    assert "Traceback" not in told
+    states = read_recording(tmp_path / "runs/small@live.mcap").states
+    assert states.position[0, 0] == pytest.approx(0.0, abs=0.01)
+    assert states.position[:, 0].max() > 0.001
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["--speed", "fast"], "USE130"),
+        (["--speed", "0"], "USE130"),
+        (["--open", "--host", "0.0.0.0"], "USE133"),
+        (["--token-file", "short"], "USE134"),
+        (["--host", "no.such.host.invalid"], "USE131"),
+    ],
+)
+def test_bad_options_are_refused(words: list[str], code: str, call_cli: RunCli, tmp_path: Path) -> None:
+    (tmp_path / "small.yaml").write_text(SMALL)
+    (tmp_path / "short").write_text("12345\n")
+    ran = call_cli("serve", "small.yaml", *words, cwd=tmp_path)
+    assert (ran.code, code in ran.err) == (4, True), ran.err
+
+
+def test_a_port_in_use_is_named_and_leaves_no_log(call_cli: RunCli, tmp_path: Path) -> None:
+    (tmp_path / "small.yaml").write_text(SMALL)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        ran = call_cli("serve", "small.yaml", "--port", port, "--log", "a.mcap", cwd=tmp_path)
+    assert (ran.code, f"port {port} of 127.0.0.1 is already in use" in ran.err) == (4, True)
+    assert [*tmp_path.glob("a.mcap*")] == []
+
+
+@pytest.mark.parametrize("words", [["echo"], ["pub", TOPIC, TYPE, MESSAGE], ["pub", "--once", TOPIC]])
+def test_topic_says_what_is_missing(words: list[str], call_cli: RunCli, tmp_path: Path) -> None:
+    ran = call_cli("topic", *words, cwd=tmp_path)
+    assert (ran.code, "USE135" in ran.err) == (4, True)

@@ -1,0 +1,248 @@
+"""Clients of raw WebSockets: goals, topics, rights, limits, and malformed frames beside a good client."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from manipcli import pipeline
+from manipcli.live import server
+from manipcli.live.source import recorded_commands
+from manipcli.record.foreign.topics import open_topics
+from tests.live.sessions import HOME, opened, serving, trajectory
+
+ARM = [f"joint_{k}" for k in range(1, 8)]
+GOAL = "/arm_controller/follow_joint_trajectory"
+
+
+def recorded_ops(log: Path) -> list[str]:
+    """The ops of the commands in a log."""
+    schedule = recorded_commands(log, 0.001, failed=True)
+    return [command.op for tick in range(10**6) for command in schedule.take(tick)]
+
+
+def test_goals_have_feedback_results_and_codes_and_the_log_simulates_the_same(tmp_path: Path) -> None:
+    async def use(url: str) -> None:
+        client = await opened(url)
+
+        async def goal(id_: str, joints: list[str], positions: list[float], seconds: float) -> None:
+            args = {"trajectory": trajectory(joints, positions, seconds)}
+            kind = "control_msgs/action/FollowJointTrajectory"
+            await client.send(op="send_action_goal", id=id_, action=GOAL, action_type=kind, args=args, feedback=True)
+
+        near = [value + 0.05 for value in HOME]
+        await goal("a", ARM, near, 0.4)
+        done = await client.until(op="action_result", id="a")
+        assert (done["status"], done["result"], done["values"]["error_code"]) == (4, True, 0)
+        feedback = [message for message in client.others if message["op"] == "action_feedback"]
+        assert len(feedback) >= 5
+        assert feedback[0]["values"]["joint_names"] == ARM
+
+        await goal("b", ARM, [*HOME], 5.0)
+        await goal("c", ARM, near, 5.0)
+        preempted = await client.until(op="action_result", id="b")
+        assert (preempted["status"], preempted["values"]["error_string"]) == (6, "preempted by a new goal")
+        await client.send(op="cancel_action_goal", id="c", action=GOAL)
+        assert (await client.until(op="action_result", id="c"))["status"] == 5
+
+        await goal("d", ["elbow", *ARM[1:]], near, 1.0)
+        unknown = await client.until(op="action_result", id="d")
+        assert (unknown["result"], unknown["values"]["error_code"]) == (False, -2)
+        await goal("e", ARM, [9.0] * 7, 1.0)
+        assert (await client.until(op="action_result", id="e"))["values"]["error_code"] == -1
+
+        switched = await client.call(
+            "/controller_manager/switch_controller", deactivate_controllers=["arm_controller"], strictness=2
+        )
+        assert switched["values"] == {"ok": True, "message": ""}
+        listed = await client.call("/controller_manager/list_controllers")
+        states = {each["name"]: each["state"] for each in listed["values"]["controller"]}
+        assert states == {"arm_controller": "inactive", "hand_controller": "active"}
+        await client.socket.close()
+
+    log = serving(tmp_path, use)
+    sent = ["send_action_goal"] * 5
+    assert recorded_ops(log) == [*sent[:3], "cancel_action_goal", *sent[3:], "call_service", "end"]
+    package = Path(__file__).parents[2] / "robots"
+    assert pipeline.verify_log(log, package_path=[package]).identical
+
+
+def test_topics_have_the_messages_of_the_log(tmp_path: Path) -> None:
+    seen: list[dict[str, Any]] = []
+
+    async def use(url: str) -> None:
+        client = await opened(url)
+        names = (await client.call("/rosapi/topics"))["values"]
+        types = dict(zip(names["topics"], names["types"], strict=True))
+        assert types["/joint_states"] == "sensor_msgs/msg/JointState"
+        assert types["/arm_controller/joint_trajectory"] == "trajectory_msgs/msg/JointTrajectory"
+        await client.send(op="subscribe", topic="/robot_description")
+        assert "<robot" in (await client.until(topic="/robot_description"))["msg"]["data"]
+        await client.send(op="subscribe", topic="/nothing", id="s")
+        assert "not published" in (await client.until(op="status", id="s"))["msg"]
+        for topic in ("/joint_states", "/tf", "/clock", "/arm_controller/controller_state"):
+            await client.send(op="subscribe", topic=topic, type=types[topic])
+            seen.append(await client.until(op="publish", topic=topic))
+        await client.socket.close()
+
+    log = serving(tmp_path, use)
+    content = open_topics(log)
+    for message in seen:
+        if message["topic"] == "/clock":
+            continue
+        from manipcli.record.json_message import definition, to_json
+
+        kind = definition(content.all[message["topic"]].type)
+        recorded = [
+            to_json(kind, data[start : start + length])
+            for _, data, places in content.messages([message["topic"]])
+            for start, length in zip(places.starts.tolist(), places.lengths.tolist(), strict=True)
+        ]
+        assert message["msg"] in recorded
+
+
+def test_without_the_token_a_client_only_reads(tmp_path: Path) -> None:
+    async def use(url: str) -> None:
+        plain = url.partition("?")[0]
+        reader = await opened(plain)
+        await reader.send(op="subscribe", topic="/joint_states")
+        await reader.until(op="publish", topic="/joint_states")
+        msg = trajectory(ARM, HOME, 1.0)
+        await reader.send(op="publish", topic="/arm_controller/joint_trajectory", msg=msg, id="p")
+        assert "may only read" in (await reader.until(op="status", id="p"))["msg"]
+        switched = await reader.call("/controller_manager/switch_controller", deactivate_controllers=["arm_controller"])
+        assert switched["result"] is False
+        for options in ({"origin": "http://evil.example"}, {"additional_headers": {"Host": "evil.example"}}):
+            with pytest.raises(InvalidStatus, match=r"HTTP 40[03]"):
+                await connect(plain, **options)  # type: ignore[arg-type]
+        with pytest.raises(InvalidStatus, match="401"):
+            await connect(f"{plain}?token=wrong")
+        await reader.socket.close()
+
+    assert recorded_ops(serving(tmp_path, use)) == ["end"]
+
+
+def malformed(draw: random.Random) -> str | bytes:
+    """A frame that is not a valid command."""
+    junk: list[Any] = [None, True, -1, 1e308, 2**70, "", "x" * 300, "\0", [], {}, [[]], {"a": [1]}, "NaN", "\ud800"]
+    some = lambda: draw.choice(junk)  # noqa: E731
+    bad_goal = trajectory(ARM, HOME, 1.0)
+    bad_goal["points"][0]["positions"][draw.randrange(7)] = draw.choice([None, True, "1", [], {}, 10**400])
+    topic = "/arm_controller/joint_trajectory"
+    choices: list[Any] = [
+        some(),
+        {"op": some()},
+        {"op": "publish", "topic": some(), "msg": some()},
+        {"op": "publish", "topic": topic, "msg": bad_goal},
+        {"op": "publish", "topic": topic, "msg": {"points": {"positions": [0]}, "joint_names": some()}},
+        {"op": "subscribe", "topic": some(), "throttle_rate": some(), "queue_length": some()},
+        {"op": "subscribe", "topic": "/tf", "throttle_rate": draw.choice([-1, "x", [], 1e308, None])},
+        {"op": "call_service", "service": some(), "args": some(), "id": some()},
+        {"op": "call_service", "service": "/rosapi/topic_type", "args": some()},
+        {"op": "call_service", "service": "/controller_manager/switch_controller", "args": {"strictness": "x"}},
+        {"op": "send_action_goal", "action": GOAL, "id": draw.choice([None, 1, "", [], "x" * 999]), "args": {}},
+        {"op": "send_action_goal", "action": GOAL, "id": "z", "args": {"trajectory": some() or 0}},
+        {"op": "cancel_action_goal", "action": some(), "id": some()},
+        {"op": "set_level", "level": some()},
+    ]
+    text = json.dumps(draw.choice(choices))
+    match draw.randrange(8):
+        case 0:
+            return text[: draw.randrange(len(text))] + "{"
+        case 1:
+            return draw.choice(["[", '{"op":']) * draw.choice([40, 3000, 100_000])
+        case 2:
+            return draw.randbytes(draw.randrange(1, 200))
+        case 3:
+            return '{"op":"publish","topic":"TOPIC","msg":{"points":[{"positions":[NaN]}]}}'.replace("TOPIC", topic)
+        case 4:
+            return '{"op":"subscribe","topic":"/tf","x":[' + "0," * 50_000 + "0]}"
+    return text
+
+
+def test_malformed_frames_disturb_no_other_client_and_are_no_commands(tmp_path: Path) -> None:
+    async def attack(url: str, seed: int, frames: int) -> None:
+        draw = random.Random(seed)
+        socket = await connect(url)
+        reading = asyncio.create_task(read(socket))
+        for _ in range(frames):
+            try:
+                await socket.send(malformed(draw))
+            except ConnectionClosed:
+                socket = await connect(url)
+                reading = asyncio.create_task(read(socket))
+        await socket.close()
+        await reading
+
+    async def read(socket: Any) -> None:
+        try:
+            async for text in socket:
+                assert "Traceback" not in text
+        except ConnectionClosed as closed:
+            assert closed.rcvd is None or closed.rcvd.code in (1000, 1007, 1008, 1009)
+
+    async def use(url: str) -> None:
+        good = await opened(url)
+        await good.send(op="subscribe", topic="/joint_states", throttle_rate=5, queue_length=100)
+        attackers = asyncio.gather(*(attack(url, seed, 500) for seed in range(4)))
+        count = 0
+        while not attackers.done():
+            await good.until(op="publish", topic="/joint_states")
+            count += 1
+        await attackers
+        assert count > 10
+        assert [message for message in good.others if "dropped" not in message.get("msg", "")] == []
+        assert (await good.call("/rosapi/nodes"))["values"] == {"nodes": ["/manipcli"]}
+        await good.socket.close()
+
+    assert recorded_ops(serving(tmp_path, use)) == ["end"]
+
+
+def test_a_large_frame_closes_the_connection(tmp_path: Path) -> None:
+    async def use(url: str) -> None:
+        client = await opened(url)
+        with pytest.raises(ConnectionClosed, match="1009"):
+            await client.socket.send(" " * (2 << 20))
+            await client.socket.recv()
+
+    serving(tmp_path, use)
+
+
+def test_the_hand_closes_by_its_action(tmp_path: Path) -> None:
+    async def use(url: str) -> None:
+        client = await opened(url)
+        action = "/hand_controller/gripper_cmd"
+        for id_, name, expected in (("a", [], 4), ("b", ["thumb"], 6)):
+            args = {"command": {"name": name, "position": [0.3]}}
+            await client.send(op="send_action_goal", id=id_, action=action, args=args)
+            result = await client.until(op="action_result", id=id_)
+            assert result["status"] == expected
+            if expected == 4:
+                assert result["values"]["reached_goal"] is True
+                assert result["values"]["state"]["position"] == pytest.approx([0.3] * 6, abs=0.05)
+            else:
+                assert result["values"]["error_code"] == -2
+
+    serving(tmp_path, use)
+
+
+def test_a_client_that_never_reads_is_disconnected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "UNREAD", 0.3)
+
+    async def use(url: str) -> None:
+        deaf = await connect(url, max_queue=1)
+        with pytest.raises(ConnectionClosed):
+            while True:  # each is answered with the whole description
+                await deaf.send(json.dumps({"op": "subscribe", "topic": "/robot_description"}))
+                await asyncio.sleep(0.002)
+        good = await opened(url)
+        assert (await good.call("/rosapi/nodes"))["result"] is True
+
+    serving(tmp_path, use)
