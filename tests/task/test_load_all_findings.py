@@ -485,7 +485,7 @@ expect:
         "write `$thing`: 'thing' is a parameter",
         "name the body, 'cup'; where the step has `part`, add `part: rim`",
         "name a step in it: r[0]/pick_1, r[0]/lift_1, r[0]/wait_1",
-        "did you mean 'r[0]'?",
+        "rounds: r[0]",
     )
     assert [(line, text[text.index(hint) :]) for (line, _, text), hint in zip(found, hints, strict=False)] == [
         (10, hints[0]), (11, hints[1]), (13, hints[2]), (15, hints[3])
