@@ -206,8 +206,8 @@ def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Sea
         named.append((("during",) if isinstance(spec.during, str) else ("during", k), name))
     for loc, name in named:
         if context.steps is not None and name not in context.steps:
-            blocks = () if loc == ("at",) else context.blocks  # a block that ends with a branch has no last step
-            known = (*context.steps, END) if loc == ("at",) else (*context.steps, *blocks)
+            blocks = context.blocks
+            known = (*context.steps, *blocks, *((END,) if loc == ("at",) else ()))
             rounds = [block for block in blocks if block.startswith(f"{name.rpartition('[')[0]}[")]
             rounds = [block for block in rounds if "/" not in block.removeprefix(name.rpartition("[")[0])]
             near = f"rounds: {listed(rounds)}" if rounds and name.endswith("]") else None

@@ -102,7 +102,6 @@ JAMMED: list[tuple[str, Change]] = [
     ("a hand that rubs", lambda world: world.jam(0.0, friction=200.0)),
     ("a hand that springs back", lambda world: world.jam(0.0, spring=1e5)),
 ]
-HALF = (("xyz: [0.5, 0.05, 0.22]", "xyz: [0.5, 0.05, 0.22], rpy: [30 deg, 0, 0]"),)
 WORLDS = [
     *(World("pick", name, "lift_1" if held else "pick_1", true) for name, held, true in GRASPS),
     *(World("grasp", name, "lift_1" if held else "grasp_1", true) for name, held, true in GRASPS),
@@ -121,7 +120,7 @@ WORLDS = [
     World("place", "no slab", "place_1", ("scene.slab.pose.xyz=[0.5, 0.25, 0.22]",), says="40.* mm lower"),
     World("place", "a slab below", "place_1", ("scene.slab.pose.xyz=[0.5, 0.05, 0.205]",), says="15.* mm lower"),
     World("place", "a slab beside", "place_1", ("scene.slab.pose.xyz=[0.5, 0.12, 0.22]",), says="from its place"),
-    World("place", "a slope", "place_1", HALF),
+    World("place", "a slab deep below", "place_1", ("scene.slab.pose.xyz=[0.5, 0.05, 0.18]",), says="40.* mm lower"),
     World("place", "a bar on the slab", "place_1", (fixed("bar", "1 cm, 9 cm, 1 cm", "0.492, 0.05, 0.245"),)),
     World("place", "an occupied place", "place_1", (fixed("other", "3 cm, 3 cm, 5 cm", "0.5, 0.05, 0.265"),)),
     *at_start("release", "release_1", *JAMMED, says="the hand did not open|still holds"),

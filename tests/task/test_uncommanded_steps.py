@@ -28,7 +28,11 @@ def told(tmp_path: Path, claims: str, steps: str, *, robot: Path = ROOT / "robot
     try:
         load_task(file, allow_outside=True)
     except InvalidInput as refused:
-        return [f"{f.code} {f.place.line if f.place else 0} {f.message} | {f.hint}" for f in refused.findings]
+        return [
+            f"{f.code} {f.place.line if f.place else 0} {f.message} | {f.hint}"
+            for f in refused.findings
+            if not f.code.startswith("TASK31")  # what the hand holds is another matter
+        ]
     return []
 
 

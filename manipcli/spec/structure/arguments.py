@@ -75,6 +75,12 @@ def _values(
         if entry is not None:
             path: Loc = (*at, "with", param.name)
             node = mapped(entry.node, outer.computed, path)
+            if (
+                isinstance(param.default, ScalarNode)
+                and param.default.written is None
+                and not names_used(param.default)
+            ):
+                _check_default(param, param.default, reports, bodies)
         elif param.default is not None:
             path = ("params", param.name, "default")
             node = mapped(param.default, outer.inner(values, lost=lost, isolated=True).computed, path)
@@ -88,3 +94,11 @@ def _values(
             reports.at(error.number, path, error.node, error.message, error.hint)
             lost.add(param.name)
     return outer.inner(values, lost=lost, isolated=True)
+
+
+def _check_default(param: Param, default: Node, reports: Reports, bodies: Collection[str]) -> None:
+    """A faulty default is an error where a value is given, too: the next use may need it."""
+    try:
+        check(param, default, bodies)
+    except Wrong as error:
+        reports.at(error.number, ("params", param.name, "default"), error.node, error.message, error.hint)

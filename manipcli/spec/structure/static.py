@@ -10,6 +10,7 @@ import math
 from collections.abc import Collection
 from typing import Final
 
+from manipcli.core.text import escape, nearest
 from manipcli.core.units import NUMBER, Quantity, UnitError
 from manipcli.spec.expression import names_used, quantity_of
 from manipcli.spec.source.tree import MappingNode, Node, Scalar, ScalarNode, SequenceNode, child, shown
@@ -46,9 +47,15 @@ def decided(condition: Node) -> bool | Node:
     """
     if isinstance(condition, ScalarNode) and isinstance(condition.value, bool):
         return condition.value
-    if not isinstance(condition, MappingNode) or len(condition.entries) != 1:
+    if not isinstance(condition, MappingNode) or not condition.entries:
+        return condition
+    if len(condition.entries) > 1:
+        if EQUAL in condition.entries:
+            raise Undecidable(condition, "`equal` takes a list of two values", "write `equal: [$color, red]`")
         return condition
     ((word, entry),) = condition.entries.items()
+    if word != EQUAL and nearest(word, [EQUAL]):
+        raise Undecidable(condition, f"unknown condition '{escape(word)}'", f"did you mean '{EQUAL}'?")
     if word == EQUAL:
         return _equal(entry.node)
     if word == "not":

@@ -117,6 +117,8 @@ def _beside(key: str, word: str, wanted: Collection[str]) -> str | None:
     """Hint for an unknown key next to a word."""
     if word == "if" and key in ("elif", "elseif", "else_if", "elsif"):
         return "write `else: [{if: {CONDITION}, then: [...]}]`"
+    if word == "do" and key in ("params", "parameters", "args", "arguments"):
+        return "write `with: {...}`: the values of the parameters of the sub-task"
     if word == "do" and not nearest(key, wanted):
         return f"put a parameter of the sub-task below `with`: `with: {{{escape(key)}: ...}}`"
     return did_you_mean(key, wanted, kind=f"keys next to `{word}`") or _usual(word)
