@@ -2,50 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeGuard
-
-import numpy.typing as npt
+from typing import Final
 
 from manipcli.control.controller import Controller
+from manipcli.live.endpoint import Endpoint
+from manipcli.live.interfaces import controller_manager, controllers
 from manipcli.record import schemas
 from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
-from manipcli.run.run_log import action_of
+from manipcli.task.task import Task
 
 CLOCK: Final = "/clock"
-LIST_CONTROLLERS: Final = "/controller_manager/list_controllers"
-SWITCH_CONTROLLER: Final = "/controller_manager/switch_controller"
-_SERVICES = {
-    LIST_CONTROLLERS: "controller_manager_msgs/srv/ListControllers",
-    SWITCH_CONTROLLER: "controller_manager_msgs/srv/SwitchController",
-}
-_ACTIONS = {
-    "follow_joint_trajectory": "control_msgs/action/FollowJointTrajectory",
-    "gripper_cmd": "control_msgs/action/ParallelGripperCommand",
-}
+INTERFACES: Final = (controllers.endpoints, controller_manager.endpoints)
+"""Groups of endpoints: (task, controllers) -> its endpoints."""
 
 
-class Commanded(Controller, Protocol):
-    """A controller that takes one value per joint."""
-
-    def set_command(self, values: npt.ArrayLike) -> None:
-        """Set the command from the next update on.
-
-        Raises:
-            InvalidArgument: not one finite number per joint.
-        """
-        ...
-
-
-def is_commanded(controller: Controller) -> TypeGuard[Commanded]:
-    """Whether it has a topic for commands."""
-    return hasattr(controller, "set_command")
+def endpoints_of(task: Task, loaded: Sequence[Controller]) -> tuple[Endpoint, ...]:
+    """All endpoints of a robot with these controllers."""
+    return tuple(endpoint for interface in INTERFACES for endpoint in interface(task, loaded))
 
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """Names and types; read by all threads.
+    """Names and types; plain data, read by all threads.
 
     Attributes:
         published: topics that clients can subscribe, and their types.
@@ -61,7 +41,7 @@ class Offer:
     received: Mapping[str, str]
     actions: Mapping[str, str]
     services: Mapping[str, str]
-    readers: frozenset[str] = frozenset({LIST_CONTROLLERS})
+    readers: frozenset[str]
 
     @property
     def topics(self) -> dict[str, str]:
@@ -69,24 +49,19 @@ class Offer:
         return {**self.published, **self.received}
 
 
-def offer_of(controllers: Sequence[Controller], recorded: Sequence[Recorded]) -> Offer:
-    """The interface of a robot with these controllers; `recorded`: their channels in the log."""
+def offer_of(endpoints: Iterable[Endpoint], recorded: Sequence[Recorded]) -> Offer:
+    """The offer with these endpoints; `recorded`: channels of controllers in the log."""
     table = [channel for channel in channel_table(recorded) if channel.topic != LIVE_COMMANDS]
-    received, actions = {}, {}
-    for controller in controllers:
-        action = action_of(controller)
-        if action:
-            actions[f"/{controller.name}/{action}"] = _ACTIONS[action]
-        if action == "follow_joint_trajectory":
-            received[f"/{controller.name}/joint_trajectory"] = schemas.JOINT_TRAJECTORY
-        if is_commanded(controller):
-            received[f"/{controller.name}/commands"] = schemas.FLOAT64_MULTI_ARRAY
+    names: dict[str, dict[str, str]] = {"topic": {}, "action": {}, "service": {}}
+    for endpoint in endpoints:
+        names[endpoint.kind][endpoint.name] = endpoint.type
     return Offer(
         published={CLOCK: schemas.CLOCK, **{channel.topic: channel.type for channel in table}},
         latched=frozenset(channel.topic for channel in table if channel.latched),
-        received=received,
-        actions=actions,
-        services=_SERVICES,
+        received=names["topic"],
+        actions=names["action"],
+        services=names["service"],
+        readers=frozenset(endpoint.name for endpoint in endpoints if endpoint.reads),
     )
 
 

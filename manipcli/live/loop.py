@@ -15,6 +15,9 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.judge.steps import RunStatus
 from manipcli.live.command import END, Command
 from manipcli.live.feed import Feed
+from manipcli.live.interface import endpoints_of
+from manipcli.live.live_robot import LiveRobot
+from manipcli.live.live_session import LiveSession, SessionOver
 from manipcli.live.obey import Obedience
 from manipcli.live.pace import Pace
 from manipcli.live.source import Source
@@ -25,6 +28,7 @@ from manipcli.run.observer import SILENT, Observer
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
+END_COMMAND: Final = Command(END, "")
 STARTED: Final = "the controllers hold, and obey commands"
 
 
@@ -52,6 +56,30 @@ class Outside:
     failure: str = ""
 
 
+class _Turn:
+    """Obeys the commands of each tick; the session has at least one tick."""
+
+    def __init__(self, robot: LiveRobot, obedience: Obedience, outside: Outside) -> None:
+        self._robot, self._obedience, self._outside = robot, obedience, outside
+
+    def before_tick(self) -> None:
+        tick, outside = self._robot.session.ticks, self._outside
+        over = False
+        if tick > 0:
+            try:
+                outside.between()
+                over = outside.pace.over
+            except KeyboardInterrupt:
+                over = True
+        for command in (END_COMMAND,) if over else outside.source.take(tick):
+            if not self._obedience.obey(command):
+                raise SessionOver
+
+    def after_tick(self) -> None:
+        self._obedience.after_tick()
+        self._outside.pace.wait()
+
+
 def simulate_live(
     task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, outside: Outside
 ) -> SimulationEnd:
@@ -61,36 +89,24 @@ def simulate_live(
     """
     outside.ready()  # before the scene is open: from there on stdout is stderr, for the engine
     try:
-        with open_session(task, plan, manager) as session:
+        with open_session(task, plan, manager, LiveSession) as session:
             live = Live(live_world(task, plan, session), manager.controllers, session.period)
             observer = Observer(recorder, live, SILENT, session.period)
             outside.feed.observer = observer
             session.restart_clock(outside.feed)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
-            obedience = Obedience(session, recorder, observer.goal)
+            robot = LiveRobot(task, plan, session, recorder, observer, outside.pace)
+            session.begin(_Turn(robot, Obedience(robot, endpoints_of(task, manager.controllers)), outside))
+            outside.pace.start()
             try:
-                outside.pace.start()
-                while _obeyed(session.ticks, obedience, outside):
+                while True:
                     session.tick()
-                    obedience.after_tick()
-                    outside.pace.wait()
+            except SessionOver:
+                pass
             finally:
                 record_saturations(session, recorder)
     except SimulationFailed as failure:
         outside.failure = str(failure)
         return SimulationEnd(RunStatus.FAILED, outside.failure, 0.0)
     return SimulationEnd(RunStatus.COMPLETE, "", 0.0)
-
-
-def _obeyed(tick: int, obedience: Obedience, outside: Outside) -> bool:
-    """Carry out the commands of a tick; False where the session ends. It has at least one tick."""
-    if tick == 0:
-        return all(obedience.obey(command) for command in outside.source.take(tick))
-    try:
-        outside.between()
-        over = outside.pace.over
-    except KeyboardInterrupt:
-        over = True
-    commands = [Command(END, "")] if over else outside.source.take(tick)
-    return all(obedience.obey(command) for command in commands)

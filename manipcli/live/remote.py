@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from manipcli.core.errors import ExitCode, ManipcliError
-from manipcli.live.interface import LIST_CONTROLLERS
+from manipcli.live.interfaces.controller_manager import LIST_CONTROLLERS
 
 DEFAULT_URL: Final = "ws://127.0.0.1:9090"
 PATIENCE: Final = 10.0

@@ -12,7 +12,7 @@ from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
 from manipcli.live.access import Access
 from manipcli.live.feed import Feed
-from manipcli.live.interface import offer_of
+from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
 from manipcli.live.pace import Pace
 from manipcli.live.publisher import Publisher
@@ -73,7 +73,7 @@ def served(
 
     period = task.spec.simulation.control_period
     channels = [recorded(controller) for controller in manager.controllers]
-    offer = offer_of(manager.controllers, channels)
+    offer = offer_of(endpoints_of(task, manager.controllers), channels)
     feed, inbox = Feed(period), Inbox()
     publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)

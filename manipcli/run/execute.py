@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.session import Session
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
+
+S = TypeVar("S", bound=Session)
 
 SETTLED_SPEED: Final = 0.02
 """Bodies slower than this [m/s] have settled."""
@@ -94,7 +96,7 @@ def _run_steps(
     Raises:
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
-    with open_session(task, plan, manager) as session:
+    with open_session(task, plan, manager, Session) as session:
         live = Live(live_world(task, plan, session), manager.controllers, session.period)
         observer = Observer(recorder, live, progress, session.period)
         session.restart_clock(observer)
@@ -106,8 +108,12 @@ def _run_steps(
 
 
 @contextmanager
-def open_session(task: Task, plan: Plan, manager: ControllerManager) -> Iterator[Session]:
+def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[S]) -> Iterator[S]:
     """The world of a task in its engine, settled or in the state in which a part of the task begins.
+
+    Args:
+        task, plan, manager: of the run.
+        kind: the class of the session.
 
     Raises:
         SimulationFailed: the world does not settle before the start.
@@ -119,7 +125,7 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager) -> Iterator
     engine = ENGINES[simulation.engine].open(true.robot, scene, settings)
     try:
         with stdout_to_stderr():
-            session = Session(
+            session = kind(
                 robot=true.robot,
                 scene=true.scene,
                 engine=engine,

@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
+from manipcli.control.controller import Controller
 from manipcli.control.manager import ControllerManager
-from manipcli.live.command import Values
+from manipcli.live.command import Command, Values
+from manipcli.live.endpoint import Endpoint
+from manipcli.live.live_robot import LiveRobot
 from manipcli.record.json_message import definition, from_json
+from manipcli.task.task import Task
 
+LIST_CONTROLLERS: Final = "/controller_manager/list_controllers"
 BEST_EFFORT: Final = 1
 _STATE = definition("controller_manager_msgs/ControllerState")
+
+
+def endpoints(task: Task, controllers: Sequence[Controller]) -> Sequence[Endpoint]:
+    """Those under `/controller_manager`."""
+    return [
+        Endpoint(
+            "service",
+            LIST_CONTROLLERS,
+            "controller_manager_msgs/srv/ListControllers",
+            lambda robot, command, request: list_controllers(robot.manager),
+            reads=True,
+        ),
+        Endpoint(
+            "service",
+            "/controller_manager/switch_controller",
+            "controller_manager_msgs/srv/SwitchController",
+            _switch,
+        ),
+    ]
+
+
+def _switch(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
+    return switch_controller(robot.manager, request, robot.time)
 
 
 def list_controllers(manager: ControllerManager) -> Values:
