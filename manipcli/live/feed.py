@@ -34,9 +34,10 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A message of the log in CDR."""
+    """A message of the log in CDR; `ns`: its simulated time."""
 
     topic: str
+    ns: int
     data: bytes
 
 
@@ -83,7 +84,7 @@ class Feed:
 
     def message(self, topic: str, ns: int, data: bytes) -> None:
         """Takes each message that the recorder writes at an event."""
-        self._put(self._events, KEPT_MESSAGES, Event(topic, data))
+        self._put(self._events, KEPT_MESSAGES, Event(topic, ns, data))
 
     def _put(self, queue: deque[Sample] | deque[Event], kept: int, item: Sample | Event) -> None:
         if len(queue) >= kept:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Iterable, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
-from manipcli.record.cdr import NS_PER_S
+from manipcli.record.cdr import ENCAPSULATION, NS_PER_S
 from manipcli.record.channels import Recorded, channel_table
 from manipcli.record.definition import read_definition
 from manipcli.record.json_message import definition, to_json
@@ -24,15 +25,21 @@ from manipcli.record.selection import Selection, word
 from manipcli.record.write.block import Block
 from manipcli.scene.scene import Scene
 
+_TIME: Final = struct.Struct("<iI")
+
 
 class Publisher:
-    """Makes the text of `publish` operations.
+    """Encodes messages in CDR, and makes the text of `publish` operations from them.
 
     Args:
         offer: the topics.
         robot, scene: of the session.
         recorded: channels of its controllers.
         period: [s] of its control loop.
+
+    Attributes:
+        definitions: ros2msg texts of types that `record/schemas.py` does not have, by topic; "" for others.
+        kept: the last message of each latched topic, in CDR.
     """
 
     def __init__(
@@ -41,40 +48,38 @@ class Publisher:
         self.offer = offer
         self._robot, self._scene, self._recorded, self._period = robot, scene, recorded, period
         self._table = {channel.topic: channel for channel in channel_table(recorded)}
+        self.definitions = {topic: channel.definition for topic, channel in self._table.items()}
         self._topics: frozenset[str] = frozenset()
         self._block: Block | None = None
         self._state = WorldState.room(len(robot.moving_joints), len(scene.movable))
-        self._last: dict[str, str] = {}
-        for topic, data in (
-            (topics.ROBOT_DESCRIPTION, messages.string_message(robot.urdf)),
-            (topics.TF_STATIC, messages.tf_message(messages.static_transforms(robot, scene), 0)),
-            (topics.MARKERS, messages.marker_message(scene, 0)),
-        ):
-            self.event(topic, data)
+        self.kept: dict[str, bytes] = {
+            topics.ROBOT_DESCRIPTION: messages.string_message(robot.urdf),
+            topics.TF_STATIC: messages.tf_message(messages.static_transforms(robot, scene), 0),
+            topics.MARKERS: messages.marker_message(scene, 0),
+        }
 
     def event(self, topic: str, data: bytes) -> str:
         """The text of a message in CDR; kept for later subscribers if its topic is latched."""
-        text = self._text(topic, data)
         if topic in self.offer.latched:
-            self._last[topic] = text
-        return text
+            self.kept[topic] = data
+        return self.text(topic, data)
 
     def latched(self, topic: str) -> str | None:
         """The last text of a latched topic; None before its first message."""
-        return self._last.get(topic)
+        data = self.kept.get(topic)
+        return None if data is None else self.text(topic, data)
 
     def clock(self, tick: int) -> dict[str, int]:
         """The simulated time of a tick, builtin_interfaces/Time."""
         sec, nanosec = divmod(round(tick * self._period * 1e9), NS_PER_S)
         return {"sec": sec, "nanosec": nanosec}
 
-    def sample(self, sample: Sample, wanted: Iterable[str]) -> dict[str, str]:
-        """The texts of the wanted topics that have a message at this tick."""
-        found: dict[str, str] = {}
+    def sample(self, sample: Sample, wanted: Iterable[str]) -> dict[str, bytes]:
+        """The messages in CDR of the wanted topics that have one at this tick."""
+        found: dict[str, bytes] = {}
         wanted = frozenset(wanted)
         if CLOCK in wanted:
-            message = {"clock": self.clock(sample.tick)}
-            found[CLOCK] = json.dumps({"op": "publish", "topic": CLOCK, "msg": message}, separators=(",", ":"))
+            found[CLOCK] = ENCAPSULATION + _TIME.pack(*self.clock(sample.tick).values())
         own = wanted & self._table.keys()
         if not own:
             return found
@@ -85,7 +90,7 @@ class Publisher:
             _, length, channel, *_ = MESSAGE_HEAD.unpack_from(content, offset)
             end = offset + 9 + length
             topic = names[channel]
-            found[topic] = self._text(topic, content[offset + PAYLOAD : end])
+            found[topic] = content[offset + PAYLOAD : end]
             offset = end
         return found
 
@@ -102,9 +107,10 @@ class Publisher:
         content = self._block.encode([])
         return b"" if content is None else content.data
 
-    def _text(self, topic: str, data: bytes) -> str:
-        channel = self._table[topic]
-        kind = definition(channel.type) if not channel.definition else read_definition(channel.type, channel.definition)
+    def text(self, topic: str, data: bytes) -> str:
+        """The `publish` operation of a message in CDR."""
+        name, own = self.offer.published[topic], self.definitions.get(topic)
+        kind = read_definition(name, own) if own else definition(name)
         message = to_json(kind, data)
         return json.dumps({"op": "publish", "topic": topic, "msg": message}, separators=(",", ":"), allow_nan=False)
 

@@ -8,7 +8,7 @@ import errno
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -20,6 +20,7 @@ from manipcli.live.feed import Feed
 from manipcli.live.frames import MAX_FRAME
 from manipcli.live.publisher import Publisher, is_sampled
 from manipcli.live.rosapi import Rosapi
+from manipcli.live.tap import Tap
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
@@ -41,6 +42,7 @@ class LiveServer:
         put: hands a command to the control loop; False if too many wait.
         access: who may connect.
         port: to listen on; 0: any free port.
+        taps: other servers of the same messages.
 
     Attributes:
         port: the port that it listens on.
@@ -50,11 +52,19 @@ class LiveServer:
     """
 
     def __init__(
-        self, publisher: Publisher, feed: Feed, put: Callable[[Command], bool], *, access: Access, port: int
+        self,
+        publisher: Publisher,
+        feed: Feed,
+        put: Callable[[Command], bool],
+        *,
+        access: Access,
+        port: int,
+        taps: Sequence[Tap] = (),
     ) -> None:
         _library()
-        self._publisher, self._feed, self._access = publisher, feed, access
+        self._publisher, self._feed, self._access, self._taps = publisher, feed, access, taps
         self._clients: dict[int, Client] = {}
+        self._wanted: frozenset[str] = frozenset()
         self._numbers = 0
         self._loop = asyncio.new_event_loop()
         self._something = asyncio.Event()
@@ -69,6 +79,8 @@ class LiveServer:
             raise _unusable(access.host, port, error) from error
         self.port: int = next(iter(self._server.sockets)).getsockname()[1]
         feed.listen(lambda: self._soon(self._something.set))
+        for tap in taps:
+            tap.listen(lambda: self._soon(self._subscribed))
         self._publishing = asyncio.run_coroutine_threadsafe(self._publish(), self._loop)
 
     def __enter__(self) -> Self:
@@ -170,8 +182,9 @@ class LiveServer:
 
     def _subscribed(self) -> None:
         """Sample the state only while somebody subscribes to it."""
-        wanted = {topic for client in self._clients.values() for topic in client.outbox.subscriptions}
-        self._feed.wanted = any(is_sampled(topic, self._publisher.offer) for topic in wanted)
+        wanted = frozenset(topic for client in self._clients.values() for topic in client.outbox.subscriptions)
+        self._wanted = wanted.union(*(tap.wanted for tap in self._taps))
+        self._feed.wanted = any(is_sampled(topic, self._publisher.offer) for topic in self._wanted)
 
     async def _publish(self) -> None:
         """Make each message once, for all its subscribers."""
@@ -181,10 +194,17 @@ class LiveServer:
             events, samples = self._feed.take()
             for event in events:
                 if event.topic in self._publisher.offer.published:
+                    for tap in self._taps:
+                        tap.publish(event.topic, event.ns, event.data)
                     self._offer(event.topic, self._publisher.event(event.topic, event.data))
             for sample in samples:
-                for topic, text in self._publisher.sample(sample, self._due()).items():
-                    self._offer(topic, text)
+                due, ns = self._due(), round(sample.tick * self._feed.period * 1e9)
+                found = self._publisher.sample(sample, self._wanted)
+                for tap in self._taps:
+                    tap.sample(ns, found)
+                for topic, data in found.items():
+                    if topic in due:
+                        self._offer(topic, self._publisher.text(topic, data))
                 await asyncio.sleep(0)
 
     def _due(self) -> set[str]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import InvalidInput
 from manipcli.judge.steps import RunStatus
 from manipcli.live.access import Access
+from manipcli.live.assets import Assets
 from manipcli.live.feed import Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
@@ -18,8 +20,11 @@ from manipcli.live.pace import Pace
 from manipcli.live.publisher import Publisher
 from manipcli.live.source import Inbox, recorded_commands
 from manipcli.record.recording import Recording
-from manipcli.run.run_log import recorded
+from manipcli.run.run_log import mesh_files, recorded
 from manipcli.task.task import Task
+
+if TYPE_CHECKING:
+    from manipcli.live.foxglove import FoxgloveServer
 
 DEFAULT_PORT: Final = 9090
 """rosbridge's."""
@@ -34,12 +39,16 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
+        foxglove: port for Foxglove, always on 127.0.0.1; 0: any free port; None: not served.
+        foxglove_needed: whether the session must not begin without it.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
+    foxglove: int | None = None
+    foxglove_needed: bool = False
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -64,7 +73,7 @@ def served(
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
         announce: called with the URL when clients can connect.
-        late: called once with a text if the simulation is slower than asked.
+        late: called with a text for the user: once if the simulation is slower than asked, and about Foxglove.
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
@@ -77,8 +86,44 @@ def served(
     feed, inbox = Feed(period), Inbox()
     publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
-    with LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port) as server:
-        yield Outside(inbox, feed, pace, between, lambda: announce(options.url(server.port)))
+    with ExitStack() as stack:
+        tap = _foxglove(options, task, publisher, feed, report=late)
+        taps = [] if tap is None else [stack.enter_context(tap)]
+        server = LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port, taps=taps)
+        stack.enter_context(server)
+
+        def ready() -> None:
+            for each in taps:
+                late(f"Foxglove: {each.url} (read-only)")
+            announce(options.url(server.port))
+
+        yield Outside(inbox, feed, pace, between, ready)
+
+
+def _foxglove(
+    options: LiveOptions, task: Task, publisher: Publisher, feed: Feed, *, report: Callable[[str], None]
+) -> FoxgloveServer | None:
+    """The server for Foxglove; None if it is not asked for, or cannot be had and is not needed."""
+    if options.foxglove is None:
+        return None
+    from manipcli.live.foxglove import FoxgloveServer
+
+    try:
+        found = FoxgloveServer(
+            publisher.offer,
+            publisher.definitions,
+            assets=Assets(mesh_files(task)),
+            now=lambda: round(feed.tick_now * feed.period * 1e9),
+            port=options.foxglove,
+        )
+    except InvalidInput as error:
+        if options.foxglove_needed:
+            raise
+        report("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
+        return None
+    for topic, data in publisher.kept.items():
+        found.publish(topic, 0, data)
+    return found
 
 
 def recorded_session(recording: Recording, log: Path) -> Outside:

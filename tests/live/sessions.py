@@ -23,6 +23,7 @@ from manipcli.live.session import LiveOptions
 from manipcli.live.source import Schedule
 from manipcli.logs.judge_log import judge_log
 from manipcli.run.execute import build_manager
+from manipcli.run.observer import SILENT, Progress
 from manipcli.run.run_log import open_log, run_metadata, verdict_metadata
 from manipcli.task.part import LIVE
 
@@ -58,7 +59,14 @@ def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path) 
         recorder.finish(verdict_metadata(judge_log(recorder.partial_path, being_written=True)))
 
 
-def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str | None = TOKEN) -> Path:
+def serving(
+    folder: Path,
+    use: Callable[[str], Awaitable[None]],
+    *,
+    token: str | None = TOKEN,
+    foxglove: int | None = None,
+    progress: Progress = SILENT,
+) -> Path:
     """Serve a small task as fast as possible while `use` runs with its URL; returns the log of the session."""
     file, log = folder / "small.yaml", folder / "session.mcap"
     file.write_text(SMALL)
@@ -71,9 +79,11 @@ def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str |
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=None)
+        options = LiveOptions(Access(token), port=0, speed=None, foxglove=foxglove)
         try:
-            _, failure = pipeline.serve_task(file, options, log=log, between=between, announce=announced.put)
+            _, failure = pipeline.serve_task(
+                file, options, log=log, progress=progress, between=between, announce=announced.put
+            )
             failures.extend([failure] if failure else [])
         except BaseException as error:  # noqa: BLE001 (raised again by the test)
             failures.append(error)

@@ -31,6 +31,17 @@ def serve(
     lasting: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="End after TIME of the wall clock (30s, 5min).")
     ] = None,
+    foxglove_port: Annotated[
+        int | None,
+        typer.Option(
+            "--foxglove-port",
+            metavar="N",
+            min=0,
+            max=65535,
+            help="Port for Foxglove, on 127.0.0.1, read-only; 0 is any free port [default: 8765].",
+        ),
+    ] = None,
+    no_foxglove: Annotated[bool, typer.Option("--no-foxglove", help="Do not serve Foxglove.")] = False,
     token_file: Annotated[
         Path | None,
         typer.Option("--token-file", metavar="FILE", help="Read the token from FILE [default: a random one, printed]."),
@@ -65,7 +76,14 @@ def serve(
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
 
-        live = LiveOptions(Access(token, host), port, factor, wall)
+        live = LiveOptions(
+            Access(token, host),
+            port,
+            factor,
+            wall,
+            foxglove=_foxglove(foxglove_port, off=no_foxglove),
+            foxglove_needed=foxglove_port is not None,
+        )
 
         def announce(url: str) -> None:
             console.result(url)
@@ -107,6 +125,20 @@ def _speed(word: str) -> float | None:
     if not 0.001 <= factor <= 1000.0:
         raise InvalidInput([Diagnostic("USE130", f"--speed is '{word}'; expected a number from 0.001 to 1000, or max")])
     return factor
+
+
+def _foxglove(port: int | None, *, off: bool) -> int | None:
+    """The port for Foxglove; None for `--no-foxglove`.
+
+    Raises:
+        InvalidInput: options that exclude each other.
+    """
+    from manipcli.live.foxglove import DEFAULT_PORT
+
+    if off and port is not None:
+        message = "--no-foxglove and --foxglove-port exclude each other"
+        raise InvalidInput([Diagnostic("USE150", message, hint="remove one of them")])
+    return None if off else DEFAULT_PORT if port is None else port
 
 
 def _token(file: Path | None, *, host: str, open_: bool) -> str | None:
