@@ -29,6 +29,7 @@ from manipcli.cli.commands import (
     info,
     init,
     judge,
+    mcp,
     plan,
     plot,
     repair,
@@ -97,6 +98,7 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "replay": replay.replay,
     "serve": serve.serve,
     "topic": topic.topic,
+    "mcp": mcp.mcp,
     "list": list_.list_,
     "schema": schema.schema,
 }
