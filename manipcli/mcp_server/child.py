@@ -45,6 +45,11 @@ class Runner:
     limit: float = 600.0
     environment: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def package_options(self) -> list[str]:
+        """Options of a command that name the folders of packages."""
+        return [f"--package-path={path}" for path in self.packages]
+
     async def start(self, words: Sequence[str]) -> asyncio.subprocess.Process:
         """Start `manipcli WORDS`; stderr is part of its stdout."""
         root, packages = str(self.folder.root), [str(path) for path in self.packages]
@@ -102,16 +107,17 @@ async def ended(process: asyncio.subprocess.Process) -> None:
 
     if process.returncode is not None:
         return
-    _send(process.pid, signal.SIGINT)
+    send_signal(process, signal.SIGINT)
     with anyio.move_on_after(GRACE, shield=True):
         await bounded(process.stdout)
         await process.wait()
     if process.returncode is None:
-        _send(process.pid, signal.SIGKILL)
+        send_signal(process, signal.SIGKILL)
         with anyio.CancelScope(shield=True):
             await process.wait()
 
 
-def _send(pid: int, number: int) -> None:
+def send_signal(process: asyncio.subprocess.Process, number: signal.Signals) -> None:
+    """Send a signal to a process and those it started."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(pid, number)
+        os.killpg(process.pid, number)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import logging
 from collections.abc import Awaitable, Callable
@@ -10,6 +11,7 @@ from typing import Any, Final
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.version import __version__
 from manipcli.mcp_server.child import Runner
+from manipcli.mcp_server.live_tools import LiveTools
 from manipcli.mcp_server.tools import Failed, Tools
 
 INSTRUCTIONS: Final = (
@@ -29,9 +31,17 @@ def serve(runner: Runner) -> None:
     library = _library()
     logging.getLogger("mcp").setLevel(logging.CRITICAL)  # what a model got wrong is its own answer
     server = library.MCPServer("manipcli", version=__version__, instructions=INSTRUCTIONS, log_level="CRITICAL")
-    for tool in Tools(runner).all:
+    live = LiveTools(runner)
+    for tool in (*Tools(runner).all, *live.all):
         server.add_tool(_told(tool), structured_output=False)
-    server.run("stdio")
+
+    async def run() -> None:
+        try:
+            await server.run_stdio_async()
+        finally:
+            await live.close()
+
+    asyncio.run(run())
 
 
 def _told(tool: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:

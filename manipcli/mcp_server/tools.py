@@ -55,7 +55,7 @@ class Tools:
     ) -> str:
         """Check files: every finding with its place (file:line:column), what was expected and a hint. A task is also
         planned, and its gains, motors and grasps are examined. Nothing is simulated; do this before `run`."""
-        words = ["check", *(["--strict"] if strict else []), *_options(overrides, seed=seed, sample=sample)]
+        words = ["check", *(["--strict"] if strict else []), *options(overrides, seed=seed, sample=sample)]
         return await self.command(words, files)
 
     async def plan(
@@ -68,7 +68,7 @@ class Tools:
     ) -> str:
         """Plan a task without simulating it: the motions of each step, what limits them, margins and clearances; or
         which candidates of which step were refused, and why."""
-        words = ["plan", *(["--why"] if why else []), *_options(overrides, seed=seed, sample=sample)]
+        words = ["plan", *(["--why"] if why else []), *options(overrides, seed=seed, sample=sample)]
         return await self.command(words, [task])
 
     async def run(
@@ -84,10 +84,10 @@ class Tools:
     ) -> str:
         """Run a task: check, plan, simulate with physics, record a log under runs/ (replaced if it exists), and judge
         it. Shows the verdict, each step's outcome and each expectation with its margin."""
-        words = ["run", f"--log={self._of(self.runner.folder.log, log or PurePath(task).stem)}", "--force"]
+        words = ["run", f"--log={inside(self.runner.folder.log, log or PurePath(task).stem)}", "--force"]
         part = {"from": from_step, "until": until_step, "state": self._file(state) if state else ""}
         words += [f"--{name}={value}" for name, value in part.items() if value]
-        return await self.command([*words, *_options(overrides, seed=seed, sample=sample)], [task])
+        return await self.command([*words, *options(overrides, seed=seed, sample=sample)], [task])
 
     async def judge(self, log: Annotated[str, Field(description="Log of a run: runs/NAME.mcap.")]) -> str:
         """Judge a run again from its log alone: the verdict, steps and expectations with their margins."""
@@ -103,7 +103,7 @@ class Tools:
         English sentences with resolved numbers."""
         if _CODE.fullmatch(subject):
             return await self.command(["explain", subject], [])
-        words = ["explain", *(["--values"] if values else []), *_options(overrides)]
+        words = ["explain", *(["--values"] if values else []), *options(overrides)]
         return await self.command(words, [f"./{self._file(subject)}"])
 
     async def command(self, words: Sequence[str], files: Sequence[str]) -> str:
@@ -114,8 +114,7 @@ class Tools:
         """
         paths = [self._file(file) for file in files]
         try:
-            packages = [f"--package-path={path}" for path in self.runner.packages]
-            found = await self.runner.run([*words, "--quiet", *packages, "--", *paths])
+            found = await self.runner.run([*words, "--quiet", *self.runner.package_options, "--", *paths])
         except TimeoutError:
             raise Failed(f"{words[0]} took longer than {self.runner.limit:g} s and was ended") from None
         if found.code not in _RESULTS:
@@ -123,16 +122,22 @@ class Tools:
         return found.text
 
     def _file(self, word: str) -> str:
-        return self._of(self.runner.folder.file, word)
-
-    def _of(self, resolve: Callable[[str], str], word: str) -> str:
-        try:
-            return resolve(word)
-        except Outside as error:
-            raise Failed(str(error)) from None
+        return inside(self.runner.folder.file, word)
 
 
-def _options(overrides: Sequence[str], **numbers: int | None) -> list[str]:
+def inside(resolve: Callable[[str], str], word: str) -> str:
+    """A path by a method of the folder.
+
+    Raises:
+        Failed: it is outside.
+    """
+    try:
+        return resolve(word)
+    except Outside as error:
+        raise Failed(str(error)) from None
+
+
+def options(overrides: Sequence[str], **numbers: int | None) -> list[str]:
     """Options of a command; values are never words of their own, so that none becomes an option."""
     for each in overrides:
         if len(each) > LONGEST or "\0" in each:
