@@ -82,7 +82,7 @@ def test_a_placed_body_falls_as_in_closed_form(tmp_path: Path, name: str) -> Non
             engine.advance()
         pose, twist = engine.body_state("cup")
     np.testing.assert_allclose(twist[:3], [0.2, 0.0, rise - 9.81 * time], atol=1e-9)
-    fallen = THERE.p + [0.2 * time, 0.0, rise * time - 9.81 * time * (time + STEP) / 2]
+    fallen = THERE.p + np.array([0.2 * time, 0.0, rise * time - 9.81 * time * (time + STEP) / 2])
     np.testing.assert_allclose(pose.p, fallen, atol=1e-9)
 
 
