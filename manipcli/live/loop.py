@@ -29,6 +29,8 @@ from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 END_COMMAND: Final = Command(END, "")
+POLL: Final = 0.05
+"""[s] of wall time between two looks for an interruption while the session is paused."""
 STARTED: Final = "the controllers hold, and obey commands"
 
 
@@ -57,25 +59,43 @@ class Outside:
 
 
 class _Turn:
-    """Obeys the commands of each tick; the session has at least one tick."""
+    """Obeys the commands of each tick; waits, obeying, while the session is paused. It has at least one tick."""
 
     def __init__(self, robot: LiveRobot, obedience: Obedience, outside: Outside) -> None:
         self._robot, self._obedience, self._outside = robot, obedience, outside
 
     def before_tick(self) -> None:
-        tick, outside = self._robot.session.ticks, self._outside
-        over = False
-        if tick > 0:
+        play, source, tick = self._robot.play, self._outside.source, self._robot.session.ticks
+        self._obey(tick)
+        while not (play.moves or play.over):
+            if not source.wait(POLL):
+                break  # simulated from a log: it went on
+            self._outside.pace.start()
+            self._obey(tick)
+        if play.over and tick > 0:
+            raise SessionOver
+
+    def _obey(self, tick: int) -> None:
+        play, outside = self._robot.play, self._outside
+        if play.over:
+            return
+        interrupted = False
+        if tick > 0 or not play.moves:
             try:
                 outside.between()
-                over = outside.pace.over
+                interrupted = outside.pace.over
             except KeyboardInterrupt:
-                over = True
-        for command in (END_COMMAND,) if over else outside.source.take(tick):
+                interrupted = True
+        commands = (END_COMMAND,) if interrupted else outside.source.take(tick)
+        for k, command in enumerate(commands):
             if not self._obedience.obey(command):
-                raise SessionOver
+                play.end()
+            if play.over:
+                outside.source.give_back(commands[k + 1 :])
+                return
 
     def after_tick(self) -> None:
+        self._robot.play.ticked()
         self._obedience.after_tick()
         self._outside.pace.wait()
 
