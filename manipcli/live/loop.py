@@ -20,6 +20,7 @@ from manipcli.live.live_robot import LiveRobot
 from manipcli.live.live_session import LiveSession, SessionOver
 from manipcli.live.obey import Obedience
 from manipcli.live.pace import Pace
+from manipcli.live.play_state import Reset
 from manipcli.live.source import Source
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.execute import SimulationEnd, live_world, open_session, record_saturations
@@ -47,7 +48,9 @@ class Outside:
         pace: of the loop.
         between: called before each tick; raises KeyboardInterrupt to end the session.
         ready: called before the scene is opened; commands wait until it has settled.
+        begun: called when the scene is open and has settled.
         failure: why the simulation failed; "" if it did not.
+        reset: the session that comes next, if it ended by a reset.
     """
 
     source: Source
@@ -55,7 +58,20 @@ class Outside:
     pace: Pace
     between: Callable[[], None] = field(default=_never)
     ready: Callable[[], None] = field(default=_never)
+    begun: Callable[[], None] = field(default=_never)
     failure: str = ""
+    reset: Reset | None = None
+
+    def again(self) -> bool:
+        """Prepare the next session after a reset; False if there is none."""
+        reset, self.reset = self.reset, None
+        if reset is None:
+            return False
+        first = reset.command()
+        self.source.give_back([] if first is None else [first])
+        self.ready, self.begun = _never, reset.begun
+        self.feed.restart()
+        return True
 
 
 class _Turn:
@@ -66,7 +82,8 @@ class _Turn:
 
     def before_tick(self) -> None:
         play, source, tick = self._robot.play, self._outside.source, self._robot.session.ticks
-        self._obey(tick)
+        if not play.over:
+            self._obey(tick)
         while not (play.moves or play.over):
             if not source.wait(POLL):
                 break  # simulated from a log: it went on
@@ -77,8 +94,6 @@ class _Turn:
 
     def _obey(self, tick: int) -> None:
         play, outside = self._robot.play, self._outside
-        if play.over:
-            return
         interrupted = False
         if tick > 0 or not play.moves:
             try:
@@ -117,13 +132,16 @@ def simulate_live(
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             robot = LiveRobot(task, plan, session, recorder, observer, outside.pace)
-            session.begin(_Turn(robot, Obedience(robot, endpoints_of(task, manager.controllers)), outside))
+            obedience = Obedience(robot, endpoints_of(task, manager.controllers))
+            session.begin(_Turn(robot, obedience, outside))
+            outside.begun()
             outside.pace.start()
             try:
                 while True:
                     session.tick()
             except SessionOver:
-                pass
+                outside.reset = robot.play.reset
+                obedience.abort("the session ended" if outside.reset is None else "the simulation was reset")
             finally:
                 record_saturations(session, recorder)
     except SimulationFailed as failure:

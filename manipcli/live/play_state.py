@@ -1,16 +1,16 @@
 """Whether a live session plays, is paused or ends: states of simulation_interfaces, changed by commands alone.
 
-While it does not play there is no tick, so no simulated number depends on how long it waits. A session that is simulated
-again from its log gets the same commands at the same ticks, and is paused and stepped as it was.
+While it does not play there is no tick, so no simulated number depends on how long it waits. A session that is
+simulated again from its log gets the same commands at the same ticks, and is paused and stepped as it was.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
-from manipcli.live.command import CALL_SERVICE, Answer, Command, nobody
+from manipcli.live.command import CALL_SERVICE, Command
 
 STOPPED: Final = 0
 PLAYING: Final = 1
@@ -25,10 +25,10 @@ FIRST: Final = "first"
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """The next session, which begins when this one has ended, and its first state; `answer`: called when it begins."""
+    """The next session, which begins when this one has ended, and its first state; `begun`: called when it begins."""
 
     state: int
-    answer: Callable[[Answer], None] = nobody
+    begun: Callable[[], None]
 
     def command(self) -> Command | None:
         """The command that brings the next session, which would play, into its first state."""
@@ -51,7 +51,7 @@ class PlayState:
     state: int = PLAYING
     steps: int = 0
     over: bool = False
-    reset: Reset | None = field(default=None)
+    reset: Reset | None = None
 
     @property
     def moves(self) -> bool:

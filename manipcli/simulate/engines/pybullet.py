@@ -158,11 +158,12 @@ class PybulletEngine:
     def _move_body(self, row: int, twist: list[float]) -> None:
         p, client = self._p, self._client
         k, offset, _ = self._movable[row]
-        linear, angular = twist[:3], twist[3:]
+        x, y, z, *angular = twist
         if offset is not None:
-            arm = _rotated(self._pose(row)[1], offset)
-            linear = [v + w for v, w in zip(linear, _cross((*angular,), arm), strict=True)]
-        p.resetBaseVelocity(k, linear, angular, physicsClientId=client)
+            wx, wy, wz = angular
+            ax, ay, az = _cross((wx, wy, wz), _rotated(self._pose(row)[1], offset))
+            x, y, z = x + ax, y + ay, z + az
+        p.resetBaseVelocity(k, (x, y, z), angular, physicsClientId=client)
 
     def _pose(self, row: int) -> tuple[Vector, tuple[float, ...]]:
         """Position and quaternion xyzw of the frame O of a movable body."""
