@@ -6,8 +6,6 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from manipcli.live.interfaces.simulation import FAILED
-
 LONGEST: Final = 200
 """Longest pattern [characters]."""
 REPETITIONS: Final = 3
@@ -16,11 +14,7 @@ _REPEATED = re.compile(r"\\.|\[\^?\]?[^\]]*\]|(?P<group>\)[*+{])|(?P<once>[*+?{]
 
 
 class BadPattern(ValueError):
-    """A filter that is not carried out; `code`: of simulation_interfaces/Result."""
-
-    def __init__(self, text: str, code: int = FAILED) -> None:
-        super().__init__(text)
-        self.code = code
+    """A pattern that is invalid or not supported."""
 
 
 def name_pattern(pattern: str) -> Callable[[str], bool]:

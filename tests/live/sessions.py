@@ -58,10 +58,12 @@ def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path) 
         recorder.finish(verdict_metadata(judge_log(recorder.partial_path, being_written=True)))
 
 
-def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str | None = TOKEN) -> Path:
+def serving(
+    folder: Path, use: Callable[[str], Awaitable[None]], *, token: str | None = TOKEN, task: str = SMALL
+) -> Path:
     """Serve a small task as fast as possible while `use` runs with its URL; returns the log of the session."""
     file, log = folder / "small.yaml", folder / "session.mcap"
-    file.write_text(SMALL)
+    file.write_text(task)
     announced: queue.Queue[str] = queue.Queue()
     over = threading.Event()
     failures: list[BaseException | str] = []
@@ -73,7 +75,9 @@ def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str |
     def serve() -> None:
         options = LiveOptions(Access(token), port=0, speed=None)
         try:
-            _, failure = pipeline.serve_task(file, options, log=log, between=between, announce=announced.put)
+            _, failure = pipeline.serve_task(
+                file, options, log=log, between=between, announce=announced.put, allow_outside=True
+            )
             failures.extend([failure] if failure else [])
         except BaseException as error:  # noqa: BLE001 (raised again by the test)
             failures.append(error)

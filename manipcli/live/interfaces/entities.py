@@ -12,7 +12,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import did_you_mean
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces.simulation import FAILED, NOT_FOUND, PACKAGE, UNSUPPORTED, result
+from manipcli.live.interfaces.simulation import FAILED, NOT_FOUND, OK, PACKAGE, UNSUPPORTED, result
 from manipcli.live.live_robot import LiveRobot
 from manipcli.live.name_pattern import BadPattern, name_pattern
 from manipcli.live.placing import misplaced
@@ -49,18 +49,13 @@ def _names(robot: LiveRobot) -> list[str]:
 
 
 def _entities(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
-    try:
-        return result(entities=_matching(robot, request["filters"]))
-    except BadPattern as error:
-        return result(error.code, str(error), entities=[])
+    names, code, why = _matching(robot, request["filters"])
+    return result(code, why, entities=names)
 
 
 def _states(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
-    try:
-        names = _matching(robot, request["filters"])
-    except BadPattern as error:
-        return result(error.code, str(error), entities=[], states=[])
-    return result(entities=names, states=[_state_of(robot, name) for name in names])
+    names, code, why = _matching(robot, request["filters"])
+    return result(code, why, entities=names, states=[_state_of(robot, name) for name in names])
 
 
 def _info(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
@@ -104,15 +99,14 @@ def _unknown(robot: LiveRobot, name: str) -> str:
     return "" if name in names else f"there is no entity '{name[:80]}'; {did_you_mean(name[:80], names)}"
 
 
-def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> list[str]:
-    """The names of the entities that pass all filters.
-
-    Raises:
-        BadPattern: of the names, or a filter by bounds.
-    """
+def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> tuple[list[str], int, str]:
+    """The names of the entities that pass all filters; a code, and why a filter is not carried out."""
     if filters["bounds"]["type"] or filters["bounds"]["points"]:
-        raise BadPattern("a filter by bounds is not supported", UNSUPPORTED)
-    pattern = name_pattern(filters["filter"])
+        return [], UNSUPPORTED, "a filter by bounds is not supported"
+    try:
+        pattern = name_pattern(filters["filter"])
+    except BadPattern as error:
+        return [], FAILED, str(error)
     categories = {each["category"] for each in filters["categories"]}
     tags, all_tags = set(filters["tags"]["tags"]), filters["tags"]["filter_mode"] == ALL_TAGS
     found = []
@@ -122,7 +116,7 @@ def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> list[str]:
         tagged = not tags or (tags <= own if all_tags else bool(tags & own))
         if pattern(name) and tagged and (not categories or info["category"]["category"] in categories):
             found.append(name)
-    return found
+    return found, OK, ""
 
 
 def _info_of(robot: LiveRobot, name: str) -> Values:
