@@ -36,6 +36,10 @@ class Hand(Controller, Protocol):
         """
         ...
 
+    def halt(self, time: float, reason: str) -> None:
+        """Abort its goal, and keep the grip as it is."""
+        ...
+
 
 class GoalTaker(Controller, Protocol):
     """Executes goals; `accepts_goals` is False while its manager has it inactive."""

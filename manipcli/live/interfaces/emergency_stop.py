@@ -1,7 +1,9 @@
 """Emergency stop: all controllers that command joints are deactivated at once, and their joints are held by brakes.
 
-Goals end as aborted, and so does a step that runs. Until the release no controller can be activated, so that no goal,
-trajectory or jog is accepted. The release activates the same controllers again, which hold the measured position.
+Only hands stay active and keep their grip, as grippers with self-locking drives do: a brake in an engine holds the
+joint, not the force that it exerted, so that the object would fall. Goals end as aborted, and so does a step that runs.
+Until the release no goal, trajectory or jog is accepted, and no controller can be activated. The release activates the
+same controllers again, which hold the measured position.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from manipcli.control.controller import Controller
+from manipcli.control.roles import Hand, is_hand, takes_goals
 from manipcli.core.text import listed
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
@@ -35,17 +38,25 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Sequence[Endpoin
 class _EmergencyStop:
     def __init__(self) -> None:
         self._stopped: tuple[str, ...] = ()
+        self._hands: list[Hand] = []
 
     def stop(self, robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
         manager = robot.manager
         if manager.locked:
             return {"success": True, "message": "the emergency stop is already active"}
-        self._stopped = tuple(info.name for info in manager.list() if info.state == "active" and info.interfaces)
+        active = [manager[info.name] for info in manager.list() if info.state == "active" and info.interfaces]
+        self._hands = [controller for controller in active if is_hand(controller)]
+        for hand in self._hands:
+            hand.halt(robot.time, REASON)
+            _accept_goals(hand, yes=False)
+        self._stopped = tuple(controller.name for controller in active if not is_hand(controller))
         for name in self._stopped:
             manager[name].deactivate(robot.time, REASON)
         manager.switch(deactivate=self._stopped, time=robot.time)
         manager.locked = LOCKED
         text = f"{REASON}: {listed(self._stopped) or 'no controller'} deactivated, brakes hold the joints"
+        if self._hands:
+            text += f"; {listed([hand.name for hand in self._hands])} keeps its grip"
         robot.event("emergency_stop", text, outcome="error")
         return {"success": True, "message": text}
 
@@ -54,7 +65,14 @@ class _EmergencyStop:
         if not manager.locked:
             return {"success": False, "message": "there is no emergency stop to release"}
         manager.locked = ""
+        for hand in self._hands:
+            _accept_goals(hand, yes=any(info.name == hand.name and info.state == "active" for info in manager.list()))
         switched = manager.switch(activate=self._stopped, strictness="best_effort", time=robot.time)
         text = "; ".join((f"emergency stop released: {listed(switched.activated)} activated", *switched.messages))
         robot.event("emergency_stop_released", text)
         return {"success": True, "message": text}
+
+
+def _accept_goals(controller: Controller, *, yes: bool) -> None:
+    if takes_goals(controller):
+        controller.accepts_goals = yes
