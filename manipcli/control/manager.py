@@ -252,7 +252,8 @@ class ControllerManager:
                 return controller
         claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "no controller is active"
         message = f"no active controller claims all of {', '.join(joints)} ({claims})"
-        raise InvalidArgument("CTRL140", message, hint=self.faults[-1].message if self.faults else None)
+        fault = self.faults[-1].message if self.faults else None
+        raise InvalidArgument("CTRL140", message, hint=self.locked or fault)
 
     def keep_references(self) -> None:
         """Include the references in the command from now on."""

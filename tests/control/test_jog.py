@@ -10,8 +10,11 @@ import pytest
 from manipcli import pipeline
 from manipcli.control.action import GoalRejected
 from manipcli.control.controller import JointState
+from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceController
+from manipcli.control.controllers.computed_torque import ComputedTorqueController
 from manipcli.control.jog import JogLaw
 from manipcli.control.jog_targets import JointTarget, TaskVelocity, ToolTarget
+from manipcli.control.roles import Follower, is_jogged
 from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.control.trajectory_goal import JointFacts
 from manipcli.core.geometry import Array
@@ -169,7 +172,7 @@ def controller(**more: object) -> JointTrajectoryController:
     )  # fmt: skip
 
 
-def run(made: JointTrajectoryController, first: int, ticks: int) -> Array:
+def run(made: Follower, first: int, ticks: int) -> Array:
     """(T, 4, n) reference and command; the joints are where the reference is."""
     rows, q = [], np.array(BENT)
     for k in range(first, first + ticks):
@@ -220,6 +223,26 @@ def test_the_arm_stops_when_the_time_of_the_target_is_over() -> None:
     assert rows[-1, 0, 0] - BENT[0] == pytest.approx(0.5 * 0.3, abs=1e-3)  # v^2 / 2a are missed and made up for
     assert rows[-1, 0, 0] - rows[300, 0, 0] == pytest.approx(0.5**2 / (2 * a), abs=1e-3)
     assert not rows[-1, 1].any()
+
+
+def test_all_controllers_of_trajectories_have_the_same_reference() -> None:
+    limits, types = [ROBOT.joint(name).limits for name in ARM], [ROBOT.joint(name).type for name in ARM]
+    others = (
+        ComputedTorqueController(name="arm", joints=ARM, limits=limits, types=types),
+        CartesianImpedanceController(
+            name="arm", joints=ARM, kinematics=KINEMATICS, link=TOOL[0], stiffness=np.full(6, 100.0), limits=limits,
+            types=types,
+        ),
+    )  # fmt: skip
+    others[1].set_pose(KINEMATICS.forward(HOME, TOOL[0]))
+    rows = []
+    for made in (controller(), *others):
+        assert is_jogged(made)
+        made.jog(tool([0.1, 0, 0, 0, 0.2, 0]), until=10.0)
+        rows.append(run(made, 0, 100)[:, :3])
+    np.testing.assert_array_equal(rows[1], rows[0])
+    np.testing.assert_array_equal(rows[2], rows[0])
+    assert np.abs(rows[0][-1, 0] - BENT).max() > 1e-3
 
 
 def test_a_paused_or_inactive_controller_does_not_jog() -> None:

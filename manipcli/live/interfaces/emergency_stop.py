@@ -52,7 +52,7 @@ class _EmergencyStop:
         self._stopped = tuple(controller.name for controller in active if not is_hand(controller))
         for name in self._stopped:
             manager[name].deactivate(robot.time, REASON)
-        manager.switch(deactivate=self._stopped, time=robot.time)
+        manager.switch(deactivate=self._stopped, strictness="best_effort", time=robot.time)
         manager.locked = LOCKED
         text = f"{REASON}: {listed(self._stopped) or 'no controller'} deactivated, brakes hold the joints"
         if self._hands:
