@@ -41,7 +41,8 @@ class Obedience:
             self._carry_out(command, endpoint, json.loads(command.json))
         except ManipcliError as error:
             found = error.findings[0]
-            text = f"{found.message}; {found.hint}" if found.hint else found.message
+            hint = self._robot.manager.locked or found.hint
+            text = f"{found.message}; {hint}" if hint else found.message
             self._refuse(command, text, getattr(error, "error_code", ErrorCode.INVALID_GOAL))
         except (ArithmeticError, AssertionError, LookupError, MemoryError, TypeError, ValueError) as error:
             # A message that no check foresaw must not end the session of the others.

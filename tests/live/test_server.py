@@ -87,9 +87,14 @@ def test_topics_have_the_messages_of_the_log(tmp_path: Path) -> None:
         assert "<robot" in (await client.until(topic="/robot_description"))["msg"]["data"]
         await client.send(op="subscribe", topic="/nothing", id="s")
         assert "not published" in (await client.until(op="status", id="s"))["msg"]
-        for topic in ("/joint_states", "/tf", "/clock", "/arm_controller/controller_state"):
+        states = ("/joint_states", "/tf", "/clock", "/arm_controller/controller_state")
+        for topic in ("/tf_static", "/markers", *states):
             await client.send(op="subscribe", topic=topic, type=types[topic])
             seen.append(await client.until(op="publish", topic=topic))
+        await client.send(op="subscribe", topic="/rosout")
+        await client.send(op="call_service", service="/emergency_stop")
+        seen.append(await client.until(op="publish", topic="/rosout"))
+        assert "emergency stop" in seen[-1]["msg"]["msg"]
         await client.socket.close()
 
     log = serving(tmp_path, use)
