@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.access import Access
-from manipcli.live.client import Client, Services
+from manipcli.live.client import Client
 from manipcli.live.command import Command
+from manipcli.live.connection import Services
 from manipcli.live.feed import Feed
 from manipcli.live.frames import MAX_FRAME
 from manipcli.live.publisher import Publisher, is_sampled
