@@ -5,6 +5,9 @@
     [test]
     samples = 10
 
+    [topic.echo]                  # a command with a sub-command
+    url = "ws://robot.lan:9090"
+
 The nearest such file of the working directory and the folders above is read. It may come with somebody's task, so it
 cannot lift a protection, and its paths, relative to it, stay below its folder.
 """
@@ -119,8 +122,17 @@ def _file(folder: Path) -> _File | None:
             table = table.get("tool", {}) if isinstance(table, dict) else {}
             table = table.get("manipcli") if isinstance(table, dict) else None
         if isinstance(table, dict):
-            return _File(path, text, table)
+            return _File(path, text, dict(_sections(table)))
     return None
+
+
+def _sections(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The entries of a file; a table within a table, `[topic.echo]`, becomes the section `topic echo`."""
+    for key, value in table.items():
+        tables = [name for name, each in value.items() if isinstance(each, dict)] if isinstance(value, dict) else []
+        yield from ((f"{key} {name}", value[name]) for name in tables)
+        if not tables or len(tables) < len(value):
+            yield key, value
 
 
 def _syntax(path: Path, cause: str) -> Diagnostic:
@@ -141,11 +153,11 @@ class _File:
         at = ""
         for number, line in enumerate(self.text.splitlines(), 1):
             head = re.fullmatch(r"\s*\[\s*(?:tool\.manipcli)?\.?([\w.-]*)\s*\]\s*(?:#.*)?", line)
-            at = head[1] if head is not None else at
+            at = head[1].replace(".", " ") if head is not None else at
             entry = re.match(rf"""(\s*)["']?{re.escape(key)}["']?\s*=""", line)
             if entry is not None and at == section:
                 return Place(str(self.path), number, len(entry[1]) + 1)
-            if head is not None and not section and head[1] == key:
+            if head is not None and not section and at == key:
                 return Place(str(self.path), number, line.index(key) + 1)
         return Place(str(self.path), 1, 1)
 

@@ -11,7 +11,6 @@ from manipcli.live.command import Answer, Command
 from manipcli.live.fields import Refused
 from manipcli.live.interface import Offer
 from manipcli.live.outbox import Outbox
-from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import Rosapi
 
 LEVELS: Final = ("none", "error", "warning", "info")
@@ -20,18 +19,23 @@ LEVELS: Final = ("none", "error", "warning", "info")
 
 @dataclass(frozen=True, slots=True)
 class Services:
-    """What all clients share: the published messages, the services of rosapi, and where commands go."""
+    """What all clients share.
 
-    publisher: Publisher
+    Attributes:
+        offer: names and types.
+        latched: the last text of a latched topic; None before its first message.
+        rosapi: answers its services.
+        put: hands a command to the control loop; False if too many wait.
+        in_network: calls in the thread of the network.
+        subscribed: to be called when subscriptions have changed.
+    """
+
+    offer: Offer
+    latched: Callable[[str], str | None]
     rosapi: Rosapi
     put: Callable[[Command], bool]
     in_network: Callable[[Callable[[], None]], None]
     subscribed: Callable[[], None]
-
-    @property
-    def offer(self) -> Offer:
-        """Names and types."""
-        return self.publisher.offer
 
 
 class Connection:

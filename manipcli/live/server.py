@@ -60,7 +60,7 @@ class LiveServer:
         self._loop = asyncio.new_event_loop()
         self._something = asyncio.Event()
         rosapi = Rosapi(publisher.offer, lambda: publisher.clock(feed.tick_now))
-        self._services = Services(publisher, rosapi, put, self._soon, self._subscribed)
+        self._services = Services(publisher.offer, publisher.latched, rosapi, put, self._soon, self._subscribed)
         self._thread = threading.Thread(target=self._loop.run_forever, name="live", daemon=True)
         self._thread.start()
         try:

@@ -78,7 +78,7 @@ class TopicOperations:
         asked[id_] = _Asked(throttle, int(min(number_of(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE)
         self._warn_of_ignored(frame)
         self._apply(topic)
-        last = self._connection.services.publisher.latched(topic)
+        last = self._connection.services.latched(topic)
         if last is not None:
             self._connection.outbox.publish(topic, last, time.monotonic())
 

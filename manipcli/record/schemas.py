@@ -6,6 +6,8 @@ line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schem
 
 from __future__ import annotations
 
+from manipcli.record.rosapi_definitions import ROSAPI
+
 STRING = "std_msgs/msg/String"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -208,6 +210,7 @@ DEFINITIONS: dict[str, str] = {
         "bool activate_asap\nbuiltin_interfaces/Duration timeout\n"
     ),
     "controller_manager_msgs/SwitchController_Response": "bool ok\nstring message\n",
+    **ROSAPI,
 }
 
 CONTACTS_WITHOUT_POINTS = (
