@@ -18,7 +18,7 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, get_args, get_origin
 
@@ -97,6 +97,7 @@ def defaults_of(command: str, commands: Commands, *, folder: Path) -> OptionDefa
     file = next((found for place in (folder, *folder.parents) if (found := _file(place)) is not None), None)
     if file is None:
         return OptionDefaults({})
+    file = replace(file, table=dict(_sections(file.table, commands)))
     return _Reader(file, {name: options_of(function) for name, function in commands.items()}).read(command)
 
 
@@ -122,17 +123,19 @@ def _file(folder: Path) -> _File | None:
             table = table.get("tool", {}) if isinstance(table, dict) else {}
             table = table.get("manipcli") if isinstance(table, dict) else None
         if isinstance(table, dict):
-            return _File(path, text, dict(_sections(table)))
+            return _File(path, text, table)
     return None
 
 
-def _sections(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The entries of a file; a table within a table, `[topic.echo]`, becomes the section `topic echo`."""
+def _sections(table: Mapping[str, Any], commands: Commands) -> Iterator[tuple[str, Any]]:
+    """The entries of a file; the table of a sub-command, `[topic.echo]`, becomes the section `topic echo`."""
     for key, value in table.items():
-        tables = [name for name, each in value.items() if isinstance(each, dict)] if isinstance(value, dict) else []
-        yield from ((f"{key} {name}", value[name]) for name in tables)
-        if not tables or len(tables) < len(value):
+        names = [name for name in value if f"{key} {name}" in commands] if isinstance(value, dict) else []
+        yield from ((f"{key} {name}", value[name]) for name in names)
+        if not names:
             yield key, value
+        elif others := {name: each for name, each in value.items() if name not in names}:
+            yield key, others
 
 
 def _syntax(path: Path, cause: str) -> Diagnostic:
