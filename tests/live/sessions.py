@@ -58,10 +58,21 @@ def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path) 
         recorder.finish(verdict_metadata(judge_log(recorder.partial_path, being_written=True)))
 
 
-def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str | None = TOKEN) -> Path:
-    """Serve a small task as fast as possible while `use` runs with its URL; returns the log of the session."""
-    file, log = folder / "small.yaml", folder / "session.mcap"
-    file.write_text(SMALL)
+def serving(
+    folder: Path,
+    use: Callable[[str], Awaitable[None]],
+    *,
+    token: str | None = TOKEN,
+    task: Path | None = None,
+    speed: float | None = None,
+) -> Path:
+    """Serve a task, or a small one, while `use` runs with its URL; returns the log.
+
+    `speed`: simulated seconds per second; None: as fast as possible.
+    """
+    file, log = task or folder / "small.yaml", folder / "session.mcap"
+    if task is None:
+        file.write_text(SMALL)
     announced: queue.Queue[str] = queue.Queue()
     over = threading.Event()
     failures: list[BaseException | str] = []
@@ -71,7 +82,7 @@ def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str |
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=None)
+        options = LiveOptions(Access(token), port=0, speed=speed)
         try:
             _, failure = pipeline.serve_task(file, options, log=log, between=between, announce=announced.put)
             failures.extend([failure] if failure else [])
