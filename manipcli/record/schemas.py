@@ -6,6 +6,7 @@ line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schem
 
 from __future__ import annotations
 
+from manipcli.record.rosapi_definitions import ROSAPI
 from manipcli.record.simulation_schemas import SIMULATION
 
 STRING = "std_msgs/msg/String"
@@ -221,6 +222,7 @@ DEFINITIONS: dict[str, str] = {
     ),
     "controller_manager_msgs/SwitchController_Response": "bool ok\nstring message\n",
     **SIMULATION,
+    **ROSAPI,
 }
 
 CONTACTS_WITHOUT_POINTS = (

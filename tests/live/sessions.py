@@ -59,11 +59,22 @@ def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path) 
 
 
 def serving(
-    folder: Path, use: Callable[[str], Awaitable[None]], *, token: str | None = TOKEN, task: str = SMALL
+    folder: Path,
+    use: Callable[[str], Awaitable[None]],
+    *,
+    token: str | None = TOKEN,
+    task: Path | str = SMALL,
+    speed: float | None = None,
 ) -> Path:
-    """Serve a small task as fast as possible while `use` runs with its URL; returns the log of the session."""
+    """Serve a task, a file or its text, while `use` runs with its URL; returns the log.
+
+    `speed`: simulated seconds per second; None: as fast as possible.
+    """
     file, log = folder / "small.yaml", folder / "session.mcap"
-    file.write_text(task)
+    if isinstance(task, Path):
+        file = task
+    else:
+        file.write_text(task)
     announced: queue.Queue[str] = queue.Queue()
     over = threading.Event()
     failures: list[BaseException | str] = []
@@ -73,7 +84,7 @@ def serving(
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=None)
+        options = LiveOptions(Access(token), port=0, speed=speed)
         try:
             _, failure = pipeline.serve_task(
                 file, options, log=log, between=between, announce=announced.put, allow_outside=True
