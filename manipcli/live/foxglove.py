@@ -155,6 +155,8 @@ class FoxgloveServer:
             now = self._now()
             if now < last:
                 self._server.clear_session()
+                for topic, (data, ns) in [*self._last.items()]:
+                    self._channels[topic].log(data, log_time=ns)
             self._server.broadcast_time(now)
             last = now
 

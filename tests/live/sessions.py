@@ -66,10 +66,18 @@ def serving(
     token: str | None = TOKEN,
     foxglove: int | None = None,
     progress: Progress = SILENT,
+    task: Path | str = SMALL,
+    speed: float | None = None,
 ) -> Path:
-    """Serve a small task as fast as possible while `use` runs with its URL; returns the log of the session."""
+    """Serve a task, a file or its text, while `use` runs with its URL; returns the log.
+
+    `speed`: simulated seconds per second; None: as fast as possible.
+    """
     file, log = folder / "small.yaml", folder / "session.mcap"
-    file.write_text(SMALL)
+    if isinstance(task, Path):
+        file = task
+    else:
+        file.write_text(task)
     announced: queue.Queue[str] = queue.Queue()
     over = threading.Event()
     failures: list[BaseException | str] = []
@@ -79,10 +87,16 @@ def serving(
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=None, foxglove=foxglove)
+        options = LiveOptions(Access(token), port=0, speed=speed, foxglove=foxglove)
         try:
             _, failure = pipeline.serve_task(
-                file, options, log=log, progress=progress, between=between, announce=announced.put
+                file,
+                options,
+                log=log,
+                progress=progress,
+                between=between,
+                announce=announced.put,
+                allow_outside=True,
             )
             failures.extend([failure] if failure else [])
         except BaseException as error:  # noqa: BLE001 (raised again by the test)
