@@ -33,6 +33,7 @@ class Caller:
         self._number = 0
         self._lock = asyncio.Lock()
         self._socket: ClientConnection | None = None
+        self._cancelling: asyncio.Future[str] | None = None
 
     async def __aenter__(self) -> Self:
         from websockets.asyncio.client import connect
@@ -62,13 +63,26 @@ class Caller:
         Raises:
             CallFailed: it is refused, or the session ends.
         """
-        async with self._lock:
-            id_ = await self._send(op="send_action_goal", action=action, action_type=kind, args=goal)
-            try:
-                return _values(action, await self._answer(id_, "action_result"))
-            except asyncio.CancelledError:
-                await self._send(op="cancel_action_goal", action=action, id=id_)
-                raise
+        await self._lock.acquire()
+        self._number += 1
+        id_ = f"goal:{self._number}"
+        # A task of its own: it takes the result of a cancelled goal, too, before the next request.
+        asking = asyncio.ensure_future(self._goal(id_, action=action, action_type=kind, args=goal))
+        asking.add_done_callback(self._asked)
+        try:
+            return await asyncio.shield(asking)
+        except asyncio.CancelledError:
+            self._cancelling = asyncio.ensure_future(self._send(op="cancel_action_goal", action=action, id=id_))
+            raise
+
+    async def _goal(self, id_: str, **goal: object) -> dict[str, Any]:
+        await self._send(op="send_action_goal", id=id_, **goal)
+        return _values(str(goal["action"]), await self._answer(id_, "action_result"))
+
+    def _asked(self, asking: asyncio.Future[dict[str, Any]]) -> None:
+        self._lock.release()
+        if not asking.cancelled():
+            asking.exception()  # it is retrieved, also where nobody waits any more
 
     async def latest(self, topic: str) -> dict[str, Any]:
         """The next message of a topic.

@@ -42,7 +42,7 @@ class Folder:
         return self._inside(word, self.root, "the folder of this server")
 
     def log(self, word: str) -> str:
-        """The path of a log to write, `runs/NAME.mcap`, from `NAME` or `runs/NAME.mcap`.
+        """The path of a log to write, `runs/NAME.mcap`, from `NAME` or `runs/NAME.mcap`; its folder is created.
 
         Raises:
             Outside: it is not below `runs`, or `runs` is elsewhere.
@@ -51,7 +51,12 @@ class Folder:
         where = self.root / RUNS
         if where.resolve() != where:
             raise Outside(f"'{RUNS}' is a symbolic link; logs are written to a folder '{RUNS}' only")
-        return self._inside(f"{RUNS}/{name}.mcap", where, f"the folder '{RUNS}'")
+        found = self._inside(f"{RUNS}/{name}.mcap", where, f"the folder '{RUNS}'")
+        try:
+            (self.root / found).parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise Outside(f"the folder of '{found}' cannot be created: {error.strerror}") from None
+        return found
 
     def _inside(self, word: str, root: Path, what: str) -> str:
         if not word or len(word) > LONGEST or not word.isprintable():

@@ -77,11 +77,14 @@ class LiveTools:
     async def live_run_step(self, step: Step) -> str:
         """Plan and do one step in the live session, from the present state. Returns its outcome (done, or why not) and
         its margin as JSON."""
-        return await self._asked(lambda caller: caller.goal(*RUN_STEP, {"step": _json(step)}))
+        found = await self._asked(lambda caller: caller.goal(*RUN_STEP, {"step": _json(step)}))
+        if found.get("outcome") == "invalid":
+            raise Failed(str(found.get("text")))
+        return json.dumps(found)
 
     async def live_check_step(self, step: Step) -> str:
         """Whether a step is valid and has a plan from the present state of the live session; nothing moves."""
-        return await self._asked(lambda caller: caller.call(CHECK_STEP, {"step": _json(step)}))
+        return json.dumps(await self._asked(lambda caller: caller.call(CHECK_STEP, {"step": _json(step)})))
 
     async def live_state(self) -> str:
         """State of the live session as JSON: simulated time [s], joint positions [rad or m], and the pose of each
@@ -103,7 +106,7 @@ class LiveTools:
                 },
             }
 
-        return await self._asked(state)
+        return json.dumps(await self._asked(state))
 
     async def live_stop(self) -> str:
         """End the live session: its log is finished and judged."""
@@ -116,10 +119,10 @@ class LiveTools:
         if self._session is not None:
             await self._session.close()
 
-    async def _asked(self, ask: Callable[[Caller], Awaitable[dict[str, Any]]]) -> str:
+    async def _asked(self, ask: Callable[[Caller], Awaitable[dict[str, Any]]]) -> dict[str, Any]:
         session = self._opened()
         try:
-            return json.dumps(await ask(session.caller))
+            return await ask(session.caller)
         except CallFailed as error:
             if session.running:
                 raise Failed(str(error)) from None
