@@ -13,8 +13,9 @@ import numpy as np
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejected, refuse_inactive
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
-from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.stopping import Stopping, StopPlanner
 from manipcli.control.tracking_error import TrackingError
 from manipcli.control.trajectory_goal import (
@@ -89,6 +90,7 @@ class JointTrajectoryController:
 
     Attributes:
         notes: arguments that have no effect, and why.
+        scaling: speed of its trajectories, and pauses.
 
     Raises:
         InvalidArgument: no or duplicate joints, incompatible interfaces, gains of an unknown joint, gains all zero
@@ -167,7 +169,9 @@ class JointTrajectoryController:
         scale = np.array([gain.ff_velocity_scale for gain in chosen])
         self.output = ControllerOutput.of(n, len(self.interfaces))
         rows = self.output.rows
-        self._reference = Reference(rows[:3], self.interfaces, velocity_scale=scale if by_error else None)
+        self._reference = Reference(
+            rows[:3], self.interfaces, velocity_scale=scale if by_error else None, acceleration=self._facts.acceleration
+        )
         self._desired, self._desired_velocity = rows[0], rows[1]
         self._commands = rows[3:]
         self._tracking = TrackingError(rows[:2], self._facts)
@@ -175,7 +179,7 @@ class JointTrajectoryController:
         self._error, self._error_rate = self._errors
         feed = self._reference.feed_room[0]
         self._control = None if self._pid is None else self._pid.loop(self._errors, rows[3], feed=feed)
-        self._initial_speed = self._speed = speed_scaling
+        self.scaling = SpeedScaling(self._reference, speed_scaling, now=lambda: self._time, ask=self._ask)
         self._clear(time=0.0)
 
     def _clear(self, *, time: float) -> None:
@@ -186,32 +190,13 @@ class JointTrajectoryController:
         self._next: ActiveGoal | None = None
         self._stop = False
         self._bound = np.inf
-        self._speed = self._initial_speed
+        self.scaling.reset()
 
     @property
     def tolerances(self) -> Tolerances:
         """The tolerances of the goal, waiting or active, otherwise of the controller."""
         goal = self._next or self._goal
         return self._default_tolerances if goal is None else goal.tolerances
-
-    @property
-    def speed_scaling(self) -> float:
-        """Trajectory seconds per second."""
-        return self._speed
-
-    def set_speed_scaling(self, speed: float) -> bool:
-        """Set the speed of trajectories from the last update on: 0 pauses, 1 is nominal. Stops are not scaled.
-
-        The reference's velocity is multiplied by `speed`, its acceleration by the square.
-
-        Returns:
-            False for a negative or non-finite speed, which has no effect.
-        """
-        if not 0.0 <= speed < np.inf:
-            return False
-        self._speed = float(speed)
-        self._reference.rescale(self._speed, time=self._time)
-        return True
 
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
@@ -297,11 +282,7 @@ class JointTrajectoryController:
 
     def _look_closer(self, time: float, measured: JointState) -> None:
         """Abort the goal if a joint exceeds its path tolerance."""
-        for what, values in (("position", measured.position), ("velocity", measured.velocity)):
-            if not np.isfinite(values).all():
-                j = int(np.flatnonzero(~np.isfinite(values))[0])
-                message = f"the measured {what} of joint '{self.joints[j]}' is {values[j]} at t = {time:.3f} s"
-                raise InvalidArgument("CTRL106", f"controller '{self.name}': {message}")
+        refuse_not_finite(self.name, self.joints, measured, time)
         goal, reference = self._goal, self._reference
         if goal is None:
             return
@@ -338,6 +319,10 @@ class JointTrajectoryController:
         elif self._stop:
             self._come_to_rest(self._reference.row(time), time, period)
         self._next, self._stop = None, False
+        self.scaling.approach(time, period)
+
+    def _ask(self) -> None:
+        self._waiting = True
 
     def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
         """Make the waiting goal active, and sample its references for every tick."""
@@ -346,7 +331,8 @@ class JointTrajectoryController:
         at = (measured.position, measured.velocity)
         if goal.unchecked and not self._reachable(goal, time, period, measured):
             return
-        active = self._transitions.to_goal(goal.trajectory, later, reference, time, self._speed, at)
+        speed = self.scaling.pace(time)
+        active = self._transitions.to_goal(goal.trajectory, later, reference, time, speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)
         if broken is not None:
@@ -356,7 +342,7 @@ class JointTrajectoryController:
         goal.begin = later
         self._goal = goal
         self._bound = goal.tolerances.bound
-        reference.follow(active, samples, time=time, period=period, speed=self._speed)
+        reference.follow(active, samples, time=time, period=period, speed=speed[0])
         reference.advance(time, period)
 
     def _reachable(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> bool:

@@ -164,6 +164,7 @@ class CartesianImpedanceController:
             types=types, compat=compat, stop_planner=stop_planner,
         )  # fmt: skip
         self.name, self.joints = self._follower.name, self._follower.joints
+        self.scaling = self._follower.scaling
         self.feed_forward: FeedForward = feed_forward
         self._stiffness = self._six("stiffness", stiffness)
         self._damping = None if damping is None else self._six("damping", damping)

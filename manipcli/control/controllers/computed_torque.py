@@ -122,6 +122,7 @@ class ComputedTorqueController:
             stop_planner=stop_planner,
         )
         self.name, self.joints = self._follower.name, self._follower.joints
+        self.scaling = self._follower.scaling
         followed = self._follower.output
         self._correction = followed.command
         self._wanted = np.zeros(len(self.joints))
