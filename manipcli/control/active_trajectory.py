@@ -215,9 +215,10 @@ class Reference:
             self.advance(time, period)
 
     def scale_feed(self, scale: Array) -> None:
-        """From the next tick on, a PID has this feed-forward (n)."""
-        self._scale = scale
-        self._drop()
+        """From the next tick on, `velocity_scale` is `scale` (n)."""
+        if not np.array_equal(scale, self._scale):  # type: ignore[arg-type]
+            self._scale = scale
+            self._drop()
 
     def advance(self, time: float, period: float) -> None:
         """Writes `rows`, `feed_room` and `ended` of `time` [s], where the next is a `period` later."""

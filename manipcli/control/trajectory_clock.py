@@ -58,7 +58,7 @@ class TrajectoryClock:
     def ahead(self, time: float, period: float, count: int) -> tuple[Array, Array, Array]:
         """As `now`, arrays (count) at `time` and the following multiples of `period` [s]."""
         s, speed, rate = self.now(time)
-        steps = np.arange(count)
+        steps = np.arange(count, dtype=np.float64)
         if rate == 0.0 and speed == self._wanted:
             return s + speed * period * steps, np.full(count, speed), np.zeros(count)
         rows = np.array([self.now(time + k * period) for k in steps.tolist()])

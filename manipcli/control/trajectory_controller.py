@@ -14,7 +14,7 @@ from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejecte
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
-from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.gains import build_pid, joint_gains, tune_pid
 from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.stopping import Stopping, StopPlanner
 from manipcli.control.tracking_error import TrackingError
@@ -28,6 +28,7 @@ from manipcli.control.trajectory_goal import (
     refused,
 )
 from manipcli.control.transitions import Transitions
+from manipcli.control.tunable_gains import TunableGains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
@@ -91,6 +92,7 @@ class JointTrajectoryController:
     Attributes:
         notes: arguments that have no effect, and why.
         scaling: speed of its trajectories, and pauses.
+        gains: of its PID, which may change; None without one.
 
     Raises:
         InvalidArgument: no or duplicate joints, incompatible interfaces, gains of an unknown joint, gains all zero
@@ -166,6 +168,7 @@ class JointTrajectoryController:
         by_error = controlled_by_error(self.interfaces)
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
+        self.gains = TunableGains(name, self.joints, chosen, self._tune) if by_error else None
         scale = np.array([gain.ff_velocity_scale for gain in chosen])
         self.output = ControllerOutput.of(n, len(self.interfaces))
         rows = self.output.rows
@@ -197,6 +200,11 @@ class JointTrajectoryController:
         """The tolerances of the goal, waiting or active, otherwise of the controller."""
         goal = self._next or self._goal
         return self._default_tolerances if goal is None else goal.tolerances
+
+    def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
+        assert self._pid is not None
+        tune_pid(self._pid, self.name, self.joints, gains)
+        self._reference.scale_feed(np.array([gain.ff_velocity_scale for gain in gains]))
 
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None

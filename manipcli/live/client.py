@@ -176,7 +176,7 @@ class Client:
     def _call_service(self, frame: dict[str, Any]) -> None:
         name = "/" + text_of(frame, "service").lstrip("/")
         request = frame.get("args", {})
-        if name.startswith("/rosapi/"):
+        if name in self._rosapi_names:
             self._respond(frame, Answer(True, self._services.rosapi.call(name, request)))
             return
         kind = self._offer.services.get(name)
@@ -194,8 +194,8 @@ class Client:
         self._calls += 1
 
     @property
-    def _rosapi_names(self) -> list[str]:
-        return [*self._services.rosapi.names]
+    def _rosapi_names(self) -> tuple[str, ...]:
+        return self._services.rosapi.names
 
     def _respond(self, frame: Mapping[str, Any], answer: Answer) -> None:
         values: object = answer.values if answer.ok else answer.text

@@ -1,4 +1,4 @@
-"""Services of rosapi, which clients of rosbridge ask for names and types; they only read."""
+"""Services of rosapi, which clients of rosbridge ask for names and types; `interfaces/parameters.py` has the others."""
 
 from __future__ import annotations
 
@@ -31,8 +31,6 @@ class Rosapi:
             "node_details": self._node_details,
             "get_time": lambda _: {"time": clock()},
             "get_ros_version": lambda _: {"version": 2, "distro": "manipcli"},
-            "get_param_names": lambda _: {"names": []},
-            "has_param": lambda _: {"exists": False},
             "message_details": lambda asked: _details(_text(asked, "type")),
             "service_request_details": lambda asked: _details(f"{_text(asked, 'type')}_Request"),
             "service_response_details": lambda asked: _details(f"{_text(asked, 'type')}_Response"),

@@ -122,7 +122,7 @@ class ComputedTorqueController:
             stop_planner=stop_planner,
         )
         self.name, self.joints = self._follower.name, self._follower.joints
-        self.scaling = self._follower.scaling
+        self.scaling, self.gains = self._follower.scaling, self._follower.gains
         followed = self._follower.output
         self._correction = followed.command
         self._wanted = np.zeros(len(self.joints))
