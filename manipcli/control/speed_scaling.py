@@ -62,8 +62,7 @@ class SpeedScaling:
         self.factor = float(factor)
         if at_once:
             self._reference.rescale(self.wanted, time=self._now())
-        else:
-            self._ask()
+        self._ask()
         return True
 
     def pause(self) -> None:

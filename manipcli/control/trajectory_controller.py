@@ -194,6 +194,7 @@ class JointTrajectoryController:
         self._stop = False
         self._bound = np.inf
         self.scaling.reset()
+        self._scaled = True
 
     @property
     def tolerances(self) -> Tolerances:
@@ -276,6 +277,8 @@ class JointTrajectoryController:
             reference.advance(time, period)
         if self._waiting:
             self._handle_requests(time, period, measured)
+        if self._scaled:
+            self._report_speed(time)
         if not self._tracking.update(measured, self._bound):
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
@@ -330,7 +333,11 @@ class JointTrajectoryController:
         self.scaling.approach(time, period)
 
     def _ask(self) -> None:
-        self._waiting = True
+        self._waiting = self._scaled = True
+
+    def _report_speed(self, time: float) -> None:
+        self.output.speed[0] = speed = self.scaling.pace(time)[0]
+        self._scaled = not speed == self.scaling.wanted == 1.0
 
     def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
         """Make the waiting goal active, and sample its references for every tick."""

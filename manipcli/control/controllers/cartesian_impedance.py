@@ -185,7 +185,7 @@ class CartesianImpedanceController:
         self._block = np.ix_(self._columns, self._columns)
         self._q = np.zeros(len(kinematics.robot.joint_names))
         self._singular = SINGULAR**2 * np.eye(6)
-        self.output = ControllerOutput.of(len(self.joints), 1)
+        self.output = ControllerOutput.of(len(self.joints), 1, speed=self._follower.output.speed)
         self._error = np.zeros(6)
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))

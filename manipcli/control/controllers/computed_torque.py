@@ -133,6 +133,7 @@ class ComputedTorqueController:
             acceleration=followed.acceleration,
             commands=followed.commands,
             wanted_acceleration=self._wanted,
+            speed=followed.speed,
         )
 
     @property

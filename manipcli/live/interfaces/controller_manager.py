@@ -102,11 +102,11 @@ def _list_types(robot: LiveRobot, command: Command, request: dict[str, Any]) -> 
 
 
 def _list_interfaces(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
-    """Interfaces of all moving joints, and of controllers that take references; joints that follow others have states."""
+    """Interfaces of all moving joints, commands of those that follow no other, and of controllers with references."""
     manager = robot.manager
     active = [manager[info.name] for info in manager.list() if info.state == "active"]
     claimed = {f"{joint}/{interface}" for joint, interface in Claims.of(active).owners}
-    names = {name: True for name in _commandable(robot)}
+    names = dict.fromkeys(_commandable(robot), True)
     for info in manager.list():
         names |= dict.fromkeys(_references(manager[info.name]), info.state == "active")
     commands = [_interface(name, available, claimed=name in claimed) for name, available in names.items()]
