@@ -264,6 +264,7 @@ DEFINITIONS: dict[str, str] = {
     "rosapi_msgs/DeleteParam_Request": "string name\n",
     "rosapi_msgs/DeleteParam_Response": "bool successful\nstring reason\n",
     "std_msgs/Float64": "float64 data\n",
+    "control_msgs/MultiDOFCommand": "string[] dof_names\nfloat64[] values\nfloat64[] values_dot\n",
     "control_msgs/SpeedScalingFactor": "float64 factor\n",
     "std_srvs/Trigger_Request": "",
     "std_srvs/Trigger_Response": "bool success\nstring message\n",

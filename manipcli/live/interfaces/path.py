@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, Protocol, TypeGuard
 
-from manipcli.control.action import refuse_inactive
 from manipcli.control.controller import Controller
 from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.core.errors import InvalidArgument
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces.controllers import controller_of
+from manipcli.live.interfaces.controllers import controller_of, refuse_unless_active
 from manipcli.live.live_robot import LiveRobot
 from manipcli.task.task import Task
 
@@ -45,8 +44,7 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoin
 def _scaling(robot: LiveRobot, command: Command) -> SpeedScaling:
     controller = controller_of(robot, command)
     assert is_scaled(controller)
-    active = any(info.name == controller.name and info.state == "active" for info in robot.manager.list())
-    refuse_inactive(controller.name, active)
+    refuse_unless_active(robot, controller)
     return controller.scaling
 
 
