@@ -53,7 +53,7 @@ class TunableGains:
         for (joint, gain), value in values.items():
             if gain in FIXED:
                 message = f"controller '{self._name}': {gain} of joint '{joint}' cannot change while it is loaded"
-                raise InvalidArgument("CTRL223", message, hint="set it in the controllers file")
+                raise InvalidArgument("CTRL222", message, hint="set it in the controllers file")
             given = new[joint].model_dump(exclude_unset=True) | {gain: value}
             new[joint] = gains_of(self._name, joint, given, type(new[joint]))
         self._apply(tuple(new[joint] for joint in self._joints))

@@ -75,7 +75,7 @@ class Ride:
 
 def far_from_path(positions):
     """Largest distance of positions (T, 2) from the path, by brute force over a dense polyline."""
-    _, path, _, _ = densely(4001)
+    _, path, _, _ = densely(2001)
     first, step = path[:-1], np.diff(path, axis=0)
     worst = 0.0
     for q in positions:
@@ -98,13 +98,13 @@ def changed(ride, seed):
     return ride.end()
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_scaled_trajectory_is_on_the_same_path_within_the_same_limits(seed):
     limits = most()
     ride = changed(Ride(limits), seed)
     assert ride.handle.status == "succeeded"
     assert min(ride.factors) < 0.9, "the ride was scaled"
-    assert far_from_path(ride.positions[::11]) < 1e-6
+    assert far_from_path(ride.positions[::23]) < 1e-6
     np.testing.assert_allclose(ride.positions[-1], END[0], atol=1e-9)
     rows = np.array(ride.rows)
     velocity = np.diff(rows[:, 0], axis=0) / PERIOD
@@ -130,12 +130,12 @@ def test_a_pause_rests_on_the_path_and_a_resumed_goal_has_all_its_time():
     """The integral of the speed over time is the duration of the trajectory."""
     ride = Ride()
     ride.run(500).controller.scaling.pause()
-    ride.run(3000)
+    ride.run(1500)
     assert ride.factors[-1] == 0.0
     assert not np.array(ride.rows[-1])[1:3].any()
     assert ride.handle.active
     assert far_from_path(ride.positions[::50]) < 1e-6
-    assert (ride.positions[-2000:] == ride.positions[-1]).all()
+    assert (ride.positions[-1000:] == ride.positions[-1]).all()
     assert 0.2 < ride.factors[500:].index(0.0) * PERIOD < 0.3
     ride.controller.scaling.resume()
     ride.end()
