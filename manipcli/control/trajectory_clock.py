@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Final
 
@@ -10,7 +11,9 @@ import numpy as np
 from manipcli.core.geometry import Array
 
 RATE: Final = 4.0
-"""[1/s] Largest change of the speed: from nominal to rest in at least 0.25 s."""
+"""[1/s] Largest rate of the speed."""
+SLEW: Final = 40.0
+"""[1/s2] Largest change of the rate towards the wanted speed: from nominal to rest in at least 0.35 s."""
 ON_KNOT: Final = 1e-3
 """A time within this tolerance, in periods, of a knot counts as that knot."""
 
@@ -18,14 +21,14 @@ ON_KNOT: Final = 1e-3
 class TrajectoryClock:
     """Runs at a constant speed f, or changes it along the path q(s) of the trajectory.
 
-    While it changes, f is linear between knots one control period apart. At each knot its rate is the greatest towards
-    the wanted speed with |rate| <= `RATE` and, for each joint with an acceleration limit a,
+    While it changes, f is linear between knots one control period apart. Its rate is at most `RATE` and changes by
+    `SLEW`; at each knot, for each joint with an acceleration limit a,
 
         |q'' f^2 + q' rate| <= max(a, |q''| f^2)
 
     The left side is the acceleration of the joint. So a change of speed exceeds no limit that the trajectory keeps, the
     joints stay on the path, and speed 0 is rest on it. Where the trajectory itself brakes at a limit, it cannot brake
-    more: the change waits. Jerks are not limited.
+    more: the change waits. Limits of jerk are not considered.
 
     Args:
         time: [s] at which s is 0.
@@ -78,10 +81,10 @@ class TrajectoryClock:
             path: s [s] -> rows of position, velocity, acceleration (n) on the trajectory.
             limits: (n) of accelerations; infinite without a limit.
         """
-        s, present, _ = self.now(time)
+        s, present, rate = self.now(time)
         self._begin, self._period, self._wanted = time, period, speed
         self._path, self._limits = path, limits
-        self._s, self._speeds, self._rates = [s], [present], [self._rate(s, present)]
+        self._s, self._speeds, self._rates = [s], [present], [self._rate(s, present, rate)]
 
     def _extend(self, last: int) -> None:
         """Knots up to this one, or until the wanted speed."""
@@ -95,16 +98,26 @@ class TrajectoryClock:
             reached = self._wanted
         self._s.append(s + h * (speed + 0.5 * rate * h))
         self._speeds.append(reached)
-        self._rates.append(self._rate(self._s[-1], reached))
+        self._rates.append(self._rate(self._s[-1], reached, rate))
 
-    def _rate(self, s: float, speed: float) -> float:
-        """The greatest rate towards the wanted speed; see the class."""
-        change = self._wanted - speed
-        if change == 0.0:
-            return 0.0
+    def _rate(self, s: float, speed: float, before: float) -> float:
+        """The rate from a knot on, after the rate `before`; see the class."""
+        change, h = self._wanted - speed, self._period
+        slew = SLEW * h
+        if abs(change) <= slew * h and abs(before) <= 2.0 * slew:
+            return change / h
+        sign = math.copysign(1.0, change)
+        towards = sign * before
+        # From here on steps of `slew` end at the wanted speed: |change| = h (r + (r - slew) + ...).
+        last = math.sqrt(slew**2 / 4.0 + 2.0 * SLEW * abs(change)) - slew / 2.0
+        best = min(RATE, last, towards + slew)
+        rate = sign * max(best, towards - slew)
+        return math.copysign(min(abs(rate), self._room(s, speed, rate)), rate)
+
+    def _room(self, s: float, speed: float, rate: float) -> float:
+        """The largest rate in the direction of `rate` that keeps the acceleration limits."""
         _, velocity, acceleration = self._path(s)[:3]
         moves = velocity != 0.0
-        along = acceleration[moves] * speed**2 * np.sign(velocity[moves] * change)
+        along = acceleration[moves] * speed**2 * np.sign(velocity[moves] * rate)
         room = (np.maximum(self._limits[moves], np.abs(along)) - along) / np.abs(velocity[moves])
-        most = min(RATE, abs(change) / self._period, float(room.min(initial=RATE)))
-        return most if change > 0.0 else -most
+        return float(room.min(initial=np.inf))

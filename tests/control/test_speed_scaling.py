@@ -5,6 +5,7 @@ import pytest
 
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
+from manipcli.control.trajectory_clock import TrajectoryClock
 from manipcli.description.elements import JointLimits
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 
@@ -136,7 +137,9 @@ def test_a_pause_rests_on_the_path_and_a_resumed_goal_has_all_its_time():
     assert ride.handle.active
     assert far_from_path(ride.positions[::50]) < 1e-6
     assert (ride.positions[-1000:] == ride.positions[-1]).all()
-    assert 0.2 < ride.factors[500:].index(0.0) * PERIOD < 0.3
+    assert ride.factors[500:].index(0.0) * PERIOD == pytest.approx(
+        1.0 / 4.0 + 4.0 / 40.0, abs=3 * PERIOD
+    )  # trapezoid of rates
     ride.controller.scaling.resume()
     ride.end()
     assert ride.handle.status == "succeeded"
@@ -164,3 +167,27 @@ def test_a_change_waits_while_the_trajectory_itself_brakes_at_the_limit():
     ride.run(600).controller.scaling.pause()
     ride.end()
     assert ride.handle.result.time == pytest.approx(1.0, abs=2 * PERIOD)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_speed_changes_without_a_step_of_its_rate_and_arrives(seed):
+    """A clock without limits: |df/dt| <= 4/s, |d2f/dt2| <= 40/s2, between the speeds that were wanted."""
+    random = np.random.default_rng(seed)
+    clock = TrajectoryClock(0.0)
+    path = np.zeros((4, 1))
+    speeds, tick = [], 0
+    for _ in range(15):
+        wanted = float(random.choice([0.0, 1.0, random.uniform()]))
+        clock.change(wanted, tick * PERIOD, PERIOD, lambda s: path, np.array([np.inf]))
+        for _ in range(int(random.choice([3, 40, 150, 500]))):
+            speeds.append(clock.now(tick * PERIOD)[1])
+            tick += 1
+    clock.change(1.0, tick * PERIOD, PERIOD, lambda s: path, np.array([np.inf]))
+    assert clock.now((tick + 500) * PERIOD)[1:] == (1.0, 0.0)
+    rates = np.diff(speeds) / PERIOD
+    assert abs(rates).max() <= 4.0 * (1 + 1e-9)
+    assert abs(np.diff(rates)).max() <= 2.0 * 40.0 * PERIOD * (1 + 1e-9)  # two at once where a change meets another
+    assert min(speeds) >= 0.0
+    assert max(speeds) <= 1.0 + 1e-6
+    s = [clock.now(k * PERIOD)[0] for k in range(tick, tick + 400)]
+    assert (np.diff(s) >= 0.0).all()

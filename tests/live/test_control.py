@@ -105,7 +105,7 @@ def test_a_controller_is_unloaded_loaded_and_paused_and_the_log_simulates_the_sa
             60: [manage("load"), switch(activate_controllers=["arm_controller"])],  # refused: it is unconfigured
             80: [manage("configure"), switch(activate_controllers=["arm_controller"]), move(0.4)],
             200: [pause],
-            500: [resume, slower, get],
+            600: [resume, slower, get],
         },
         1300,
     )
@@ -119,8 +119,8 @@ def test_a_controller_is_unloaded_loaded_and_paused_and_the_log_simulates_the_sa
         "a loaded one has the gains of its file"
     )
     factor = {tick: state["speed_scaling_factor"] for tick, state in states}
-    assert (factor[150], factor[490], factor[1200]) == (1.0, 0.0, 0.5)
-    paused = {tuple(state["reference"]["positions"]) for tick, state in states if 480 <= tick <= 500}
+    assert (factor[150], factor[590], factor[1200]) == (1.0, 0.0, 0.5)
+    paused = {tuple(state["reference"]["positions"]) for tick, state in states if 580 <= tick <= 600}
     assert len(paused) == 1
     (rest,) = paused
     shares = (np.array(rest) - HOME) / (np.array(MOVED) - HOME)
