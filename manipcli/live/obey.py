@@ -65,16 +65,14 @@ class Obedience:
     def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
         if logged:
             self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
-        command.answer(self._failed(command, text, code))
-
-    def _failed(self, command: Command, text: str, code: ErrorCode) -> Answer:
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}
-        return Answer(False, values, text=text, status=ABORTED)
+        command.answer(Answer(False, values, text=text, status=ABORTED))
 
     def abort(self, why: str) -> None:
         """End all goals of clients as aborted, and all services that wait."""
         for goal in self._robot.goals:
-            goal.command.answer(self._failed(goal.command, why, ErrorCode.INVALID_GOAL))
+            values: Values = {"error_code": int(ErrorCode.INVALID_GOAL), "error_string": why}
+            goal.command.answer(Answer(True, values, text=why, status=ABORTED))
         self._robot.goals.clear()
 
     def after_tick(self) -> None:
