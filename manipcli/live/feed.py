@@ -25,11 +25,11 @@ KEPT_MESSAGES: Final = 1000
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The state of one tick; `rows`: those of each controller, None while it is inactive."""
+    """The state of one tick; `outputs`: rows and speed of each controller, None while it is inactive."""
 
     tick: int
     numbers: Array
-    rows: tuple[Array | None, ...]
+    outputs: tuple[tuple[Array, Array] | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +82,8 @@ class Feed:
         self.tick_now = tick
         if not self.wanted or tick % self._every:
             return
-        rows = tuple(None if output is None else output.rows.copy() for output in outputs)
-        self._put(self._samples, KEPT_SAMPLES, Sample(tick, state.numbers.copy(), rows))
+        copies = tuple(None if output is None else (output.rows.copy(), output.speed.copy()) for output in outputs)
+        self._put(self._samples, KEPT_SAMPLES, Sample(tick, state.numbers.copy(), copies))
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
         if self.observer is not None:

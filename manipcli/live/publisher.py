@@ -93,7 +93,7 @@ class Publisher:
             every = Selection({word(topic): 1 for topic in wanted})
             self._block = Block(self._robot, self._scene, self._recorded, table, every, self._period, 1)
         np.copyto(self._state.numbers, sample.numbers)
-        outputs: Any = [None if rows is None else SimpleNamespace(rows=rows) for rows in sample.rows]
+        outputs: Any = [None if own is None else SimpleNamespace(rows=own[0], speed=own[1]) for own in sample.outputs]
         self._block.add(sample.tick, self._state, outputs)
         content = self._block.encode([])
         return b"" if content is None else content.data
