@@ -82,6 +82,7 @@ def errors_of_names_and_messages(run: Run, url: str) -> None:
         (["topic", "echo", "/joint_states", "--once", "--field", "pose"], "USE161", "fields: header, name"),
         (["service", "call", "/controller_manager/list_controler"], "LIVE192", "list_controllers"),
         (["action", "send", *FOLLOW, goal(1, ["elbow", *ARM[1:]])], "LIVE191", "INVALID_JOINTS (-2)"),
+        (["param", "set", "/arm_controller", "gains.joint_1.p", "[1]"], "LIVE191", "double"),
         (["param", "get", "/arm_controller", "no_such"], "LIVE192", "no parameter '/arm_controller:no_such'"),
     ):  # fmt: skip
         status, _, err = run(*words, url=url)
@@ -116,6 +117,15 @@ def services_and_goals(run: Run, url: str) -> None:
     assert printed[-1] == "Goal finished with status: CANCELED"
 
 
+def parameters(run: Run, url: str) -> None:
+    assert "  gains.joint_1.p" in run("param", "list", "/arm_controller", url=url)[1].splitlines()
+    words = ("/arm_controller", "gains.joint_1.p")
+    before = yaml.safe_load(run("param", "get", *words, url=url)[1])
+    assert run("param", "set", *words, str(before + 1.0), url=url)[0] == 0
+    assert yaml.safe_load(run("param", "get", ":".join(words), url=url)[1]) == before + 1.0
+    assert run("param", "get", "robot_description", url=url)[1].startswith("<?xml")
+
+
 def published(run: Run, url: str) -> None:
     message = goal(1).removeprefix("{trajectory: ")[:-1]
     code, _, err = run("topic", "pub", "--times", "3", "--rate", "100", *TOPIC, message, url=url)
@@ -127,7 +137,7 @@ def published(run: Run, url: str) -> None:
 
 def test_the_commands_of_a_session(run: Run, tmp_path: Path) -> None:
     async def use(url: str) -> None:
-        for laws in (topics, errors_of_names_and_messages, services_and_goals, published):
+        for laws in (topics, errors_of_names_and_messages, services_and_goals, parameters, published):
             await asyncio.to_thread(laws, run, url)
 
     serving(tmp_path, use, speed=4.0)

@@ -131,3 +131,28 @@ def test_dropped_messages_are_counted_on_rosout_and_in_a_status() -> None:
         "/joint_states: 3 messages were dropped; read faster or throttle"
     ]
     assert peer.client.report_drops() == []
+
+
+def test_every_service_that_is_listed_has_a_type_with_a_request_and_a_response() -> None:
+    peer = Peer()
+
+    def call(service: str, **args: Any) -> Any:
+        (answer,) = peer.send(op="call_service", service=f"/rosapi/{service}", id="a", args=args)
+        assert answer["result"] is True, answer
+        return answer["values"]
+
+    names = call("services")["services"]
+    assert len(names) > 20
+    for name in names:
+        kind = call("service_type", service=name)["type"]
+        assert kind.count("/srv/") == 1, name
+        assert name in call("services_for_type", type=kind)["services"]
+        for half in ("request", "response"):
+            assert call(f"service_{half}_details", type=kind)["typedefs"], name
+    for half in ("goal", "feedback", "result"):
+        assert call(f"action_{half}_details", type=FOLLOW)["typedefs"][0]["fieldnames"]
+    raw = call("topics_and_raw_types")
+    assert raw["topics"] == [*OFFER.topics]
+    assert raw["typedefs_full_text"][0].startswith("std_msgs/Header header\n")
+    described = call("message_details", type="control_msgs/FollowJointTrajectory_Result")["typedefs"][0]
+    assert dict(zip(described["constnames"], described["constvalues"], strict=True))["INVALID_JOINTS"] == "-2"
