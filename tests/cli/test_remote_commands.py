@@ -16,6 +16,7 @@ from websockets.sync.server import ServerConnection, serve
 
 from manipcli.cli import console
 from manipcli.cli.app import main
+from manipcli.record.json_message import definition
 from tests.live.sessions import HOME, serving
 
 ARM = [f"joint_{k}" for k in range(1, 8)]
@@ -93,6 +94,10 @@ def services_and_goals(run: Run, url: str) -> None:
     assert (
         run("service", "type", "/controller_manager/list_controllers", url=url)[1].strip().endswith("/ListControllers")
     )
+    for line in run("service", "list", "-t", url=url)[1].splitlines():
+        kind = line.partition(" [")[2].rstrip("]")
+        assert definition(f"{kind}_Request").name, line
+        assert definition(f"{kind}_Response").fields, line
     name = "/controller_manager/switch_controller"
     request = "{deactivate_controllers: [hand_controller], strictness: 2}"
     code, out, _ = run("service", "call", name, "controller_manager_msgs/srv/SwitchController", request, url=url)

@@ -136,8 +136,8 @@ def test_dropped_messages_are_counted_on_rosout_and_in_a_status() -> None:
 def test_every_service_that_is_listed_has_a_type_with_a_request_and_a_response() -> None:
     peer = Peer()
 
-    def call(service: str, **args: Any) -> Any:
-        (answer,) = peer.send(op="call_service", service=f"/rosapi/{service}", id="a", args=args)
+    def call(word: str, **args: Any) -> Any:
+        (answer,) = peer.send(op="call_service", service=f"/rosapi/{word}", id="a", args=args)
         assert answer["result"] is True, answer
         return answer["values"]
 
