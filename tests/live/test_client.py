@@ -69,6 +69,15 @@ def test_two_subscriptions_of_a_topic_get_each_message_once_until_the_last_ends(
     assert peer.publish("/joint_states") == 0
 
 
+def test_a_message_has_the_name_under_which_its_topic_was_subscribed() -> None:
+    peer = Peer()
+    text = json.dumps({"op": "publish", "topic": "/joint_states", "msg": {}}, separators=(",", ":"))
+    for id_, name in (("a", "joint_states"), ("b", "/joint_states")):
+        peer.send(op="subscribe", topic=name, id=id_)
+    peer.client.outbox.publish("/joint_states", text, 100.0)
+    assert {each["topic"] for each in peer.taken()} == {"joint_states", "/joint_states"}
+
+
 @pytest.mark.parametrize("op", UNSUPPORTED)
 def test_an_operation_that_the_server_lacks_is_named_with_what_to_do(op: str) -> None:
     (status,) = Peer().send(op=op, id="7", service="/a", action="/a")
