@@ -21,6 +21,7 @@ from manipcli.live.feed import Feed
 from manipcli.live.frames import MAX_FRAME
 from manipcli.live.publisher import Publisher, is_sampled
 from manipcli.live.rosapi import Rosapi
+from manipcli.record.channels import ROSOUT
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
@@ -163,7 +164,8 @@ class LiveServer:
                     await asyncio.wait_for(connection.send(text), UNREAD)
                 if time.monotonic() - told > TOLD:
                     told = time.monotonic()
-                    _warn_of_drops(client)
+                    for line in client.report_drops():
+                        self._offer(ROSOUT, line)
         except TimeoutError:
             connection.transport.abort()
         except ConnectionClosed:
@@ -198,13 +200,6 @@ class LiveServer:
         now = time.monotonic()
         for client in self._clients.values():
             client.outbox.publish(topic, text, now)
-
-
-def _warn_of_drops(client: Client) -> None:
-    for one in client.outbox.subscriptions.values():
-        if one.dropped:
-            client.status("warning", f"{one.topic}: {one.dropped} messages were dropped; read faster or throttle")
-            one.dropped = 0
 
 
 def _status(code: int) -> Any:
