@@ -15,9 +15,8 @@ from manipcli.live.budget import RATE, Budget
 from manipcli.live.command import Answer, Command
 from manipcli.live.fields import MAX_NAME, Refused, check_type, near, number_of, text_of, topic_of
 from manipcli.live.frames import BadFrame, read_frame
-from manipcli.live.interface import goal_type, request_type
+from manipcli.live.offer import Offer, goal_type, request_type
 from manipcli.live.outbox import MAX_QUEUE, Outbox, Subscription
-from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import Rosapi
 from manipcli.record.json_message import BadMessage, definition, from_json
 
@@ -31,9 +30,19 @@ QUEUE: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class Services:
-    """What all clients share: the published messages, the services of rosapi, and where commands go."""
+    """What all clients share.
 
-    publisher: Publisher
+    Attributes:
+        offer: names and types.
+        latched: the last text of a latched topic; None before its first message.
+        rosapi: answers its services.
+        put: hands a command to the control loop; False if too many wait.
+        in_network: calls in the thread of the network.
+        subscribed: to be called when subscriptions have changed.
+    """
+
+    offer: Offer
+    latched: Callable[[str], str | None]
     rosapi: Rosapi
     put: Callable[[Command], bool]
     in_network: Callable[[Callable[[], None]], None]
@@ -54,7 +63,7 @@ class Client:
         self._number = number
         self._commands = commands
         self._services = services
-        self._offer = services.publisher.offer
+        self._offer = services.offer
         self._goals: dict[str, str] = {}
         self._calls = 0
         self._sent = 0
@@ -164,7 +173,7 @@ class Client:
         throttle = number_of(frame, "throttle_rate", 0.0) / 1000.0
         length = int(min(number_of(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE
         self.outbox.subscriptions[topic] = Subscription(topic, throttle, deque(maxlen=length))
-        last = self._services.publisher.latched(topic)
+        last = self._services.latched(topic)
         if last is not None:
             self.outbox.publish(topic, last, time.monotonic())
         self._services.subscribed()

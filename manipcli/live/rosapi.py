@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from manipcli.live.command import Values
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.record.definition import Array, Message, Number, Text, Type
 from manipcli.record.json_message import BadMessage, definition
 

@@ -11,18 +11,20 @@ from typing import Final
 from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
 from manipcli.live.access import Access
-from manipcli.live.feed import Feed
+from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
+from manipcli.live.network_process import NetworkProcess
 from manipcli.live.pace import Pace
-from manipcli.live.publisher import Publisher
-from manipcli.live.source import Inbox, recorded_commands
+from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
 from manipcli.run.run_log import recorded
 from manipcli.task.task import Task
 
 DEFAULT_PORT: Final = 9090
 """rosbridge's."""
+WATCHED: Final = 500
+"""Ticks between two looks at the process of the network."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,16 +71,38 @@ def served(
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
     """
-    from manipcli.live.server import LiveServer  # asyncio, which nothing else needs
+    from manipcli.live.network import Setup  # asyncio, which nothing else needs
 
     period = task.spec.simulation.control_period
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    feed, inbox = Feed(period), Inbox()
-    publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
+    setup = Setup(offer, task.robot, task.true.scene, channels, period, options.access, options.port)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
-    with LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port) as server:
-        yield Outside(inbox, feed, pace, between, lambda: announce(options.url(server.port)))
+    with NetworkProcess(setup) as network:
+        least = FAST_PERIOD if options.speed is None else 0.0
+        feed = Feed(period, network.link, topics=offer.published, least=least)
+        watched = _Watch(network, between)
+        outside = Outside(network.link, feed, pace, watched.check, lambda: announce(options.url(network.port)))
+        yield outside
+        outside.failure = outside.failure or watched.lost
+
+
+class _Watch:
+    """Ends the session when the process of the network has ended."""
+
+    def __init__(self, network: NetworkProcess, between: Callable[[], None]) -> None:
+        self._network, self._between = network, between
+        self._left = WATCHED
+        self.lost = ""
+
+    def check(self) -> None:
+        self._between()
+        self._left -= 1
+        if self._left <= 0 or self._network.link.lost:
+            self._left = WATCHED
+            self.lost = self._network.lost
+            if self.lost:
+                raise KeyboardInterrupt
 
 
 def recorded_session(recording: Recording, log: Path) -> Outside:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Protocol
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.command import END, Command
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import JOINT_STATES, LIVE_COMMANDS
 from manipcli.record.foreign.topics import open_topics
-
-WAITING: Final = 1000
-"""Most commands that wait for the next tick."""
 
 
 class Source(Protocol):
@@ -23,27 +19,6 @@ class Source(Protocol):
     def take(self, tick: int) -> Sequence[Command]:
         """The commands that take effect at control tick `tick`, in order; called once per tick."""
         ...
-
-
-class Inbox:
-    """Commands from the threads of the network; never blocks."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[Command] = deque()
-
-    def put(self, command: Command) -> bool:
-        """Add a command; False if too many wait already."""
-        if len(self._waiting) >= WAITING:
-            return False
-        self._waiting.append(command)
-        return True
-
-    def take(self, tick: int) -> Sequence[Command]:
-        """All commands that wait."""
-        waiting = self._waiting
-        if not waiting:
-            return ()
-        return [waiting.popleft() for _ in range(len(waiting))]
 
 
 class Schedule:
