@@ -7,13 +7,20 @@ from typing import Final
 
 from manipcli.control.controller import Controller
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces import controller_manager, controllers
+from manipcli.live.interfaces import controller_manager, controllers, emergency_stop, entities, jog, simulation
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.record import schemas
 from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
 from manipcli.task.task import Task
 
-INTERFACES: Final = (controllers.endpoints, controller_manager.endpoints)
+INTERFACES: Final = (
+    controllers.endpoints,
+    controller_manager.endpoints,
+    jog.endpoints,
+    emergency_stop.endpoints,
+    simulation.endpoints,
+    entities.endpoints,
+)
 """Groups of endpoints: (task, controllers) -> its endpoints."""
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import mmap
 import pickle
+import select
 import socket
 import struct
 import time
@@ -78,6 +79,7 @@ class Link:
         self._waits = False
         self._received = bytearray()
         self._taken = 0
+        self._given_back: list[Command] = []
 
     def sample(self, tick: int, numbers: object, rows: Sequence[object]) -> None:
         """Send the state of a tick: see `Sample`."""
@@ -99,13 +101,26 @@ class Link:
         """The commands that have arrived."""
         if self._waits:
             self._flush()
-        if self.numbers[SENT] == self._taken or self.lost:
-            return ()
-        self._receive()
-        found = [self._command(body) for body in complete(self._received)]
-        self._taken += len(found)
-        self.numbers[TAKEN] = self._taken
+        found, self._given_back = self._given_back, []
+        if self.numbers[SENT] != self._taken and not self.lost:
+            self._receive()
+            new = [self._command(body) for body in complete(self._received)]
+            self._taken += len(new)
+            self.numbers[TAKEN] = self._taken
+            found += new
         return found
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for commands, at most this wall time."""
+        if not self._given_back:
+            if self._waits:
+                self._flush()
+            select.select([self._end], [self._end] if self._waits else [], [], seconds)
+        return True
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        """Take these again, before all others."""
+        self._given_back += commands
 
     def _receive(self) -> None:
         try:

@@ -19,8 +19,8 @@ from typing import Any, Final
 
 from manipcli.core.errors import InvalidInput
 from manipcli.live.access import Access
-from manipcli.live.client import Services
 from manipcli.live.command import Command
+from manipcli.live.connection import Services
 from manipcli.live.link import ANSWER, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
 from manipcli.live.offer import Offer
 from manipcli.live.outlet import Network, Outlet, OutletOptions

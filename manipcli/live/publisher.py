@@ -14,7 +14,7 @@ from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
 from manipcli.record.cdr import NS_PER_S, CdrWriter
-from manipcli.record.channels import Recorded, channel_table
+from manipcli.record.channels import ControllerChannel, Recorded, channel_table
 from manipcli.record.definition import read_definition
 from manipcli.record.json_message import definition, to_json
 from manipcli.record.records import MESSAGE_HEAD, PAYLOAD
@@ -43,11 +43,7 @@ class Publisher:
         self.offer = offer
         self.robot, self.scene, self.recorded, self.period = robot, scene, recorded, period
         self.state = WorldState.room(len(robot.moving_joints), len(scene.movable))
-        self.latched: dict[str, bytes] = {
-            topics.ROBOT_DESCRIPTION: messages.string_message(robot.urdf),
-            topics.TF_STATIC: messages.tf_message(messages.static_transforms(robot, scene), 0),
-            topics.MARKERS: messages.marker_message(scene, 0),
-        }
+        self.latched = dict(begin_messages(robot, scene, recorded))
         self._table = {channel.topic: channel for channel in channel_table(recorded)}
         self._names = {channel.id: topic for topic, channel in self._table.items()}
         self._kinds = {
@@ -103,6 +99,19 @@ class Publisher:
         """The `publish` operation of a message in CDR."""
         message = to_json(self._kinds[topic], data)
         return json.dumps({"op": "publish", "topic": topic, "msg": message}, separators=(",", ":"), allow_nan=False)
+
+
+def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]) -> tuple[tuple[str, bytes], ...]:
+    """The latched topics at the begin of a session, with their messages: there are no goals yet."""
+    no_goals = CdrWriter()
+    no_goals.u32(0)
+    actions = [each for each in recorded if isinstance(each, ControllerChannel) and each.action]
+    return (
+        (topics.ROBOT_DESCRIPTION, messages.string_message(robot.urdf)),
+        (topics.TF_STATIC, messages.tf_message(messages.static_transforms(robot, scene), 0)),
+        (topics.MARKERS, messages.marker_message(scene, 0)),
+        *((each.status_topic, no_goals.data) for each in actions),
+    )
 
 
 def is_sampled(topic: str, offer: Offer) -> bool:

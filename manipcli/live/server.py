@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.access import Access
-from manipcli.live.client import Client, Services
+from manipcli.live.client import Client
+from manipcli.live.connection import Services
 from manipcli.live.frames import MAX_FRAME
 
 if TYPE_CHECKING:

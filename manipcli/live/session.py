@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
@@ -20,6 +20,9 @@ from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
 from manipcli.run.run_log import recorded
 from manipcli.task.task import Task
+
+if TYPE_CHECKING:
+    from manipcli.live.outlet import OutletOptions
 
 DEFAULT_PORT: Final = 9090
 """rosbridge's."""
@@ -36,12 +39,14 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
+        outlets: what shows the session besides the WebSocket server.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
+    outlets: Sequence[OutletOptions] = ()
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -59,7 +64,7 @@ def served(
     announce: Callable[[str], None],
     late: Callable[[str], None],
 ) -> Iterator[Outside]:
-    """A session that clients can connect to.
+    """A session that clients can connect to; after a reset the same `Outside` is that of the next one (`again`).
 
     Args:
         task, manager: of the session.
@@ -70,39 +75,48 @@ def served(
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
+        NetworkFailed: LIVE200 the process of the network did not start.
     """
     from manipcli.live.network import Setup  # asyncio, which nothing else needs
+    from manipcli.live.publisher import begin_messages
 
     period = task.spec.simulation.control_period
+    robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    setup = Setup(offer, task.robot, task.true.scene, channels, period, options.access, options.port)
+    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with NetworkProcess(setup) as network:
         least = FAST_PERIOD if options.speed is None else 0.0
-        feed = Feed(period, network.link, topics=offer.published, least=least)
-        watched = _Watch(network, between)
-        outside = Outside(network.link, feed, pace, watched.check, lambda: announce(options.url(network.port)))
+        latched = begin_messages(robot, scene, channels)
+        feed = Feed(period, network.link, topics=offer.published, latched=latched, least=least)
+        outside = Outside(network.link, feed, pace, ready=lambda: announce(options.url(network.port)))
+        left = 0
+
+        def check() -> None:
+            nonlocal left
+            between()
+            left -= 1
+            if left < 0 or network.link.lost:
+                left = WATCHED
+                if network.lost:
+                    outside.failure = network.lost
+                    raise KeyboardInterrupt
+
+        outside.between = check
         yield outside
-        outside.failure = outside.failure or watched.lost
 
 
-class _Watch:
-    """Ends the session when the process of the network has ended."""
+def next_log(first: Path, number: int, *, overwrite: bool) -> tuple[Path, int]:
+    """The log of the session after number `number`, `runs/pour@live-2.mcap` after `runs/pour@live.mcap`; its number.
 
-    def __init__(self, network: NetworkProcess, between: Callable[[], None]) -> None:
-        self._network, self._between = network, between
-        self._left = WATCHED
-        self.lost = ""
-
-    def check(self) -> None:
-        self._between()
-        self._left -= 1
-        if self._left <= 0 or self._network.link.lost:
-            self._left = WATCHED
-            self.lost = self._network.lost
-            if self.lost:
-                raise KeyboardInterrupt
+    Unless they may be replaced, numbers whose log exists are left out.
+    """
+    while True:
+        number += 1
+        path = first.with_name(f"{first.stem}-{number}{first.suffix}")
+        if overwrite or not path.exists():
+            return path, number
 
 
 def recorded_session(recording: Recording, log: Path) -> Outside:

@@ -17,7 +17,15 @@ class Source(Protocol):
     """Where the control loop gets its commands."""
 
     def take(self, tick: int) -> Sequence[Command]:
-        """The commands that take effect at control tick `tick`, in order; called once per tick."""
+        """The commands that take effect at control tick `tick`, in order; called again for a tick that waits."""
+        ...
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a command, at most this wall time; False: none will come at this tick."""
+        ...
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        """Take these again, before all others: they came after the command that ended the session."""
         ...
 
 
@@ -26,9 +34,17 @@ class Schedule:
 
     def __init__(self, commands: Mapping[int, Sequence[Command]]) -> None:
         self._commands = commands
+        self._taken = -1
 
     def take(self, tick: int) -> Sequence[Command]:
-        return self._commands.get(tick, ())
+        first, self._taken = tick != self._taken, tick
+        return self._commands.get(tick, ()) if first else ()
+
+    def wait(self, seconds: float) -> bool:
+        return False
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        """No effect: the session of a schedule ends with it."""
 
 
 def recorded_commands(log: Path, period: float, *, failed: bool) -> Schedule:

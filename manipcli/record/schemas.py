@@ -6,6 +6,9 @@ line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schem
 
 from __future__ import annotations
 
+from manipcli.record.rosapi_definitions import ROSAPI
+from manipcli.record.simulation_schemas import SIMULATION
+
 STRING = "std_msgs/msg/String"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -24,6 +27,9 @@ TASK_EVENT = "manipcli_msgs/msg/TaskEvent"
 CLOCK = "rosgraph_msgs/msg/Clock"
 JOINT_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 FLOAT64_MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+TWIST = "geometry_msgs/msg/TwistStamped"
+JOINT_JOG = "control_msgs/msg/JointJog"
+TRIGGER = "std_srvs/srv/Trigger"
 LIVE_COMMAND = "manipcli_msgs/msg/LiveCommand"
 
 _CONTACT = (
@@ -47,6 +53,7 @@ DEFINITIONS: dict[str, str] = {
     "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
     "geometry_msgs/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
     "geometry_msgs/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
+    "geometry_msgs/TwistStamped": "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
     "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
     "geometry_msgs/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
     "geometry_msgs/TransformStamped": (
@@ -192,6 +199,12 @@ DEFINITIONS: dict[str, str] = {
         "control_msgs/JointComponentTolerance[] component_goal_tolerance\n"
         "builtin_interfaces/Duration goal_time_tolerance\n"
     ),
+    "control_msgs/JointJog": (
+        "std_msgs/Header header\nstring[] joint_names\nfloat64[] displacements\nfloat64[] velocities\n"
+        "float64 duration\n"
+    ),
+    "std_srvs/Trigger_Request": "",
+    "std_srvs/Trigger_Response": "bool success\nstring message\n",
     "control_msgs/ParallelGripperCommand_Goal": "sensor_msgs/JointState command\n",
     "controller_manager_msgs/ChainConnection": "string name\nstring[] reference_interfaces\n",
     "controller_manager_msgs/ControllerState": (
@@ -208,6 +221,8 @@ DEFINITIONS: dict[str, str] = {
         "bool activate_asap\nbuiltin_interfaces/Duration timeout\n"
     ),
     "controller_manager_msgs/SwitchController_Response": "bool ok\nstring message\n",
+    **SIMULATION,
+    **ROSAPI,
 }
 
 CONTACTS_WITHOUT_POINTS = (
