@@ -14,8 +14,9 @@ from manipcli.control.action import ErrorCode, Feedback, GoalHandle, refuse_inac
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
-from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.gains import build_pid, joint_gains, tune_pid
 from manipcli.control.jog import Jogging, JogTarget
+from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.stopping import Stopping, StopPlanner
 from manipcli.control.tracking_error import TrackingError
 from manipcli.control.trajectory_goal import (
@@ -28,6 +29,7 @@ from manipcli.control.trajectory_goal import (
     refused,
 )
 from manipcli.control.transitions import Transitions
+from manipcli.control.tunable_gains import TunableGains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
@@ -90,6 +92,8 @@ class JointTrajectoryController:
 
     Attributes:
         notes: arguments that have no effect, and why.
+        scaling: speed of its trajectories, and pauses.
+        gains: of its PID, which may change; None without one.
 
     Raises:
         InvalidArgument: no or duplicate joints, incompatible interfaces, gains of an unknown joint, gains all zero
@@ -165,10 +169,13 @@ class JointTrajectoryController:
         by_error = controlled_by_error(self.interfaces)
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
+        self.gains = TunableGains(name, self.joints, chosen, self._tune) if by_error else None
         scale = np.array([gain.ff_velocity_scale for gain in chosen])
         self.output = ControllerOutput.of(n, len(self.interfaces))
         rows = self.output.rows
-        self._reference = Reference(rows[:3], self.interfaces, velocity_scale=scale if by_error else None)
+        self._reference = Reference(
+            rows[:3], self.interfaces, velocity_scale=scale if by_error else None, acceleration=self._facts.acceleration
+        )
         self._desired, self._desired_velocity = rows[0], rows[1]
         self._commands = rows[3:]
         self._tracking = TrackingError(rows[:2], self._facts)
@@ -176,7 +183,7 @@ class JointTrajectoryController:
         self._error, self._error_rate = self._errors
         feed = self._reference.feed_room[0]
         self._control = None if self._pid is None else self._pid.loop(self._errors, rows[3], feed=feed)
-        self._initial_speed = self._speed = speed_scaling
+        self.scaling = SpeedScaling(self._reference, speed_scaling, now=lambda: self._time, ask=self._ask)
         self._clear(time=0.0)
 
     def _clear(self, *, time: float) -> None:
@@ -187,7 +194,8 @@ class JointTrajectoryController:
         self._jogging.end()
         self._stop = False
         self._bound = np.inf
-        self._speed = self._initial_speed
+        self.scaling.reset()
+        self._scaled = True
 
     @property
     def tolerances(self) -> Tolerances:
@@ -195,24 +203,10 @@ class JointTrajectoryController:
         goal = self._next or self._goal
         return self._default_tolerances if goal is None else goal.tolerances
 
-    @property
-    def speed_scaling(self) -> float:
-        """Trajectory seconds per second."""
-        return self._speed
-
-    def set_speed_scaling(self, speed: float) -> bool:
-        """Set the speed of trajectories from the last update on: 0 pauses, 1 is nominal. Stops are not scaled.
-
-        The reference's velocity is multiplied by `speed`, its acceleration by the square.
-
-        Returns:
-            False for a negative or non-finite speed, which has no effect.
-        """
-        if not 0.0 <= speed < np.inf:
-            return False
-        self._speed = float(speed)
-        self._reference.rescale(self._speed, time=self._time)
-        return True
+    def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
+        assert self._pid is not None
+        tune_pid(self._pid, self.name, self.joints, gains)
+        self._reference.scale_feed(np.array([gain.ff_velocity_scale for gain in gains]))
 
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
@@ -297,7 +291,9 @@ class JointTrajectoryController:
         if self._waiting:
             self._handle_requests(time, period, measured)
         if self._jogging.active:
-            self._jogging.step(reference, time, period, min(self._speed, 1.0))
+            self._jogging.step(reference, time, period, min(self.scaling.wanted, 1.0))
+        if self._scaled:
+            self._report_speed(time)
         if not self._tracking.update(measured, self._bound):
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
@@ -350,6 +346,14 @@ class JointTrajectoryController:
         elif self._stop:
             self._come_to_rest(self._reference.row(time), time, period)
         self._next, self._stop = None, False
+        self.scaling.approach(time, period)
+
+    def _ask(self) -> None:
+        self._waiting = self._scaled = True
+
+    def _report_speed(self, time: float) -> None:
+        self.output.speed[0] = speed = self.scaling.pace(time)[0]
+        self._scaled = not speed == self.scaling.wanted == 1.0
 
     def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
         """Make the waiting goal active, and sample its references for every tick."""
@@ -357,9 +361,9 @@ class JointTrajectoryController:
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
         if goal.unchecked and not goal.reachable(self._transitions, reference, time, period, measured.position):
             return
-        active = self._transitions.to_goal(
-            goal.trajectory, later, reference, time, self._speed, (measured.position, measured.velocity)
-        )
+        speed = self.scaling.pace(time)
+        at = (measured.position, measured.velocity)
+        active = self._transitions.to_goal(goal.trajectory, later, reference, time, speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)
         if broken is not None:
@@ -369,7 +373,7 @@ class JointTrajectoryController:
         goal.begin = later
         self._goal = goal
         self._bound = goal.tolerances.bound
-        reference.follow(active, samples, time=time, period=period, speed=self._speed)
+        reference.follow(active, samples, time=time, period=period, speed=speed[0])
         reference.advance(time, period)
 
     def _come_to_rest(self, row: Array, time: float, period: float) -> None:

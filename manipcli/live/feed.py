@@ -66,7 +66,7 @@ class Feed:
             if now < self._next:
                 return
             self._next = now + self._least
-        rows = [None if output is None else output.rows for output in outputs]
+        rows = [None if output is None else (output.rows, output.speed) for output in outputs]
         self._link.sample(tick, state.numbers, rows)
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:

@@ -7,7 +7,16 @@ from typing import Final
 
 from manipcli.control.controller import Controller
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces import controller_manager, controllers, emergency_stop, entities, jog, simulation
+from manipcli.live.interfaces import (
+    controller_manager,
+    controllers,
+    emergency_stop,
+    entities,
+    jog,
+    parameters,
+    path,
+    simulation,
+)
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.record import schemas
 from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
@@ -15,9 +24,11 @@ from manipcli.task.task import Task
 
 INTERFACES: Final = (
     controllers.endpoints,
-    controller_manager.endpoints,
+    path.endpoints,
     jog.endpoints,
     emergency_stop.endpoints,
+    controller_manager.endpoints,
+    parameters.endpoints,
     simulation.endpoints,
     entities.endpoints,
 )

@@ -81,9 +81,9 @@ class Link:
         self._taken = 0
         self._given_back: list[Command] = []
 
-    def sample(self, tick: int, numbers: object, rows: Sequence[object]) -> None:
+    def sample(self, tick: int, numbers: object, outputs: Sequence[object]) -> None:
         """Send the state of a tick: see `Sample`."""
-        self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, rows))
+        self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, outputs))
 
     def event(self, topic: str, ns: int, data: bytes) -> None:
         """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR."""

@@ -90,7 +90,7 @@ class Publisher:
             table = [self._table[topic] for topic in sorted(wanted)]
             every = Selection({word(topic): 1 for topic in wanted})
             self._block = Block(self.robot, self.scene, self.recorded, table, every, self.period, 1)
-        outputs: Any = [None if rows is None else SimpleNamespace(rows=rows) for rows in sample.rows]
+        outputs: Any = [None if own is None else SimpleNamespace(rows=own[0], speed=own[1]) for own in sample.outputs]
         self._block.add(sample.tick, self.state, outputs)
         content = self._block.encode([])
         return b"" if content is None else content.data

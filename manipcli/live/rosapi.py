@@ -1,4 +1,4 @@
-"""Services of rosapi, which clients of rosbridge ask for names and types; they only read."""
+"""Services of rosapi, which clients of rosbridge ask for names and types; `interfaces/parameters.py` has the others."""
 
 from __future__ import annotations
 
@@ -58,8 +58,6 @@ class Rosapi:
             "node_details": ("NodeDetails", self._node_details),
             "get_time": ("GetTime", lambda _: {"time": self._time()}),
             "get_ros_version": ("GetROSVersion", lambda _: {"version": 2, "distro": "manipcli"}),
-            "get_param_names": ("GetParamNames", lambda _: {"names": []}),
-            "has_param": ("HasParam", lambda _: {"exists": False}),
             "message_details": ("MessageDetails", lambda asked: typedefs(asked["type"])),
             **{
                 f"{_snake(what)}_details": (f"{what}Details", _details(half))

@@ -15,12 +15,12 @@ class Sample:
     Attributes:
         tick: of the control loop.
         numbers: those of a `WorldState`.
-        rows: those of each controller's output; None while it is inactive.
+        outputs: rows and speed of each controller's output; None while it is inactive.
     """
 
     tick: int
     numbers: Array
-    rows: Sequence[Array | None]
+    outputs: Sequence[tuple[Array, Array] | None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,6 +165,7 @@ class CartesianImpedanceController:
             types=types, compat=compat, stop_planner=stop_planner,
         )  # fmt: skip
         self.name, self.joints = self._follower.name, self._follower.joints
+        self.scaling = self._follower.scaling
         self.feed_forward: FeedForward = feed_forward
         self._stiffness = self._six("stiffness", stiffness)
         self._damping = None if damping is None else self._six("damping", damping)
@@ -185,7 +186,7 @@ class CartesianImpedanceController:
         self._block = np.ix_(self._columns, self._columns)
         self._q = np.zeros(len(kinematics.robot.joint_names))
         self._singular = SINGULAR**2 * np.eye(6)
-        self.output = ControllerOutput.of(len(self.joints), 1)
+        self.output = ControllerOutput.of(len(self.joints), 1, speed=self._follower.output.speed)
         self._error = np.zeros(6)
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))

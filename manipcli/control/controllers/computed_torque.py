@@ -123,6 +123,7 @@ class ComputedTorqueController:
             stop_planner=stop_planner,
         )
         self.name, self.joints = self._follower.name, self._follower.joints
+        self.scaling, self.gains = self._follower.scaling, self._follower.gains
         followed = self._follower.output
         self._correction = followed.command
         self._wanted = np.zeros(len(self.joints))
@@ -133,6 +134,7 @@ class ComputedTorqueController:
             acceleration=followed.acceleration,
             commands=followed.commands,
             wanted_acceleration=self._wanted,
+            speed=followed.speed,
         )
 
     @property
