@@ -8,39 +8,81 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
-from collections.abc import Callable, Mapping
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.assets import AssetRefused, Assets
-from manipcli.live.interface import Offer
+from manipcli.live.offer import CLOCK, Offer
+from manipcli.live.outlet import Network, Outlet
+from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import NODE
+from manipcli.model.state import WorldState
 from manipcli.record import schemas
+from manipcli.record.channels import channel_table
 from manipcli.replay.page_server import HOST
+from manipcli.shapes.primitives import mesh_files
 
 if TYPE_CHECKING:
     import foxglove
 
 DEFAULT_PORT: Final = 8765
 """Foxglove's."""
-LEAST: Final = 1.0 / 60.0
-"""[s] Least wall time between two samples."""
-CLOCK_PERIOD: Final = 1.0 / 30.0
-"""[s] Wall time between two broadcasts of the simulated time."""
 BACKLOG: Final = 256
 """Messages that wait for a client; then its oldest are dropped."""
 
 
-class FoxgloveServer:
-    """Serves a session to Foxglove. A context manager that closes all connections at its end; a `Tap`.
+@dataclass(frozen=True, slots=True)
+class FoxgloveOptions:
+    """How a session is served to Foxglove.
+
+    Attributes:
+        port: always of 127.0.0.1; 0: any free port.
+        needed: whether the session must not begin without it; otherwise a notice says why it is not served.
+    """
+
+    port: int = DEFAULT_PORT
+    needed: bool = False
+
+    def open(self, network: Network) -> Outlet:
+        """
+        Raises:
+            InvalidInput: it is needed, and the port cannot be used or the library is not installed.
+        """
+        try:
+            return FoxgloveServer(network.publisher, network.changed, port=self.port)
+        except InvalidInput as error:
+            if self.needed:
+                raise
+            return _Missing("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
+
+
+class _Missing:
+    """An outlet that is not served, and why."""
+
+    def __init__(self, notice: str) -> None:
+        self.notice = notice
+
+    def wanted(self) -> Collection[str]:
+        return ()
+
+    def message(self, topic: str, ns: int, data: bytes) -> None: ...
+
+    def watches(self) -> bool:
+        return False
+
+    def state(self, tick: int, state: WorldState) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class FoxgloveServer(_Missing):
+    """Serves a session to Foxglove: an outlet.
 
     Args:
-        offer: topics and services.
-        definitions: ros2msg texts of the types that `record/schemas.py` does not have, by topic.
-        assets: files that clients may fetch.
-        now: returns the simulated time [ns].
+        publisher: of the session.
+        changed: called, in any thread, when `wanted` has changed.
         port: to listen on; 0: any free port.
 
     Attributes:
@@ -50,32 +92,26 @@ class FoxgloveServer:
         InvalidInput: USE148 the port cannot be used; USE149 the library is not installed.
     """
 
-    def __init__(
-        self,
-        offer: Offer,
-        definitions: Mapping[str, str],
-        *,
-        assets: Assets,
-        now: Callable[[], int],
-        port: int = DEFAULT_PORT,
-    ) -> None:
+    def __init__(self, publisher: Publisher, changed: Callable[[], None], *, port: int = DEFAULT_PORT) -> None:
         library = _library()
         from foxglove.websocket import Capability
 
-        self._latched, self._now = offer.latched, now
-        self._last: dict[str, tuple[bytes, int]] = {}
-        self._next = 0.0
+        offer = publisher.offer
+        self._changed = changed
+        self._latched = {topic: (data, 0) for topic, data in publisher.latched.items()}
+        self._time = 0
         self._subscribers: set[tuple[int, str]] = set()
         self._wanted: frozenset[str] = frozenset()
         self._lock = threading.Lock()
-        self._changed: Callable[[], object] = lambda: None
         self._context = context = library.Context()  # its channels live as long as it does
+        own = {channel.topic: channel.definition for channel in channel_table(publisher.recorded)}
         self._channels = {
             topic: library.Channel(
-                topic, schema=_schema(kind, definitions.get(topic, "")), message_encoding="cdr", context=context
+                topic, schema=_schema(kind, own.get(topic, "")), message_encoding="cdr", context=context
             )
             for topic, kind in offer.published.items()
         }
+        assets = _assets(publisher)
         try:
             self._server = library.start_server(
                 name="manipcli",
@@ -90,75 +126,51 @@ class FoxgloveServer:
         except RuntimeError as error:
             raise _unusable(port, str(error)) from None
         self.port: int = self._server.port
+        super().__init__(f"Foxglove: ws://{HOST}:{self.port} (read-only)")
         self._server.publish_connection_graph(_graph(offer))
-        self._over = threading.Event()
-        self._clock = threading.Thread(target=self._broadcast_time, name="foxglove-clock", daemon=True)
-        self._clock.start()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._over.set()
-        self._clock.join()
-        self._server.stop()
-
-    @property
-    def url(self) -> str:
-        """The address for Foxglove."""
-        return f"ws://{HOST}:{self.port}"
-
-    @property
-    def wanted(self) -> frozenset[str]:
+    def wanted(self) -> Collection[str]:
         return self._wanted
 
-    def listen(self, changed: Callable[[], object]) -> None:
-        self._changed = changed
-
-    def publish(self, topic: str, ns: int, data: bytes) -> None:
-        channel = self._channels.get(topic)
-        if channel is None:
-            return
+    def message(self, topic: str, ns: int, data: bytes) -> None:
+        if topic == CLOCK:
+            self._broadcast_time(ns)
         if topic in self._latched:
-            self._last[topic] = data, ns
-        channel.log(data, log_time=ns)
+            self._latched[topic] = data, ns
+        self._channels[topic].log(data, log_time=ns)
 
-    def sample(self, ns: int, found: Mapping[str, bytes]) -> None:
-        now, wanted = time.monotonic(), self._wanted
-        if now < self._next or not wanted:
-            return
-        self._next = now + LEAST
-        for topic in wanted & found.keys():
-            self._channels[topic].log(found[topic], log_time=ns)
+    def close(self) -> None:
+        self._server.stop()
 
     def _subscribe(self, client: int, topic: str) -> None:
         """The last message of a latched topic goes to all its subscribers: the library cannot send to one of them."""
-        last = self._last.get(topic)
-        if last is not None:
-            data, ns = last
-            self._channels[topic].log(data, log_time=ns)
-        with self._lock:
-            self._subscribers.add((client, topic))
-            self._wanted = frozenset(topic for _, topic in self._subscribers)
-        self._changed()
+        self._repeat(topic)
+        self._subscribed(self._subscribers.add, client, topic)
 
     def _unsubscribe(self, client: int, topic: str) -> None:
+        self._subscribed(self._subscribers.discard, client, topic)
+
+    def _subscribed(self, change: Callable[[tuple[int, str]], None], client: int, topic: str) -> None:
+        """Whoever subscribes to anything gets the time, too."""
         with self._lock:
-            self._subscribers.discard((client, topic))
-            self._wanted = frozenset(topic for _, topic in self._subscribers)
+            change((client, topic))
+            topics = {topic for _, topic in self._subscribers}
+            self._wanted = frozenset(topics | {CLOCK} if topics else ())
         self._changed()
 
-    def _broadcast_time(self) -> None:
-        """Simulated time that goes back is that of another log: clients then forget what they have."""
-        last = 0
-        while not self._over.wait(CLOCK_PERIOD):
-            now = self._now()
-            if now < last:
-                self._server.clear_session()
-                for topic, (data, ns) in [*self._last.items()]:
-                    self._channels[topic].log(data, log_time=ns)
-            self._server.broadcast_time(now)
-            last = now
+    def _repeat(self, topic: str) -> None:
+        if topic in self._latched:
+            data, ns = self._latched[topic]
+            self._channels[topic].log(data, log_time=ns)
+
+    def _broadcast_time(self, ns: int) -> None:
+        """Time that goes back is that of the next log: clients then forget what they have."""
+        if ns < self._time:
+            self._server.clear_session()
+            for topic in self._latched:
+                self._repeat(topic)
+        self._time = ns
+        self._server.broadcast_time(ns)
 
 
 class _Listener:
@@ -176,6 +188,12 @@ class _Listener:
     def on_connection_graph_subscribe(self) -> None: ...
 
     def on_connection_graph_unsubscribe(self) -> None: ...
+
+
+def _assets(publisher: Publisher) -> Assets:
+    """The mesh files of robot and scene."""
+    geometries = [g for link in publisher.robot.links for g in (*link.visuals, *link.collisions)]
+    return Assets(mesh_files([*geometries, *(g for body in publisher.scene.bodies for g in body.geometries)]))
 
 
 def _asset(assets: Assets, uri: str) -> bytes | None:

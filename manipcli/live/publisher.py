@@ -1,22 +1,19 @@
-"""Messages for subscribers, made in the thread of the network by the encoders of the log."""
+"""Messages for clients, made in the process of the network by the encoders of the log."""
 
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-
-from manipcli.live.feed import Sample
-from manipcli.live.interface import CLOCK, Offer
+from manipcli.live.offer import CLOCK, Offer
+from manipcli.live.sample import Sample
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
-from manipcli.record.cdr import ENCAPSULATION, NS_PER_S, CdrWriter
+from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.channels import ControllerChannel, Recorded, channel_table
 from manipcli.record.definition import read_definition
 from manipcli.record.json_message import definition, to_json
@@ -25,11 +22,9 @@ from manipcli.record.selection import Selection, word
 from manipcli.record.write.block import Block
 from manipcli.scene.scene import Scene
 
-_TIME: Final = struct.Struct("<iI")
-
 
 class Publisher:
-    """Encodes messages in CDR, and makes the text of `publish` operations from them.
+    """Makes messages in CDR, and their text in `publish` operations.
 
     Args:
         offer: the topics.
@@ -38,76 +33,71 @@ class Publisher:
         period: [s] of its control loop.
 
     Attributes:
-        definitions: ros2msg texts of types that `record/schemas.py` does not have, by topic; "" for others.
-        kept: the last message of each latched topic, in CDR.
+        state: of the last sample.
+        latched: the last message of each latched topic, in CDR.
     """
 
     def __init__(
         self, offer: Offer, robot: RobotModel, scene: Scene, recorded: Sequence[Recorded], period: float
     ) -> None:
         self.offer = offer
-        self._robot, self._scene, self._recorded, self._period = robot, scene, recorded, period
+        self.robot, self.scene, self.recorded, self.period = robot, scene, recorded, period
+        self.state = WorldState.room(len(robot.moving_joints), len(scene.movable))
+        self.latched = dict(begin_messages(robot, scene, recorded))
         self._table = {channel.topic: channel for channel in channel_table(recorded)}
-        self.definitions = {topic: channel.definition for topic, channel in self._table.items()}
+        self._names = {channel.id: topic for topic, channel in self._table.items()}
+        self._kinds = {
+            topic: read_definition(kind, self._table[topic].definition)
+            if topic in self._table and self._table[topic].definition
+            else definition(kind)
+            for topic, kind in offer.published.items()
+        }
         self._topics: frozenset[str] = frozenset()
         self._block: Block | None = None
-        self._state = WorldState.room(len(robot.moving_joints), len(scene.movable))
-        self.kept: dict[str, bytes] = dict(begin_messages(robot, scene, recorded))
 
-    def event(self, topic: str, data: bytes) -> str:
-        """The text of a message in CDR; kept for later subscribers if its topic is latched."""
-        if topic in self.offer.latched:
-            self.kept[topic] = data
-        return self.text(topic, data)
-
-    def latched(self, topic: str) -> str | None:
-        """The last text of a latched topic; None before its first message."""
-        data = self.kept.get(topic)
-        return None if data is None else self.text(topic, data)
+    def ns(self, tick: int) -> int:
+        """The simulated time [ns] of a tick."""
+        return round(tick * self.period * 1e9)
 
     def clock(self, tick: int) -> dict[str, int]:
         """The simulated time of a tick, builtin_interfaces/Time."""
-        sec, nanosec = divmod(round(tick * self._period * 1e9), NS_PER_S)
+        sec, nanosec = divmod(self.ns(tick), NS_PER_S)
         return {"sec": sec, "nanosec": nanosec}
 
-    def sample(self, sample: Sample, wanted: Iterable[str]) -> dict[str, bytes]:
-        """The messages in CDR of the wanted topics that have one at this tick."""
+    def sample(self, sample: Sample, wanted: Collection[str]) -> dict[str, bytes]:
+        """The messages in CDR of the wanted topics that have one at this tick; sets `state`."""
         found: dict[str, bytes] = {}
-        wanted = frozenset(wanted)
+        self.state.numbers[...] = sample.numbers
+        self.state.time[...] = sample.tick * self.period
         if CLOCK in wanted:
-            found[CLOCK] = ENCAPSULATION + _TIME.pack(*self.clock(sample.tick).values())
-        own = wanted & self._table.keys()
+            found[CLOCK] = _clock(self.ns(sample.tick))
+        own = self._table.keys() & wanted
         if not own:
             return found
-        content = self._encoder(own, sample)
-        names = {channel.id: topic for topic, channel in self._table.items()}
+        content = self._encoded(own, sample)
         offset = 0
         while offset < len(content):
             _, length, channel, *_ = MESSAGE_HEAD.unpack_from(content, offset)
             end = offset + 9 + length
-            topic = names[channel]
-            found[topic] = content[offset + PAYLOAD : end]
+            found[self._names[channel]] = content[offset + PAYLOAD : end]
             offset = end
         return found
 
-    def _encoder(self, wanted: frozenset[str], sample: Sample) -> bytes:
+    def _encoded(self, wanted: set[str], sample: Sample) -> bytes:
         """The message records of one tick, by the encoder of the log."""
         if self._block is None or wanted != self._topics:
-            self._topics = wanted
+            self._topics = frozenset(wanted)
             table = [self._table[topic] for topic in sorted(wanted)]
             every = Selection({word(topic): 1 for topic in wanted})
-            self._block = Block(self._robot, self._scene, self._recorded, table, every, self._period, 1)
-        np.copyto(self._state.numbers, sample.numbers)
+            self._block = Block(self.robot, self.scene, self.recorded, table, every, self.period, 1)
         outputs: Any = [None if own is None else SimpleNamespace(rows=own[0], speed=own[1]) for own in sample.outputs]
-        self._block.add(sample.tick, self._state, outputs)
+        self._block.add(sample.tick, self.state, outputs)
         content = self._block.encode([])
         return b"" if content is None else content.data
 
     def text(self, topic: str, data: bytes) -> str:
         """The `publish` operation of a message in CDR."""
-        name, own = self.offer.published[topic], self.definitions.get(topic)
-        kind = read_definition(name, own) if own else definition(name)
-        message = to_json(kind, data)
+        message = to_json(self._kinds[topic], data)
         return json.dumps({"op": "publish", "topic": topic, "msg": message}, separators=(",", ":"), allow_nan=False)
 
 
@@ -127,3 +117,10 @@ def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]
 def is_sampled(topic: str, offer: Offer) -> bool:
     """Whether a topic can have messages at ticks, not only once."""
     return topic in offer.published and topic not in offer.latched
+
+
+def _clock(ns: int) -> bytes:
+    """A rosgraph_msgs/Clock."""
+    writer = CdrWriter()
+    writer.time(ns)
+    return writer.data

@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
-from manipcli.core.errors import InvalidInput
 from manipcli.judge.steps import RunStatus
 from manipcli.live.access import Access
-from manipcli.live.assets import Assets
-from manipcli.live.feed import Feed
+from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
+from manipcli.live.network_process import NetworkProcess
 from manipcli.live.pace import Pace
-from manipcli.live.publisher import Publisher, begin_messages
-from manipcli.live.source import Inbox, recorded_commands
+from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
-from manipcli.run.run_log import mesh_files, recorded
+from manipcli.run.run_log import recorded
 from manipcli.task.task import Task
 
 if TYPE_CHECKING:
-    from manipcli.live.foxglove import FoxgloveServer
+    from manipcli.live.outlet import OutletOptions
 
 DEFAULT_PORT: Final = 9090
 """rosbridge's."""
+WATCHED: Final = 500
+"""Ticks between two looks at the process of the network."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,16 +39,14 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
-        foxglove: port for Foxglove, always on 127.0.0.1; 0: any free port; None: not served.
-        foxglove_needed: whether the session must not begin without it.
+        outlets: what shows the session besides the WebSocket server.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
-    foxglove: int | None = None
-    foxglove_needed: bool = False
+    outlets: Sequence[OutletOptions] = ()
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -73,58 +71,46 @@ def served(
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
         announce: called with the URL when clients can connect.
-        late: called with a text for the user: once if the simulation is slower than asked, and about Foxglove.
+        late: called with texts for the user: notices of outlets, and once if the simulation is slower than asked.
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
+        NetworkFailed: LIVE200 the process of the network did not start.
     """
-    from manipcli.live.server import LiveServer  # asyncio, which nothing else needs
+    from manipcli.live.network import Setup  # asyncio, which nothing else needs
+    from manipcli.live.publisher import begin_messages
 
     period = task.spec.simulation.control_period
+    robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    feed = Feed(period, begin_messages(task.robot, task.true.scene, channels))
-    inbox = Inbox()
-    publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
+    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
-    with ExitStack() as stack:
-        tap = _foxglove(options, task, publisher, feed, report=late)
-        taps = [] if tap is None else [stack.enter_context(tap)]
-        server = LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port, taps=taps)
-        stack.enter_context(server)
+    with NetworkProcess(setup) as network:
+        least = FAST_PERIOD if options.speed is None else 0.0
+        latched = begin_messages(robot, scene, channels)
+        feed = Feed(period, network.link, topics=offer.published, latched=latched, least=least)
+        left = 0
 
         def ready() -> None:
-            for each in taps:
-                late(f"Foxglove: {each.url} (read-only)")
-            announce(options.url(server.port))
+            for notice in network.notices:
+                late(notice)
+            announce(options.url(network.port))
 
-        yield Outside(inbox, feed, pace, between, ready)
+        outside = Outside(network.link, feed, pace, ready=ready)
 
+        def check() -> None:
+            nonlocal left
+            between()
+            left -= 1
+            if left < 0 or network.link.lost:
+                left = WATCHED
+                if network.lost:
+                    outside.failure = network.lost
+                    raise KeyboardInterrupt
 
-def _foxglove(
-    options: LiveOptions, task: Task, publisher: Publisher, feed: Feed, *, report: Callable[[str], None]
-) -> FoxgloveServer | None:
-    """The server for Foxglove; None if it is not asked for, or cannot be had and is not needed."""
-    if options.foxglove is None:
-        return None
-    from manipcli.live.foxglove import FoxgloveServer
-
-    try:
-        found = FoxgloveServer(
-            publisher.offer,
-            publisher.definitions,
-            assets=Assets(mesh_files(task)),
-            now=lambda: round(feed.tick_now * feed.period * 1e9),
-            port=options.foxglove,
-        )
-    except InvalidInput as error:
-        if options.foxglove_needed:
-            raise
-        report("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
-        return None
-    for topic, data in publisher.kept.items():
-        found.publish(topic, 0, data)
-    return found
+        outside.between = check
+        yield outside
 
 
 def next_log(first: Path, number: int, *, overwrite: bool) -> tuple[Path, int]:

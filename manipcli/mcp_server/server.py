@@ -6,6 +6,8 @@ import asyncio
 import functools
 import logging
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
@@ -31,17 +33,19 @@ def serve(runner: Runner) -> None:
     library = _library()
     logging.getLogger("mcp").setLevel(logging.CRITICAL)  # what a model got wrong is its own answer
     server = library.MCPServer("manipcli", version=__version__, instructions=INSTRUCTIONS, log_level="CRITICAL")
-    live = LiveTools(runner)
-    for tool in (*Tools(runner).all, *live.all):
-        server.add_tool(_told(tool), structured_output=False)
+    with TemporaryDirectory(prefix="manipcli-mcp-") as scratch:  # others may have files in the usual one
+        runner = replace(runner, environment={**runner.environment, "TMPDIR": scratch})
+        live = LiveTools(runner)
+        for tool in (*Tools(runner).all, *live.all):
+            server.add_tool(_told(tool), structured_output=False)
+        asyncio.run(_run(server, live))
 
-    async def run() -> None:
-        try:
-            await server.run_stdio_async()
-        finally:
-            await live.close()
 
-    asyncio.run(run())
+async def _run(server: Any, live: LiveTools) -> None:
+    try:
+        await server.run_stdio_async()
+    finally:
+        await live.close()
 
 
 def _told(tool: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:

@@ -18,6 +18,7 @@ from manipcli.live.access import Access
 from manipcli.live.command import Command
 from manipcli.live.feed import Feed
 from manipcli.live.loop import Outside, simulate_live
+from manipcli.live.outlet import OutletOptions
 from manipcli.live.pace import Pace
 from manipcli.live.session import LiveOptions
 from manipcli.live.source import Schedule
@@ -64,7 +65,7 @@ def serving(
     use: Callable[[str], Awaitable[None]],
     *,
     token: str | None = TOKEN,
-    foxglove: int | None = None,
+    outlets: Sequence[OutletOptions] = (),
     progress: Progress = SILENT,
     task: Path | str = SMALL,
     speed: float | None = None,
@@ -87,7 +88,7 @@ def serving(
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=speed, foxglove=foxglove)
+        options = LiveOptions(Access(token), port=0, speed=speed, outlets=outlets)
         try:
             _, failure = pipeline.serve_task(
                 file,

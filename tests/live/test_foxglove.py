@@ -8,6 +8,7 @@ import socket
 import struct
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,8 +17,10 @@ from websockets.asyncio.client import ClientConnection, connect
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live import assets
 from manipcli.live.assets import AssetRefused, Assets
-from manipcli.live.foxglove import FoxgloveServer
-from manipcli.live.interface import Offer
+from manipcli.live.foxglove import FoxgloveOptions
+from manipcli.live.offer import Offer
+from manipcli.live.outlet import Network, Outlet
+from manipcli.live.publisher import Publisher
 from manipcli.live.source import recorded_commands
 from manipcli.record.definition import read_definition
 from manipcli.record.foreign.topics import open_topics
@@ -133,7 +136,7 @@ def test_foxglove_sees_the_log_and_its_meshes_and_commands_nothing(tmp_path: Pat
         assert {each["level"] for each in client.of("status")} == {2}
         await connection.close()
 
-    log = serving(tmp_path, use, foxglove=0, progress=told)
+    log = serving(tmp_path, use, outlets=[FoxgloveOptions(0)], progress=told)
     client = found[0]
     content = open_topics(log)
     for topic in (*SAMPLED, *LATCHED):
@@ -174,17 +177,28 @@ def finding(error: pytest.ExceptionInfo[InvalidInput]) -> Diagnostic:
 
 
 def test_a_port_in_use_and_a_missing_library_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    def server(port: int) -> FoxgloveServer:
-        return FoxgloveServer(NOTHING, {}, assets=Assets({}), now=lambda: 0, port=port)
+    robot: Any = SimpleNamespace(moving_joints=(), links=(), joints=(), root="world", urdf="<robot/>")
+    scene: Any = SimpleNamespace(movable=(), bodies=(), frames=())
+    network = Network(Publisher(NOTHING, robot, scene, (), 0.001), lambda _: True, lambda: None)
 
-    with server(0) as first, pytest.raises(InvalidInput) as used:
-        server(first.port)
+    def opened(port: int, *, needed: bool) -> Outlet:
+        return FoxgloveOptions(port, needed=needed).open(network)
+
+    first = opened(0, needed=True)
+    port = int(first.notice.partition("127.0.0.1:")[2].partition(" ")[0])
+    with pytest.raises(InvalidInput) as used:
+        opened(port, needed=True)
     assert finding(used).code == "USE148"
-    assert finding(used).message == f"port {first.port} for Foxglove is already in use"
+    assert finding(used).message == f"port {port} for Foxglove is already in use"
+    without = opened(port, needed=False)
+    assert without.notice.startswith(finding(used).message)
+    assert not without.wanted()
+    first.close()
     monkeypatch.setitem(sys.modules, "foxglove", None)
     with pytest.raises(InvalidInput) as missing:
-        server(0)
+        opened(0, needed=True)
     assert finding(missing).code == "USE149"
+    assert "not installed" in opened(0, needed=False).notice
 
 
 def test_assets_are_the_listed_files_within_their_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Sample, Seed, TaskFile, seconds
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+
+if TYPE_CHECKING:
+    from manipcli.live.outlet import OutletOptions
 
 LOCAL = "127.0.0.1"
 
@@ -82,8 +85,7 @@ def serve(
             port,
             factor,
             wall,
-            foxglove=_foxglove(foxglove_port, off=no_foxglove),
-            foxglove_needed=foxglove_port is not None,
+            outlets=_foxglove(foxglove_port, off=no_foxglove),
         )
 
         def announce(url: str) -> None:
@@ -132,18 +134,20 @@ def _speed(word: str) -> float | None:
     return factor
 
 
-def _foxglove(port: int | None, *, off: bool) -> int | None:
-    """The port for Foxglove; None for `--no-foxglove`.
+def _foxglove(port: int | None, *, off: bool) -> tuple[OutletOptions, ...]:
+    """The server for Foxglove; none with `--no-foxglove`.
 
     Raises:
         InvalidInput: options that exclude each other.
     """
-    from manipcli.live.foxglove import DEFAULT_PORT
+    from manipcli.live.foxglove import FoxgloveOptions
 
     if off and port is not None:
         message = "--no-foxglove and --foxglove-port exclude each other"
         raise InvalidInput([Diagnostic("USE150", message, hint="remove one of them")])
-    return None if off else DEFAULT_PORT if port is None else port
+    if off:
+        return ()
+    return (FoxgloveOptions(),) if port is None else (FoxgloveOptions(port, needed=True),)
 
 
 def _token(file: Path | None, *, host: str, open_: bool) -> str | None:
