@@ -15,6 +15,7 @@ from mcp import Client
 from mcp.client.stdio import StdioServerParameters, stdio_client
 
 from manipcli.core.errors import InvalidInput
+from manipcli.judge.verdict import INTERRUPTED
 from manipcli.logs.judge_log import judge_log
 from manipcli.mcp_server import child, server
 from manipcli.mcp_server.child import Runner, bounded, readable
@@ -107,7 +108,8 @@ def test_the_tools_work_in_their_folder_and_nowhere_else(tmp_path: Path) -> None
         assert scope.cancelled_caught
         while any(str(folder) in line for line in confined()):
             await asyncio.sleep(0.05)
-        assert judge_log(folder / "runs" / "small.mcap").verdict == "interrupted"
+        verdict = judge_log(folder / "runs" / "small.mcap")
+        assert [each.code for each in verdict.errors] == [INTERRUPTED], verdict
         assert sorted(path.name for path in tmp_path.iterdir()) == ["project", "secret.yaml"]
 
     async def session() -> None:
