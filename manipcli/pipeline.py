@@ -49,7 +49,7 @@ from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.explanation import Explanation, explained
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
-from manipcli.task.part import LIVE
+from manipcli.task.part import LIVE, LIVE_RUN
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
 from manipcli.task.task import Task
 from manipcli.task.variants import overrides_of, simulation_of
@@ -269,26 +269,30 @@ def serve_task(
     """Opens the scene of a task, and lets clients command its controllers until the session ends.
 
     Args:
-        path: the task file; its steps are not run.
+        path: the task file.
         live: how it is served.
         log: path of the log; default `runs/<task>@live.mcap`, which is replaced.
         force: replace `log` if it exists.
         embed_meshes: see `run_task`.
-        progress: receives warnings.
+        progress: receives warnings and steps.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        announce: called with the URL when clients can connect.
+        announce: called with the URL when clients can connect and the scene has settled.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the log by the expectations of the task that need no step; and why the simulation failed, or "".
+        The verdict on the log, without steps by the expectations of the task that need none; and why the simulation
+        failed, or "". The verdict on a task that cannot be planned has no log.
 
     Raises:
         InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
         RecordingFailed: writing the log failed.
     """
     task, loading = timed(_load, path, progress, options, None)
-    task = replace(task, part=LIVE)
-    plan = plan_task(task)
+    task = replace(task, part=LIVE_RUN if live.run else LIVE)
+    stage = _plan if live.run else _held
+    (plan, warnings), planning = timed(stage, task, progress, None)
+    if isinstance(plan, Verdict):
+        return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings), ""
     where = log if log is not None else default_log(task)
 
     def late(text: str) -> None:
@@ -305,8 +309,8 @@ def serve_task(
     verdict, timing = _record(
         task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress, live=opened
     )
-    timing = replace(timing, load=loading)
-    report = RunReport(verdict, timing, log=str(where), warnings=task.warnings, meshes=mesh_files(task))
+    timing = replace(timing, load=loading, plan=planning + timing.plan)
+    report = RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
     return report, failures[0]
 
 
@@ -373,6 +377,11 @@ def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Pl
     return plan, (*task.warnings, *findings)
 
 
+def _held(task: Task, progress: Progress, prepared: None) -> tuple[Plan, tuple[Diagnostic, ...]]:
+    """As `_plan`, of a session without the steps of its task."""
+    return plan_task(task), task.warnings
+
+
 def _record(
     task: Task,
     plan: Plan,
@@ -383,7 +392,7 @@ def _record(
     progress: Progress,
     live: Callable[[ControllerManager], AbstractContextManager[Outside]] | None = None,
 ) -> tuple[Verdict, Timing]:
-    """Simulates into a log, which is judged before it gets its name; `live`: a session instead of steps."""
+    """Simulates into a log, which is judged before it gets its name; `live`: a session that clients can command."""
     manager = build_manager(task, plan.planner.kinematics)
     with (
         nullcontext() if live is None else live(manager) as outside,
@@ -392,7 +401,7 @@ def _record(
         if outside is None:
             end, simulating = timed(simulate, task, plan, manager, recorder, progress)
         else:
-            end, simulating = timed(simulate_live, task, plan, manager, recorder, outside)
+            end, simulating = timed(simulate_live, task, plan, manager, recorder, outside, progress)
         recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
         verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))

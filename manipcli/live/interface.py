@@ -8,13 +8,13 @@ from typing import Final
 
 from manipcli.control.controller import Controller
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces import controller_manager, controllers
+from manipcli.live.interfaces import controller_manager, controllers, task
 from manipcli.record import schemas
 from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
 from manipcli.task.task import Task
 
 CLOCK: Final = "/clock"
-INTERFACES: Final = (controllers.endpoints, controller_manager.endpoints)
+INTERFACES: Final = (controllers.endpoints, controller_manager.endpoints, task.endpoints)
 """Groups of endpoints: (task, controllers) -> its endpoints."""
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from manipcli.control.manager import ControllerManager
 from manipcli.live.endpoint import Goal
+from manipcli.live.live_steps import LiveSteps
 from manipcli.live.pace import Pace
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.observer import Observer
@@ -24,6 +25,7 @@ class LiveRobot:
         recorder: of the session.
         observer: records goals.
         pace: of the control loop.
+        steps: does steps of the task and of clients.
         goals: the active goals of clients.
     """
 
@@ -33,6 +35,7 @@ class LiveRobot:
     recorder: Recorder
     observer: Observer
     pace: Pace
+    steps: LiveSteps
     goals: list[Goal] = field(default_factory=list)
 
     @property

@@ -34,12 +34,14 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
+        run: also do the steps of the task.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
+    run: bool = False
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""

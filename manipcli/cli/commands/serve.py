@@ -38,6 +38,7 @@ def serve(
     open_: Annotated[
         bool, typer.Option("--open", help="Let all programs of this machine command, without a token.")
     ] = False,
+    run: Annotated[bool, typer.Option("--run", help="Also do the steps of the task, then hold.")] = False,
     log: Annotated[
         Path | None,
         typer.Option("--log", metavar="PATH", help="Write the log to PATH [default: runs/<task>@live.mcap]."),
@@ -52,7 +53,8 @@ def serve(
 ) -> ExitCode:
     """Simulate a task's scene live, and let clients of rosbridge command its robot.
 
-    The controllers hold; the steps are not run. The session is recorded. Press Ctrl-C to end it.
+    The controllers hold; with --run the steps are done first, and the exit code is that of `manipcli run`. The session
+    is recorded. Press Ctrl-C to end it.
     """
     from manipcli.cli.interrupts import Interrupts
 
@@ -64,8 +66,9 @@ def serve(
         from manipcli.live.access import Access
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
+        from manipcli.report.run_report import exit_code
 
-        live = LiveOptions(Access(token, host), port, factor, wall)
+        live = LiveOptions(Access(token, host), port, factor, wall, run)
 
         def announce(url: str) -> None:
             console.result(url)
@@ -73,7 +76,7 @@ def serve(
                 console.talk("--open: every program of this machine can command the robot.")
             console.talk("Press Ctrl-C to end the session.")
 
-        with StepProgress(verbose=False, quiet=quiet, interrupts=interrupts) as progress:
+        with StepProgress(verbose=False, quiet=quiet) as progress:
             report, failure = pipeline.serve_task(
                 task,
                 live,
@@ -88,8 +91,8 @@ def serve(
                 package_path=tuple(package_path or ()),
                 allow_outside=allow_outside,
             )
-        console.result(text.render_session(report, failure))
-        return ExitCode.FAILED if failure else ExitCode.PASSED
+        console.result(text.render_run(report) if run else text.render_session(report, failure))
+        return exit_code(report.verdict) if run else ExitCode.FAILED if failure else ExitCode.PASSED
 
 
 def _speed(word: str) -> float | None:
