@@ -45,6 +45,7 @@ from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
 from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
 from manipcli.spec.simulation import SimulationSpec
+from manipcli.task.bare_task import bare_task
 from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.explanation import Explanation, explained
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
@@ -59,6 +60,7 @@ __all__ = [
     "Diagnostic",
     "Plan",
     "Task",
+    "bare_task",
     "check_files",
     "compare_runs",
     "controllers_of",

@@ -55,7 +55,7 @@ class StepRequest:
     """A step of a client.
 
     Attributes:
-        id: of the step in the log; "" if it is not valid.
+        id: of the step in the log; "" if it is refused.
         task: with this step alone; None if it is not valid.
         on_phase: called with the name of each motion that begins, and with `plan` before.
         end: how it ended; None before.
@@ -148,8 +148,8 @@ class LiveSteps:
             on_phase: see `StepRequest`.
         """
         found = self._checked(text)
-        if found.end is None:
-            found.on_phase = on_phase
+        if found.end is None and found.task is not None:
+            found.id, found.on_phase = str(found.task.spec.steps[0].id), on_phase
             self._count += 1
             self._waiting, self._doing = found, f"step '{found.id}'"
         return found
@@ -176,7 +176,7 @@ class LiveSteps:
         except InvalidInput as invalid:
             findings = [f"{finding}; {finding.hint}" if finding.hint else str(finding) for finding in invalid.findings]
             return StepRequest("", None, end=StepEnd("invalid", "\n".join(findings)))
-        request = StepRequest(str(task.spec.steps[0].id), task)
+        request = StepRequest("", task)
         if self._doing:
             request.end = StepEnd("rejected", f"{self._doing} is running; cancel it, or wait for its result")
         elif moving := self._moving:

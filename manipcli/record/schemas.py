@@ -171,7 +171,7 @@ DEFINITIONS: dict[str, str] = {
     ),
     "manipcli_msgs/RunStep_Goal": "# A step as in a task file, in YAML or JSON: `{pick: {object: cup}}`\nstring step\n",
     "manipcli_msgs/RunStep_Result": (
-        "# Of the step in the log, such as `pick@1`; empty if it is not valid.\n"
+        "# Of the step in the log, such as `pick@1`; empty if it is refused.\n"
         "string id\n"
         "# done, failed, timeout, canceled, not_plannable, invalid, or rejected: the robot is busy.\n"
         "string outcome\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from manipcli.core.errors import Diagnostic, InvalidInput, Loc
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.outline import StepOutline
@@ -20,6 +20,7 @@ from manipcli.task.vocabulary import task_spec
 
 NAME: Final = "step"
 """The name of the text in places: `step:1:8`."""
+EXAMPLE: Final = "write a step as in a task file: `{pick: {object: cup}}`"
 
 
 def lone_step(text: str, task: Task, number: int, claims: Claims) -> Task:
@@ -34,14 +35,14 @@ def lone_step(text: str, task: Task, number: int, claims: Claims) -> Task:
     Raises:
         InvalidInput: every finding about the step, with its place in the text.
     """
+    if not text.strip():
+        raise InvalidInput([Diagnostic("TASK333", "the text is empty", Place(NAME, 1, 1), EXAMPLE)])
     try:
         file = load_step_text(text, NAME, model=task_spec())
         steps = file.spec.steps
         if len(steps) != 1 or file.spec.blocks:
             message = "this is a block of steps; expected one step with a verb"
-            raise InvalidInput(
-                [Diagnostic("TASK333", message, file.place("steps"), "send its steps one after another")]
-            )
+            raise InvalidInput([Diagnostic("TASK333", message, Place(NAME, 1, 1), "send its steps one after another")])
         (step,) = steps
         node = node_at(file.source.root, ("steps", 0))
         name = step.verb if child(node, "id") is None else step.id
@@ -65,6 +66,7 @@ def lone_plan(task: Task, start: PlanningState, planner: Planner) -> Plan:
 
 
 def _without_index(finding: Diagnostic) -> Diagnostic:
-    """The finding as one about the step, not about a list of steps."""
+    """The finding as one about the step, not about a task with a list of steps and parameters."""
     message = finding.message.removeprefix("steps[0]").removeprefix(".").removeprefix(": ")
-    return replace(finding, message=message)
+    hint = "write its value: a step of a client has no parameters" if "unknown parameter" in message else finding.hint
+    return replace(finding, message=message, hint=hint)
