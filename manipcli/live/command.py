@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 Op = str
 PUBLISH: Final = "publish"
@@ -51,3 +51,20 @@ class Command:
     id: str = ""
     json: str = "{}"
     answer: Callable[[Answer], None] = nobody
+
+
+class Goal(Protocol):
+    """An active goal of an action."""
+
+    @property
+    def command(self) -> Command:
+        """The command that sent it."""
+        ...
+
+    def cancel(self) -> None:
+        """Cancel it; its result follows at a later tick."""
+        ...
+
+    def step(self, *, due: bool) -> Answer | None:
+        """After a tick: its result (an answer with a status), or its feedback if that is due; None: neither."""
+        ...

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+from typing import Any, Final, Literal
 
 from manipcli.live import command as words
-from manipcli.live.command import Answer, Command, Values
-
-if TYPE_CHECKING:
-    from manipcli.live.live_robot import LiveRobot
+from manipcli.live.command import Command, Values
+from manipcli.live.live_robot import LiveRobot
 
 Kind = Literal["topic", "service", "action"]
-Handler = Callable[["LiveRobot", Command, dict[str, Any]], Values | None]
+Handler = Callable[[LiveRobot, Command, dict[str, Any]], Values | None]
 """Carries out a command between two ticks, in the thread of the control loop: (robot, command, its message).
 
 It depends on nothing but the message and the simulation, so that a session is simulated again from its commands. A
@@ -22,23 +20,6 @@ of the robot. A ManipcliError refuses the command.
 """
 KINDS: Final[dict[str, Kind]] = {words.PUBLISH: "topic", words.CALL_SERVICE: "service", words.SEND_GOAL: "action"}
 """What a command of each op is sent to."""
-
-
-class Goal(Protocol):
-    """An active goal of an action."""
-
-    @property
-    def command(self) -> Command:
-        """The command that sent it."""
-        ...
-
-    def cancel(self) -> None:
-        """Cancel it; its result follows at a later tick."""
-        ...
-
-    def step(self, *, due: bool) -> Answer | None:
-        """After a tick: its result (an answer with a status), or its feedback if that is due; None: neither."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from manipcli.control.manager import ControllerManager
-from manipcli.live.endpoint import Goal
+from manipcli.live.command import Goal
 from manipcli.live.live_steps import LiveSteps
 from manipcli.live.pace import Pace
 from manipcli.record.write.recorder import Recorder
