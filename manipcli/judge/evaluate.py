@@ -44,7 +44,7 @@ def examine(
     steps: tuple[StepOutcome, ...],
     until: float = inf,
 ) -> Examined:
-    """The outcomes of `expect` up to the time `until` [s].
+    """The outcomes of `expect` before the time `until` [s].
 
     Every span is read, even without expectations, so damage anywhere in the file is detected. Only the last half second
     is kept in memory.
@@ -77,9 +77,9 @@ def examine(
             )
             asked = [Expected(expectation, world, steps, seam) for expectation in expect]
         window = successive.next(span)
-        if window.times[0] > until + ROUNDING:
+        if window.times[0] >= until - ROUNDING:
             continue
-        window = window.part(0, int(np.searchsorted(window.times, until + ROUNDING, side="right")))
+        window = window.part(0, int(np.searchsorted(window.times, until - ROUNDING)))
         judged = float(window.times[-1])
         last = every = at_every_tick(window, last, recording.period)
         for expected, uses_no_state in zip(asked, stateless, strict=True):

@@ -227,6 +227,9 @@ class LiveSteps:
             return loop.planned([(0,)])[0]
         except NotPlannable as refusal:
             return StepEnd("not_plannable", f"{refusal.cause}; {refusal.hint}" if refusal.hint else refusal.cause)
+        except (ArithmeticError, InvalidInput, LookupError, TypeError, ValueError) as error:
+            # A step that no check foresaw must not end the session of the others.
+            return StepEnd("not_plannable", f"{type(error).__name__}: {error}")
 
     def _loop_of(self, task: Task, plan: Plan) -> StepLoop:
         """The loop for this task; the first one is made here, later ones know what the hand holds."""
