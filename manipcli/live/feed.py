@@ -25,11 +25,11 @@ KEPT_MESSAGES: Final = 1000
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The state of one tick; `rows`: those of each controller, None while it is inactive."""
+    """The state of one tick; `outputs`: rows and speed of each controller, None while it is inactive."""
 
     tick: int
     numbers: Array
-    rows: tuple[Array | None, ...]
+    outputs: tuple[tuple[Array, Array] | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,7 @@ class Feed:
 
     Args:
         period: [s] of the control loop.
+        latched: topics and messages that are sent again when a session begins after a reset.
 
     Attributes:
         observer: the observer that sees each tick first.
@@ -53,8 +54,9 @@ class Feed:
         dropped: samples and messages that nobody took in time.
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, latched: Sequence[tuple[str, bytes]] = ()) -> None:
         self.period = period
+        self._latched = latched
         self.observer: Observer | None = None
         self.wanted = False
         self.tick_now = 0
@@ -68,14 +70,20 @@ class Feed:
         """Call `wake`, in the thread of the control loop, when there is something to take."""
         self._wake = wake
 
+    def restart(self) -> None:
+        """The next session begins, with tick 0."""
+        self.observer, self.tick_now = None, 0
+        for topic, data in self._latched:
+            self.message(topic, 0, data)
+
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         if self.observer is not None:
             self.observer.tick(tick, state, outputs)
         self.tick_now = tick
         if not self.wanted or tick % self._every:
             return
-        rows = tuple(None if output is None else output.rows.copy() for output in outputs)
-        self._put(self._samples, KEPT_SAMPLES, Sample(tick, state.numbers.copy(), rows))
+        copies = tuple(None if output is None else (output.rows.copy(), output.speed.copy()) for output in outputs)
+        self._put(self._samples, KEPT_SAMPLES, Sample(tick, state.numbers.copy(), copies))
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
         if self.observer is not None:

@@ -8,6 +8,7 @@ from manipcli.control.manager import ControllerManager
 from manipcli.live.command import Goal
 from manipcli.live.live_steps import LiveSteps
 from manipcli.live.pace import Pace
+from manipcli.live.play_state import PlayState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.observer import Observer
 from manipcli.simulate.session import Session
@@ -27,6 +28,7 @@ class LiveRobot:
         pace: of the control loop.
         steps: does steps of the task and of clients.
         goals: the active goals of clients.
+        play: whether it plays, is paused or ends.
     """
 
     task: Task
@@ -37,6 +39,7 @@ class LiveRobot:
     pace: Pace
     steps: LiveSteps
     goals: list[Goal] = field(default_factory=list)
+    play: PlayState = field(default_factory=PlayState)
 
     @property
     def manager(self) -> ControllerManager:

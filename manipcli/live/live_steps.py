@@ -26,7 +26,6 @@ from manipcli.task.plan_steps import PlannedStep
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
-OVER: Final = "the session ended"
 CANCELED: Final = "canceled by the client"
 TASK: Final = "the steps of the task"
 
@@ -109,6 +108,7 @@ class LiveSteps:
         self._recorder, self._live, self._observer, self._progress = recorder, live, observer, progress
         self._loop: StepLoop | None = None
         self._waiting: StepRequest | None = None
+        self._current: StepRequest | None = None
         self._doing = ""
         self._count = 0
         self.planning = _Planning(pace)
@@ -133,12 +133,14 @@ class LiveSteps:
         if request is not None:
             self._waiting = None
             request.end = self._done(request)
-            self._doing = ""
+            self._current, self._doing = None, ""
 
-    def abandon(self) -> None:
+    def abandon(self, why: str) -> None:
         """The session is over: record that a running step is not done."""
         if self._loop is not None:
-            self._loop.abandon(OVER)
+            self._loop.abandon(why)
+        if self._current is not None:
+            self._current.end = StepEnd("failed", why)
 
     def request(self, text: str, on_phase: Callable[[str], None]) -> StepRequest:
         """Do a step after this tick, if it is valid and the robot rests.
@@ -151,7 +153,8 @@ class LiveSteps:
         if found.end is None and found.task is not None:
             found.id, found.on_phase = str(found.task.spec.steps[0].id), on_phase
             self._count += 1
-            self._waiting, self._doing = found, f"step '{found.id}'"
+            self._waiting = self._current = found
+            self._doing = f"step '{found.id}'"
         return found
 
     def cancel(self, request: StepRequest) -> None:

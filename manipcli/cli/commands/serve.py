@@ -75,7 +75,7 @@ def serve(
         from manipcli.live.access import Access
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
-        from manipcli.report.run_report import exit_code
+        from manipcli.report.run_report import RunReport, exit_code
 
         live = LiveOptions(Access(token, host), port, factor, wall, run)
 
@@ -84,6 +84,12 @@ def serve(
             if token is None:
                 console.talk("--open: every program of this machine can command the robot.")
             console.talk("Press Ctrl-C to end the session.")
+
+        def shown(report: RunReport, failure: str) -> str:
+            return text.render_run(report) if run else text.render_session(report, failure)
+
+        def ended(report: RunReport, failure: str) -> None:
+            console.result(shown(report, failure))
 
         with served as path, StepProgress(verbose=False, quiet=quiet) as progress:
             report, failure = pipeline.serve_task(
@@ -94,13 +100,14 @@ def serve(
                 progress=progress,
                 between=interrupts.check,
                 announce=announce,
+                ended=ended,
                 overrides=tuple(overrides or ()),
                 seed=seed,
                 sample=sample,
                 package_path=tuple(package_path or ()),
                 allow_outside=allow_outside,
             )
-        console.result(text.render_run(report) if run else text.render_session(report, failure))
+        console.result(shown(report, failure))
         return exit_code(report.verdict) if run else ExitCode.FAILED if failure else ExitCode.PASSED
 
 
