@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, cast
 
 from annotated_types import Ge, Le
 
+from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.manager import ControllerManager
 from manipcli.control.tunable_gains import FIXED, TunableGains, gains_in
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean
+from manipcli.live.live_robot import LiveRobot
+from manipcli.spec.controllers import GainsSpec
 
 NOT_SET, BOOL, INTEGER, DOUBLE, STRING, STRING_ARRAY = 0, 1, 2, 3, 4, 9
 FIELDS: Final = {
@@ -80,18 +84,18 @@ def _gains(gains: TunableGains) -> Iterator[tuple[str, Parameter]]:
             yield f"gains.{joint}.{gain}", Parameter(value, kind, field.description or "", where, least, most)
 
 
-def change(manager: ControllerManager, name: str, values: Mapping[str, Value]) -> None:
+def change(robot: LiveRobot, name: str, values: Mapping[str, Value]) -> None:
     """Change parameters of a controller from the next tick on, all or none.
 
     Args:
-        manager, name: its manager and name.
+        robot, name: its robot and name.
         values: by name; None removes a bound.
 
     Raises:
         InvalidArgument: the controller is not loaded; a parameter that is unknown, cannot change, or is of another
             type; a value that is not finite, or that a controllers file may not have either.
     """
-    known = parameters_of(manager, name)
+    known = parameters_of(robot.manager, name)
     wanted: dict[tuple[str, str], object] = {}
     for word, value in values.items():
         parameter = known.get(word)
@@ -101,9 +105,22 @@ def change(manager: ControllerManager, name: str, values: Mapping[str, Value]) -
             message = f"parameter '{word}' of controller '{name}' is read-only"
             raise InvalidArgument("LIVE152", message, hint="set it in the controllers file")
         wanted[parameter.gain] = _typed(word, parameter, value)
-    gains = gains_in(manager[name])
+    gains = gains_in(robot.manager[name])
     if gains is not None and wanted:
-        gains.change(wanted)
+        gains.change(wanted, partial(_check, robot, name))
+
+
+def _check(robot: LiveRobot, name: str, gains: Mapping[str, GainsSpec]) -> None:
+    """The checks of the controllers file, with these gains.
+
+    Raises:
+        InvalidArgument: an error.
+    """
+    spec = robot.task.true.controllers.spec.controllers[name].model_copy(update={"gains": dict(gains)})
+    for problem in CONTROLLERS[spec.type].check(spec, robot.task.robot):
+        if problem.severity == "error":
+            text = f"controller '{name}': {problem.message}"
+            raise InvalidArgument(problem.code or "CTRL100", text, hint=problem.hint)
 
 
 def unknown(name: str, word: str, known: Mapping[str, Parameter]) -> InvalidArgument:

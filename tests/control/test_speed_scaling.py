@@ -114,6 +114,7 @@ def test_a_scaled_trajectory_is_on_the_same_path_within_the_same_limits(seed):
         assert abs(velocity[:, j]).max() <= limit.velocity * 1.001
         assert abs(acceleration[:, j]).max() <= limit.acceleration * 1.03  # differences lag by a tick
         assert abs(rows[:, 2, j]).max() <= limit.acceleration * (1 + 1e-9)  # the reference itself
+    np.testing.assert_allclose(rows[:-1, 3], rows[1:, 0], atol=1e-12)  # a command is the next reference
     np.testing.assert_allclose(rows[1:-1, 1], (velocity[1:] + velocity[:-1]) / 2, atol=1e-2)
 
 

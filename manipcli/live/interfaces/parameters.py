@@ -118,7 +118,7 @@ def _set_atomically(robot: LiveRobot, command: Command, request: dict[str, Any])
 def _tried(robot: LiveRobot, node: str, parameters: Sequence[dict[str, Any]]) -> Values:
     """rcl_interfaces/SetParametersResult of a change of these rcl_interfaces/Parameter."""
     try:
-        change(robot.manager, node, {each["name"]: _given(robot.manager, node, each) for each in parameters})
+        change(robot, node, {each["name"]: _given(robot.manager, node, each) for each in parameters})
     except InvalidArgument as error:
         found = error.findings[0]
         reason = f"{found.message}; {found.hint}" if found.hint else found.message
@@ -171,14 +171,14 @@ def _set_param(robot: LiveRobot, command: Command, request: dict[str, Any]) -> V
         raise InvalidArgument("LIVE153", message, hint="give a number, such as 800") from None
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1 << 53:
         value = math.inf
-    change(robot.manager, node, {name: value})
+    change(robot, node, {name: value})
     return {"successful": True, "reason": ""}
 
 
 def _delete_param(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """Removes a bound; other parameters of controllers always have a value."""
     node, name = _parts(robot, request["name"])
-    change(robot.manager, node, {name: None})
+    change(robot, node, {name: None})
     return {"successful": True, "reason": ""}
 
 
