@@ -166,11 +166,11 @@ class Reference:
         self.feed_room = np.zeros((len(self._interfaces) if velocity_scale is None else 1, rows.shape[1]))
         self.hold(ActiveTrajectory.hold(np.zeros(rows.shape[1])), time=0.0)
 
-    def hold(self, active: ActiveTrajectory, *, time: float) -> None:
-        """From now on, hold the rest position of `active`."""
+    def hold(self, active: ActiveTrajectory, *, time: float, ahead: Array | None = None) -> None:
+        """From now on, the rest of `active`; `ahead` (4, n): what is fed forward, where the rest is for one tick."""
         self._active = active
         self.rows[:] = active.rest[:EFFORT]
-        feed = self._feed(active.rest[None])
+        feed = self._feed((active.rest if ahead is None else ahead)[None])
         self.feeds = feed is not None
         self.feed_room[:] = 0.0 if feed is None else feed[0]
         self.moving, self.ended, self.scales = False, True, False

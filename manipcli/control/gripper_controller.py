@@ -190,6 +190,12 @@ class GripperController:
         self._goal = GoalHandle(cancel=self._cancel, feedback=self._feedback)
         return self._goal
 
+    def halt(self, time: float, reason: str) -> None:
+        """Abort its goal for this reason; the references stay where they are, and the fingers go on pressing."""
+        if self._goal is not None:
+            self._goal.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
+            self._end_motion()
+
     @property
     def senses_contact(self) -> bool:
         """True while a goal stops fingers by force."""

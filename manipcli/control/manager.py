@@ -63,6 +63,9 @@ class ControllerManager:
         following: joints that cannot be commanded, because they follow others (mimic).
         feed_forward: adds gravity or inverse dynamics for the controllers that want it.
 
+    Attributes:
+        locked: why no controller can be activated; "": they can.
+
     Raises:
         InvalidInput: every conflict at once: duplicate names or claims, joints that are unknown or follow others.
         InvalidArgument: a period that is not above 0.
@@ -85,6 +88,7 @@ class ControllerManager:
         self.command = JointCommand(len(self.joints))
         self.outputs: tuple[ControllerOutput | None, ...] = ()
         self.faults: tuple[Diagnostic, ...] = ()
+        self.locked = ""
         self._feed_forward = feed_forward if feed_forward is not None else NoDynamics()
         self._slots: dict[str, Slot] = {}
         self._active: tuple[Slot, ...] = ()
@@ -228,6 +232,8 @@ class ControllerManager:
         """Carry out the switch of a step; see `switch` and `switch_to`."""
         controllers = {name: (slot.controller, slot.state) for name, slot in self._slots.items() if slot.loaded}
         decision = decided(controllers, switch, self.joints, self.following)
+        if decision.activated and self.locked:
+            decision = SwitchResult(False, (*decision.messages, self.locked))
         if not decision.ok:
             return decision
         for name in decision.deactivated:
@@ -265,7 +271,8 @@ class ControllerManager:
                 return controller
         claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "no controller is active"
         message = f"no active controller claims all of {', '.join(joints)} ({claims})"
-        raise InvalidArgument("CTRL140", message, hint=self.faults[-1].message if self.faults else None)
+        fault = self.faults[-1].message if self.faults else None
+        raise InvalidArgument("CTRL140", message, hint=self.locked or fault)
 
     def keep_references(self) -> None:
         """Include the references in the command from now on."""

@@ -10,11 +10,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejected, refuse_inactive
+from manipcli.control.action import ErrorCode, Feedback, GoalHandle, refuse_inactive
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains, tune_pid
+from manipcli.control.jog import Jogging, JogTarget
 from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.stopping import Stopping, StopPlanner
 from manipcli.control.tracking_error import TrackingError
@@ -136,8 +137,7 @@ class JointTrajectoryController:
         self.interfaces: tuple[Interface, ...] = tuple(command_interfaces)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
-        wrong = refused(command_interfaces, state_interfaces)
-        if wrong is not None:
+        if (wrong := refused(command_interfaces, state_interfaces)) is not None:
             raise InvalidArgument("CTRL107", f"controller '{name}': {wrong[0]}", hint=wrong[1])
         for what, value in (
             ("cmd_timeout", cmd_timeout), ("stop_trajectory_duration", stop_trajectory_duration),
@@ -158,6 +158,7 @@ class JointTrajectoryController:
             smooth=positions_upsampling, interpolation=interpolation_method,
         )  # fmt: skip
         planner = stop_planner if compat is None else None
+        self._jogging = Jogging(self._facts, limits)
         self._stopping = Stopping.of(self._facts, self._constraints, stop_trajectory_duration, planner)
         self._default_tolerances = Tolerances.of(self.joints, self._constraints, patient=compat == "ros2")
         self.notes: tuple[str, ...] = ()
@@ -186,11 +187,11 @@ class JointTrajectoryController:
         self._clear(time=0.0)
 
     def _clear(self, *, time: float) -> None:
-        self._activated = False
-        self._waiting = True
+        self._activated, self._waiting = False, True
         self._time, self._period = time, 0.0
         self._goal: ActiveGoal | None = None
         self._next: ActiveGoal | None = None
+        self._jogging.end()
         self._stop = False
         self._bound = np.inf
         self.scaling.reset()
@@ -231,10 +232,7 @@ class JointTrajectoryController:
         if constraints is not None:
             tolerances = Tolerances.of(self.joints, constraints, patient=self._compat == "ros2")
         tolerances, notes = tolerances.adopted(goal, self.joints)
-        for old in (self._goal, self._next):
-            if old is not None:
-                old.preempt(self._time, as_canceled=self._compat == "ros1")
-        self._goal = None
+        self._preempt("a new goal")
         ends = zip(self.joints, np.isfinite(tolerances.goal[0]).tolist(), strict=True)
         bounded = frozenset(joint for joint, finite in ends if finite)
         handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes, bounded=bounded)
@@ -245,11 +243,26 @@ class JointTrajectoryController:
         self._waiting = True
         return handle
 
+    def _preempt(self, by: str) -> None:
+        for old in filter(None, (self._goal, self._next)):
+            old.preempt(self._time, as_canceled=self._compat == "ros1", by=by)
+        self._goal = self._next = None
+
+    def jog(self, target: JogTarget, *, until: float) -> None:
+        """Follow the velocities of `target` until the time `until` [s], then stop; see `jog.py`. A goal ends it.
+
+        Raises:
+            GoalRejected: the controller is inactive.
+        """
+        refuse_inactive(self.name, self.accepts_goals)
+        self._preempt("jogging")
+        self._bound, self._stop = np.inf, False
+        self._jogging.begin(target, until)
+
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""
-        for goal in (self._goal, self._next):
-            if goal is not None:
-                goal.handle.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
+        for goal in filter(None, (self._goal, self._next)):
+            goal.handle.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
         self._clear(time=time)
 
     def update(
@@ -277,6 +290,8 @@ class JointTrajectoryController:
             reference.advance(time, period)
         if self._waiting:
             self._handle_requests(time, period, measured)
+        if self._jogging.active:
+            self._jogging.step(reference, time, period, min(self.scaling.wanted, 1.0))
         if self._scaled:
             self._report_speed(time)
         if not self._tracking.update(measured, self._bound):
@@ -314,8 +329,7 @@ class JointTrajectoryController:
             self._tracking.update(measured, self._bound)
 
     def _forget(self) -> None:
-        self._goal = None
-        self._bound = np.inf
+        self._goal, self._bound = None, np.inf
 
     def _handle_requests(self, time: float, period: float, measured: JointState) -> None:
         """Carry out the requests since the last update: activation, a new goal, a stop."""
@@ -325,6 +339,8 @@ class JointTrajectoryController:
             if self._pid is not None:
                 self._pid.reset()
             self._reference.hold(ActiveTrajectory.hold(measured.position), time=time)
+        if (self._next is not None or self._stop) and (row := self._jogging.end()) is not None:
+            self._come_to_rest(row, time, period)
         if self._next is not None:
             self._begin(self._next, time, period, measured)
         elif self._stop:
@@ -343,10 +359,9 @@ class JointTrajectoryController:
         """Make the waiting goal active, and sample its references for every tick."""
         reference = self._reference
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
-        at = (measured.position, measured.velocity)
-        if goal.unchecked and not self._reachable(goal, time, period, measured):
+        if goal.unchecked and not goal.reachable(self._transitions, reference, time, period, measured.position):
             return
-        speed = self.scaling.pace(time)
+        speed, at = self.scaling.begin(time), (measured.position, measured.velocity)
         active = self._transitions.to_goal(goal.trajectory, later, reference, time, speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)
@@ -359,18 +374,6 @@ class JointTrajectoryController:
         self._bound = goal.tolerances.bound
         reference.follow(active, samples, time=time, period=period, speed=speed[0])
         reference.advance(time, period)
-
-    def _reachable(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> bool:
-        """Whether the first point of a goal that was sent before activation can be reached; if not, it is aborted."""
-        try:
-            self._transitions.check_way(
-                goal.trajectory, goal.start_time, self._reference, time - period, period, measured.position
-            )
-        except GoalRejected as refused:
-            text = f"controller '{self.name}': {refused.findings[0].message}"
-            goal.handle.end("aborted", ErrorCode.INVALID_GOAL, text, time)
-            return False
-        return True
 
     def _come_to_rest(self, row: Array, time: float, period: float) -> None:
         active = self._stopping.to_rest(row, period)

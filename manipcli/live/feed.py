@@ -45,6 +45,7 @@ class Feed:
 
     Args:
         period: [s] of the control loop.
+        latched: topics and messages that are sent again when a session begins after a reset.
 
     Attributes:
         observer: the observer that sees each tick first.
@@ -53,8 +54,9 @@ class Feed:
         dropped: samples and messages that nobody took in time.
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, latched: Sequence[tuple[str, bytes]] = ()) -> None:
         self.period = period
+        self._latched = latched
         self.observer: Observer | None = None
         self.wanted = False
         self.tick_now = 0
@@ -67,6 +69,12 @@ class Feed:
     def listen(self, wake: Callable[[], object]) -> None:
         """Call `wake`, in the thread of the control loop, when there is something to take."""
         self._wake = wake
+
+    def restart(self) -> None:
+        """The next session begins, with tick 0."""
+        self.observer, self.tick_now = None, 0
+        for topic, data in self._latched:
+            self.message(topic, 0, data)
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         if self.observer is not None:

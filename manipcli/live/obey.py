@@ -42,7 +42,8 @@ class Obedience:
             self._carry_out(command, endpoint, json.loads(command.json))
         except ManipcliError as error:
             found = error.findings[0]
-            text = f"{found.message}; {found.hint}" if found.hint else found.message
+            hint = self._robot.manager.locked or found.hint
+            text = f"{found.message}; {hint}" if hint else found.message
             self._refuse(command, text, getattr(error, "error_code", ErrorCode.INVALID_GOAL), logged=logged)
         except (ArithmeticError, AssertionError, LookupError, MemoryError, TypeError, ValueError) as error:
             # A message that no check foresaw must not end the session of the others.
@@ -62,10 +63,20 @@ class Obedience:
             command.answer(Answer(True, values))
 
     def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
+        """Answer; an event tells it, unless the command is not in the log either."""
         if logged:
             self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
+        command.answer(self._failed(command, text, code))
+
+    def _failed(self, command: Command, text: str, code: ErrorCode) -> Answer:
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}
-        command.answer(Answer(False, values, text=text, status=ABORTED))
+        return Answer(False, values, text=text, status=ABORTED)
+
+    def abort(self, why: str) -> None:
+        """End all goals of clients as aborted, and all services that wait."""
+        for goal in self._robot.goals:
+            goal.command.answer(self._failed(goal.command, why, ErrorCode.INVALID_GOAL))
+        self._robot.goals.clear()
 
     def after_tick(self) -> None:
         """Send feedback at 20 Hz, and results, to the clients of goals."""

@@ -64,6 +64,7 @@ def serve(
         from manipcli.live.access import Access
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
+        from manipcli.report.run_report import RunReport
 
         live = LiveOptions(Access(token, host), port, factor, wall)
 
@@ -72,6 +73,9 @@ def serve(
             if token is None:
                 console.talk("--open: every program of this machine can command the robot.")
             console.talk("Press Ctrl-C to end the session.")
+
+        def ended(report: RunReport, failure: str) -> None:
+            console.result(text.render_session(report, failure))
 
         with StepProgress(verbose=False, quiet=quiet, interrupts=interrupts) as progress:
             report, failure = pipeline.serve_task(
@@ -82,6 +86,7 @@ def serve(
                 progress=progress,
                 between=interrupts.check,
                 announce=announce,
+                ended=ended,
                 overrides=tuple(overrides or ()),
                 seed=seed,
                 sample=sample,

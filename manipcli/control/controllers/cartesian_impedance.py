@@ -39,6 +39,7 @@ from manipcli.control.control_loop import ControlLoop, NoLoop
 from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
+from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
@@ -225,6 +226,13 @@ class CartesianImpedanceController:
         handle = self._follower.send_goal(trajectory, constraints=constraints)
         self._pose = self._held = None
         return handle
+
+    def jog(self, target: JogTarget, *, until: float) -> None:
+        """Follow velocities until `until` [s], see `JointTrajectoryController.jog`; a pose that was set is cleared."""
+        if self._pose is not None:
+            self._follower.deactivate(self._time)
+        self._follower.jog(target, until=until)
+        self._pose = self._held = None
 
     def set_pose(self, X_WT: Transform) -> None:
         """Set the reference pose of the tool from the next update on; an active goal is aborted.
