@@ -361,7 +361,8 @@ class JointTrajectoryController:
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
         if goal.unchecked and not goal.reachable(self._transitions, reference, time, period, measured.position):
             return
-        speed, at = self.scaling.begin(time), (measured.position, measured.velocity)
+        speed = self.scaling.pace(time)
+        at = (measured.position, measured.velocity)
         active = self._transitions.to_goal(goal.trajectory, later, reference, time, speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)

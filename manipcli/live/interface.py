@@ -26,10 +26,10 @@ CLOCK: Final = "/clock"
 INTERFACES: Final = (
     controllers.endpoints,
     path.endpoints,
-    controller_manager.endpoints,
-    parameters.endpoints,
     jog.endpoints,
     emergency_stop.endpoints,
+    controller_manager.endpoints,
+    parameters.endpoints,
     simulation.endpoints,
     entities.endpoints,
 )
