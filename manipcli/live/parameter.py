@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Final, cast
 
 from annotated_types import Ge, Le
 
+from manipcli.control.controller import Controller
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.manager import ControllerManager
-from manipcli.control.tunable_gains import FIXED, TunableGains, gains_in
+from manipcli.control.tunable_gains import FIXED, gains_in
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean
 from manipcli.live.live_robot import LiveRobot
@@ -55,33 +56,56 @@ class Parameter:
         return self.gain is None
 
 
-def parameters_of(manager: ControllerManager, name: str) -> dict[str, Parameter]:
-    """The parameters of a controller, by their names in ros2_controllers.
+def parameter_names(manager: ControllerManager, name: str) -> list[str]:
+    """The names of the parameters of a controller, those of ros2_controllers.
 
     Raises:
         InvalidArgument: it is not loaded.
     """
+    gains = gains_in(manager[name])
+    own = {} if gains is None else gains.now
+    return [*_FIXED, *(f"gains.{joint}.{gain}" for joint, each in own.items() for gain in _fields(type(each)))]
+
+
+def parameter_of(manager: ControllerManager, name: str, word: str) -> Parameter | None:
+    """A parameter of a controller; None: it has no such parameter. Raises as `parameter_names`."""
     controller = manager[name]
-    every = next(info.every for info in manager.list() if info.name == name)
-    found = {
-        "joints": Parameter(list(controller.joints), STRING_ARRAY, "The joints that it claims."),
-        "command_interfaces": Parameter(list(controller.interfaces), STRING_ARRAY, "What it commands of each joint."),
-        "update_rate": Parameter(round(1.0 / (manager.period * every)), INTEGER, "Updates per second [Hz]."),
-        "use_sim_time": Parameter(True, BOOL, "Its time is the simulated time."),
-    }
+    if word in _FIXED:
+        return _FIXED[word](manager, controller)
+    first, _, rest = word.partition(".")
+    joint, _, gain = rest.rpartition(".")
     gains = gains_in(controller)
-    return found if gains is None else found | dict(_gains(gains))
+    own = None if gains is None or first != "gains" else gains.now.get(joint)
+    if own is None or gain not in _fields(type(own)):
+        return None
+    value, field = cast("Value", getattr(own, gain)), _fields(type(own))[gain]
+    kind = NOT_SET if value is None and gain in FIXED else DOUBLE if value is None else _OF[type(value)]
+    return replace(field, value=value, type=kind, gain=None if gain in FIXED else (joint, gain))
 
 
-def _gains(gains: TunableGains) -> Iterator[tuple[str, Parameter]]:
-    for joint, own in gains.now.items():
-        for gain, field in type(own).model_fields.items():
-            value = cast("Value", getattr(own, gain))
-            kind = NOT_SET if value is None and gain in FIXED else DOUBLE if value is None else _OF[type(value)]
-            where = None if gain in FIXED else (joint, gain)
-            least = next((float(str(one.ge)) for one in field.metadata if isinstance(one, Ge)), None)
-            most = next((float(str(one.le)) for one in field.metadata if isinstance(one, Le)), None)
-            yield f"gains.{joint}.{gain}", Parameter(value, kind, field.description or "", where, least, most)
+def _update_rate(manager: ControllerManager, controller: Controller) -> Parameter:
+    every = next(info.every for info in manager.list() if info.name == controller.name)
+    return Parameter(round(1.0 / (manager.period * every)), INTEGER, "Updates per second [Hz].")
+
+
+_FIXED: Final[dict[str, Callable[[ControllerManager, Controller], Parameter]]] = {
+    "joints": lambda _, own: Parameter(list(own.joints), STRING_ARRAY, "The joints that it claims."),
+    "command_interfaces": lambda _, own: Parameter(list(own.interfaces), STRING_ARRAY, "What it commands."),
+    "update_rate": _update_rate,
+    "use_sim_time": lambda _, own: Parameter(True, BOOL, "Its time is the simulated time."),
+}
+"""What every controller has, and cannot change."""
+
+
+@cache
+def _fields(kind: type[GainsSpec]) -> dict[str, Parameter]:
+    """The gains of a joint without their values."""
+    found = {}
+    for gain, field in kind.model_fields.items():
+        least = next((float(str(one.ge)) for one in field.metadata if isinstance(one, Ge)), None)
+        most = next((float(str(one.le)) for one in field.metadata if isinstance(one, Le)), None)
+        found[gain] = Parameter(None, DOUBLE, field.description or "", None, least, most)
+    return found
 
 
 def change(robot: LiveRobot, name: str, values: Mapping[str, Value]) -> None:
@@ -95,12 +119,9 @@ def change(robot: LiveRobot, name: str, values: Mapping[str, Value]) -> None:
         InvalidArgument: the controller is not loaded; a parameter that is unknown, cannot change, or is of another
             type; a value that is not finite, or that a controllers file may not have either.
     """
-    known = parameters_of(robot.manager, name)
     wanted: dict[tuple[str, str], object] = {}
     for word, value in values.items():
-        parameter = known.get(word)
-        if parameter is None:
-            raise unknown(name, word, known)
+        parameter = known(robot.manager, name, word)
         if parameter.gain is None:
             message = f"parameter '{word}' of controller '{name}' is read-only"
             raise InvalidArgument("LIVE152", message, hint="set it in the controllers file")
@@ -123,10 +144,17 @@ def _check(robot: LiveRobot, name: str, gains: Mapping[str, GainsSpec]) -> None:
             raise InvalidArgument(problem.code or "CTRL100", text, hint=problem.hint)
 
 
-def unknown(name: str, word: str, known: Mapping[str, Parameter]) -> InvalidArgument:
-    """The error for a parameter that a controller does not have."""
-    hint = did_you_mean(word[:80], known, kind="parameters")
-    return InvalidArgument("LIVE151", f"controller '{name}' has no parameter '{word[:80]}'", hint=hint)
+def known(manager: ControllerManager, name: str, word: str) -> Parameter:
+    """As `parameter_of`.
+
+    Raises:
+        InvalidArgument: the controller is not loaded, or has no such parameter.
+    """
+    found = parameter_of(manager, name, word)
+    if found is None:
+        hint = did_you_mean(word[:80], parameter_names(manager, name), kind="parameters")
+        raise InvalidArgument("LIVE151", f"controller '{name}' has no parameter '{word[:80]}'", hint=hint)
+    return found
 
 
 def _typed(word: str, parameter: Parameter, value: Value) -> Value:

@@ -233,6 +233,11 @@ def test_roslibpy_gets_and_sets_parameters(tmp_path: Path) -> None:
         assert "may only read" in refused["values"]
         read = await reader.call("/rosapi/get_param", name="/arm_controller:gains.joint_2.p")
         assert read["values"]["value"] == "700.0"
+        owner = await opened(url)
+        for name, value in (("x" * 10**5, "1"), ("/arm_controller:gains.joint_2.p", "[" * 10**5)):
+            hostile = await owner.call("/rosapi/set_param", name=name, value=value)
+            assert hostile["result"] is False
+            assert len(hostile["values"]) < 400
 
     log = serving(tmp_path, use)
     assert pipeline.verify_log(log).identical
