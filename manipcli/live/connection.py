@@ -9,7 +9,7 @@ from typing import Final
 
 from manipcli.live.command import Answer, Command
 from manipcli.live.fields import Refused
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.live.outbox import Outbox
 from manipcli.live.rosapi import Rosapi
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from manipcli.live.command import Values
 from manipcli.live.fields import arguments, rooted
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.live.typedefs import typedefs
 from manipcli.record.json_message import BadMessage, definition
 from manipcli.record.schemas import schema_text
