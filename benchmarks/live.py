@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from mmap import PAGESIZE
 from pathlib import Path
 from typing import Final
@@ -55,6 +55,8 @@ class Worker:
         if clients:
             self.clients = started("watch", self.url, str(clients), str(deaf))
             assert line(self.clients) == "ready"
+        own = [self.process.pid, *children(self.process.pid)]
+        self._pids = own if self.clients is None else [*own, self.clients.pid]
 
     def counted(self) -> int:
         """Messages that each client has received at least of each topic since the last call."""
@@ -67,9 +69,9 @@ class Worker:
 
     def signal(self, number: int) -> None:
         """To all its processes."""
-        found = [self.process.pid, *children(self.process.pid), *([self.clients.pid] if self.clients else [])]
-        for pid in found:
-            os.kill(pid, number)
+        for pid in self._pids:
+            with suppress(ProcessLookupError):
+                os.kill(pid, number)
 
     def close(self) -> None:
         """End them."""
