@@ -48,13 +48,13 @@ class Connection:
 
     Attributes:
         outbox: what waits to be sent.
-        level: of the status messages that it wants.
+        level: of the status messages that it wants; at first that of the protocol.
     """
 
     def __init__(self, number: int, *, commands: bool, services: Services) -> None:
         self.number, self.services = number, services
         self.outbox = Outbox()
-        self.level = "warning"
+        self.level = "error"
         self._commands = commands
 
     @property

@@ -16,6 +16,7 @@ from manipcli.live.interfaces import (
     parameters,
     path,
     simulation,
+    task,
 )
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.record import schemas
@@ -31,6 +32,7 @@ INTERFACES: Final = (
     parameters.endpoints,
     simulation.endpoints,
     entities.endpoints,
+    task.endpoints,
 )
 """Groups of endpoints: (task, controllers) -> its endpoints."""
 

@@ -15,6 +15,7 @@ from manipcli.live.access import Access
 from manipcli.live.client import Client
 from manipcli.live.connection import Services
 from manipcli.live.frames import MAX_FRAME
+from manipcli.record.channels import ROSOUT
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -123,7 +124,8 @@ class LiveServer:
                         await connection.send(text)
                 if time.monotonic() - told > TOLD:
                     told = time.monotonic()
-                    _warn_of_drops(client)
+                    for line in client.report_drops():
+                        self.publish(ROSOUT, line)
         except TimeoutError:
             connection.transport.abort()
         except ConnectionClosed:
@@ -144,13 +146,6 @@ class LiveServer:
         now = time.monotonic()
         for client in self._clients.values():
             client.outbox.publish(topic, text, now)
-
-
-def _warn_of_drops(client: Client) -> None:
-    for one in client.outbox.subscriptions.values():
-        if one.dropped:
-            client.status("warning", f"{one.topic}: {one.dropped} messages were dropped; read faster or throttle")
-            one.dropped = 0
 
 
 def _status(code: int) -> Any:

@@ -40,6 +40,7 @@ class LiveOptions:
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
         outlets: what shows the session besides the WebSocket server.
+        run: also do the steps of the task.
     """
 
     access: Access
@@ -47,6 +48,7 @@ class LiveOptions:
     speed: float | None = 1.0
     lasting: float | None = None
     outlets: Sequence[OutletOptions] = ()
+    run: bool = False
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
