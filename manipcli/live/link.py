@@ -101,6 +101,8 @@ class Link:
         """The commands that have arrived."""
         if self._waits:
             self._flush()
+        if not self._given_back and self.numbers[SENT] == self._taken:
+            return ()
         found, self._given_back = self._given_back, []
         if self.numbers[SENT] != self._taken and not self.lost:
             self._receive()
