@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
 from manipcli.live.access import Access
-from manipcli.live.feed import Feed
+from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
+from manipcli.live.network_process import NetworkProcess
 from manipcli.live.pace import Pace
-from manipcli.live.publisher import Publisher, begin_messages
-from manipcli.live.source import Inbox, recorded_commands
+from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
 from manipcli.run.run_log import recorded
 from manipcli.task.task import Task
 
+if TYPE_CHECKING:
+    from manipcli.live.outlet import OutletOptions
+
 DEFAULT_PORT: Final = 9090
 """rosbridge's."""
+WATCHED: Final = 500
+"""Ticks between two looks at the process of the network."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,7 @@ class LiveOptions:
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
         run: also do the steps of the task.
+        outlets: what shows the session besides the WebSocket server.
     """
 
     access: Access
@@ -42,6 +48,7 @@ class LiveOptions:
     speed: float | None = 1.0
     lasting: float | None = None
     run: bool = False
+    outlets: Sequence[OutletOptions] = ()
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -70,18 +77,36 @@ def served(
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
+        NetworkFailed: LIVE200 the process of the network did not start.
     """
-    from manipcli.live.server import LiveServer  # asyncio, which nothing else needs
+    from manipcli.live.network import Setup  # asyncio, which nothing else needs
+    from manipcli.live.publisher import begin_messages
 
     period = task.spec.simulation.control_period
+    robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    feed = Feed(period, begin_messages(task.robot, task.true.scene, channels))
-    inbox = Inbox()
-    publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
+    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
-    with LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port) as server:
-        yield Outside(inbox, feed, pace, between, lambda: announce(options.url(server.port)))
+    with NetworkProcess(setup) as network:
+        least = FAST_PERIOD if options.speed is None else 0.0
+        latched = begin_messages(robot, scene, channels)
+        feed = Feed(period, network.link, topics=offer.published, latched=latched, least=least)
+        outside = Outside(network.link, feed, pace, ready=lambda: announce(options.url(network.port)))
+        left = 0
+
+        def check() -> None:
+            nonlocal left
+            between()
+            left -= 1
+            if left < 0 or network.link.lost:
+                left = WATCHED
+                if network.lost:
+                    outside.failure = network.lost
+                    raise KeyboardInterrupt
+
+        outside.between = check
+        yield outside
 
 
 def next_log(first: Path, number: int, *, overwrite: bool) -> tuple[Path, int]:

@@ -77,7 +77,7 @@ def serve(
         from manipcli.report import text
         from manipcli.report.run_report import RunReport, exit_code
 
-        live = LiveOptions(Access(token, host), port, factor, wall, run)
+        live = LiveOptions(Access(token, host), port, factor, wall, run=run)
 
         def announce(url: str) -> None:
             console.result(url)
