@@ -39,16 +39,16 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
-        outlets: what shows the session besides the WebSocket server.
         run: also do the steps of the task.
+        outlets: what shows the session besides the WebSocket server.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
-    outlets: Sequence[OutletOptions] = ()
     run: bool = False
+    outlets: Sequence[OutletOptions] = ()
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
