@@ -15,7 +15,8 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.live.command import CALL_SERVICE, END, PUBLISH, Answer, Command
-from manipcli.live.interface import endpoints_of, request_type
+from manipcli.live.interface import endpoints_of
+from manipcli.live.offer import request_type
 from manipcli.record.foreign.topics import open_topics
 from manipcli.record.json_message import definition, from_json, to_json
 from manipcli.run.execute import build_manager
