@@ -164,6 +164,8 @@ async def reset(client: Raw) -> None:
     client.others.clear()
     assert await state(client, STOPPED) == OK
     assert await ball(client) == (0.0, pytest.approx(there, abs=1e-3))
+    clocks = [each["msg"]["clock"] for each in client.others if each.get("topic") == "/clock"]
+    assert (clocks[-1]["sec"], clocks[-1]["nanosec"]) == (0, 0)
     assert await code(client, "/step_simulation", steps=3) == OK
     assert (await asked(client, "/get_simulation_state"))["state"]["state"] == PAUSED
     assert (await asked(client, "/rosapi/get_time"))["time"]["nanosec"] == 2_000_000
