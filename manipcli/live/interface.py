@@ -15,7 +15,9 @@ from manipcli.live.interfaces import (
     jog,
     parameters,
     path,
+    rosapi_parameters,
     simulation,
+    task,
 )
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.record import schemas
@@ -29,8 +31,10 @@ INTERFACES: Final = (
     emergency_stop.endpoints,
     controller_manager.endpoints,
     parameters.endpoints,
+    rosapi_parameters.endpoints,
     simulation.endpoints,
     entities.endpoints,
+    task.endpoints,
 )
 """Groups of endpoints: (task, controllers) -> its endpoints."""
 

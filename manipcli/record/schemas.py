@@ -6,6 +6,7 @@ line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schem
 
 from __future__ import annotations
 
+from manipcli.record.parameter_schemas import PARAMETERS
 from manipcli.record.rosapi_definitions import ROSAPI
 from manipcli.record.simulation_schemas import SIMULATION
 
@@ -176,6 +177,28 @@ DEFINITIONS: dict[str, str] = {
         "# The message, the goal or the request as JSON.\n"
         "string json\n"
     ),
+    "manipcli_msgs/RunStep_Goal": "# A step as in a task file, in YAML or JSON: `{pick: {object: cup}}`\nstring step\n",
+    "manipcli_msgs/RunStep_Result": (
+        "# Of the step in the log, such as `pick@1`; empty if it is refused.\n"
+        "string id\n"
+        "# done, failed, timeout, canceled, not_plannable, invalid, or rejected: the robot is busy.\n"
+        "string outcome\n"
+        "# Why it is not done.\n"
+        "string text\n"
+        "# By how much it is done, negative if it is not: of its `until`; else of the place of an object that was set\n"
+        "# down [m], or of the friction over the weight of an object that was grasped [N]; NaN without one.\n"
+        "float64 margin\nstring unit\n"
+    ),
+    "manipcli_msgs/RunStep_Feedback": (
+        "# A phase begins: plan, then the motions of the step by their names.\nstring id\nstring phase\n"
+    ),
+    "manipcli_msgs/CheckStep_Request": "# As of RunStep.\nstring step\n",
+    "manipcli_msgs/CheckStep_Response": (
+        "# Whether it is valid, and can be planned from where the robot is; text: why not.\n"
+        "bool valid\nbool plannable\nstring text\n"
+        "# Its motions, and their planned duration [s]; NaN without a plan.\n"
+        "string[] phases\nfloat64 duration\n"
+    ),
     "rosgraph_msgs/Clock": "builtin_interfaces/Time clock\n",
     "std_msgs/MultiArrayDimension": "string label\nuint32 size\nuint32 stride\n",
     "std_msgs/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n",
@@ -222,6 +245,7 @@ DEFINITIONS: dict[str, str] = {
         "bool activate_asap\nbuiltin_interfaces/Duration timeout\n"
     ),
     "controller_manager_msgs/SwitchController_Response": "bool ok\nstring message\n",
+    **PARAMETERS,
     **SIMULATION,
     **ROSAPI,
     "controller_manager_msgs/ListControllerTypes_Request": "",
@@ -236,38 +260,6 @@ DEFINITIONS: dict[str, str] = {
         for verb in ("Load", "Configure", "Cleanup", "Unload")
         for part, fields in (("Request", "string name\n"), ("Response", "bool ok\n"))
     },
-    "rcl_interfaces/ParameterType": (
-        "uint8 PARAMETER_NOT_SET=0\nuint8 PARAMETER_BOOL=1\nuint8 PARAMETER_INTEGER=2\nuint8 PARAMETER_DOUBLE=3\n"
-        "uint8 PARAMETER_STRING=4\nuint8 PARAMETER_BYTE_ARRAY=5\nuint8 PARAMETER_BOOL_ARRAY=6\n"
-        "uint8 PARAMETER_INTEGER_ARRAY=7\nuint8 PARAMETER_DOUBLE_ARRAY=8\nuint8 PARAMETER_STRING_ARRAY=9\n"
-    ),
-    "rcl_interfaces/ParameterValue": (
-        "uint8 type\nbool bool_value\nint64 integer_value\nfloat64 double_value\nstring string_value\n"
-        "byte[] byte_array_value\nbool[] bool_array_value\nint64[] integer_array_value\nfloat64[] double_array_value\n"
-        "string[] string_array_value\n"
-    ),
-    "rcl_interfaces/Parameter": "string name\nrcl_interfaces/ParameterValue value\n",
-    "rcl_interfaces/FloatingPointRange": "float64 from_value\nfloat64 to_value\nfloat64 step\n",
-    "rcl_interfaces/IntegerRange": "int64 from_value\nint64 to_value\nuint64 step\n",
-    "rcl_interfaces/ParameterDescriptor": (
-        "string name\nuint8 type\nstring description\nstring additional_constraints\nbool read_only false\n"
-        "bool dynamic_typing false\nrcl_interfaces/FloatingPointRange[<=1] floating_point_range\n"
-        "rcl_interfaces/IntegerRange[<=1] integer_range\n"
-    ),
-    "rcl_interfaces/SetParametersResult": "bool successful\nstring reason\n",
-    "rcl_interfaces/ListParametersResult": "string[] names\nstring[] prefixes\n",
-    "rcl_interfaces/ListParameters_Request": "uint64 DEPTH_RECURSIVE=0\nstring[] prefixes\nuint64 depth\n",
-    "rcl_interfaces/ListParameters_Response": "rcl_interfaces/ListParametersResult result\n",
-    "rcl_interfaces/GetParameters_Request": "string[] names\n",
-    "rcl_interfaces/GetParameters_Response": "rcl_interfaces/ParameterValue[] values\n",
-    "rcl_interfaces/GetParameterTypes_Request": "string[] names\n",
-    "rcl_interfaces/GetParameterTypes_Response": "uint8[] types\n",
-    "rcl_interfaces/DescribeParameters_Request": "string[] names\n",
-    "rcl_interfaces/DescribeParameters_Response": "rcl_interfaces/ParameterDescriptor[] descriptors\n",
-    "rcl_interfaces/SetParameters_Request": "rcl_interfaces/Parameter[] parameters\n",
-    "rcl_interfaces/SetParameters_Response": "rcl_interfaces/SetParametersResult[] results\n",
-    "rcl_interfaces/SetParametersAtomically_Request": "rcl_interfaces/Parameter[] parameters\n",
-    "rcl_interfaces/SetParametersAtomically_Response": "rcl_interfaces/SetParametersResult result\n",
     "std_msgs/Float64": "float64 data\n",
     "control_msgs/MultiDOFCommand": "string[] dof_names\nfloat64[] values\nfloat64[] values_dot\n",
     "control_msgs/SpeedScalingFactor": "float64 factor\n",
