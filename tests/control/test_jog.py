@@ -72,7 +72,7 @@ def test_no_limit_is_exceeded_by_1000_random_messages() -> None:
             axes = (None, "", ROBOT.root)[rng.integers(3)]
             target: ToolTarget | JointTarget | None = tool(rng.normal(size=6) * 10 ** rng.uniform(-2, 2), axes)
         else:
-            target = None if kind < 0.5 else JointTarget(rng.normal(size=len(ARM)) * 10 ** rng.uniform(-1, 2))
+            target = None if kind < 0.5 else JointTarget((rng.normal(size=len(ARM)) + 1) * 10 ** rng.uniform(-1, 2))
         for _ in range(rng.integers(1, 7)):
             after, speed = made.step(q, v, target, dt)
             np.testing.assert_allclose(after, q + 0.5 * dt * (v + speed), atol=1e-14, rtol=0.0)
@@ -149,6 +149,27 @@ def test_near_a_limit_the_tool_slows_down_on_its_line() -> None:
         reached += np.abs(q).max() > 0.5 - 1e-4
         assert np.abs(v).max() < 1e-3
     assert reached == 5
+
+
+def test_at_the_end_of_its_reach_the_tool_stops_on_its_line_and_comes_back() -> None:
+    made, q, v = law(), BENT.copy(), np.zeros(len(ARM))
+    _, begin = pose(q)
+    out, home = tool([0.3, 0, 0, 0, 0, 0]), tool([-0.3, 0, 0, 0, 0, 0])
+    for target, ticks in ((out, 600), (home, 600)):
+        for tick in range(ticks):
+            before = v
+            q, v = made.step(q, v, target, 4 * PERIOD)
+            assert (np.abs(v) < 0.9 * FACTS.velocity).all()
+            if tick % 20 == 0:
+                assert np.abs(pose(q)[1] - begin)[1:].max() < 2e-3
+        if target is out:
+            full = HOME.copy()
+            full[COLUMNS] = q
+            assert np.linalg.svd(KINEMATICS.jacobian(full, *TOOL)[:, COLUMNS], compute_uv=False)[-1] < 0.01
+            reached = pose(q)[1][0]
+            assert np.abs(v - before).max() < 1e-3
+    assert reached - begin[0] > 0.1
+    assert pose(q)[1][0] < reached - 0.15
 
 
 def test_a_redundant_joint_at_its_limit_does_not_stop_the_tool() -> None:
