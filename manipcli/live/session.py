@@ -74,7 +74,7 @@ def served(
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
         announce: called with the URL when clients can connect.
-        late: called once with a text if the simulation is slower than asked.
+        late: called with texts for the user: notices of outlets, and once if the simulation is slower than asked.
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
@@ -93,8 +93,14 @@ def served(
         least = FAST_PERIOD if options.speed is None else 0.0
         again = (*begin_messages(robot, scene, channels), (CLOCK, clock_message(0)))
         feed = Feed(period, network.link, topics=offer.published, again=again, least=least)
-        outside = Outside(network.link, feed, pace, ready=lambda: announce(options.url(network.port)))
         left = 0
+
+        def ready() -> None:
+            for notice in network.notices:
+                late(notice)
+            announce(options.url(network.port))
+
+        outside = Outside(network.link, feed, pace, ready=ready)
 
         def check() -> None:
             nonlocal left
