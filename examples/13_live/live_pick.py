@@ -20,7 +20,8 @@ STEPS = (
 def main() -> None:
     command = [sys.executable, "-m", "manipcli", "serve", str(TASK), "--port", "0", "--speed", "max", "--open"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    robot = roslibpy.Ros(server.stdout.readline().strip())
+    url = next(line for line in server.stdout if line.startswith("ws://"))
+    robot = roslibpy.Ros(url.strip())
     robot.run()
     action = roslibpy.ActionClient(robot, "/task/run_step", "manipcli_msgs/action/RunStep")
     for step in STEPS:

@@ -73,7 +73,7 @@ def served(
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
         announce: called with the URL when clients can connect.
-        late: called once with a text if the simulation is slower than asked.
+        late: called with texts for the user: notices of outlets, and once if the simulation is slower than asked.
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
@@ -92,8 +92,14 @@ def served(
         least = FAST_PERIOD if options.speed is None else 0.0
         latched = begin_messages(robot, scene, channels)
         feed = Feed(period, network.link, topics=offer.published, latched=latched, least=least)
-        outside = Outside(network.link, feed, pace, ready=lambda: announce(options.url(network.port)))
         left = 0
+
+        def ready() -> None:
+            for notice in network.notices:
+                late(notice)
+            announce(options.url(network.port))
+
+        outside = Outside(network.link, feed, pace, ready=ready)
 
         def check() -> None:
             nonlocal left
