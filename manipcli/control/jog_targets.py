@@ -35,6 +35,8 @@ NEAR: Final = 100.0
 """[rad/s] per unit of s: very near, s decays without a step."""
 NEGLIGIBLE: Final = 1e-3
 """Relative to x."""
+NEVER: Final = 1e-9
+"""A singular value below this is that of a direction in which these joints never move the tool; it is left out."""
 TASK: Final = 6
 
 
@@ -106,10 +108,10 @@ class TaskVelocity:
         parts = x @ U
         most = np.minimum(np.sqrt(BRAKE * values), NEAR * values)
         allowed = values * most + NEGLIGIBLE * np.sqrt(np.vdot(x, x))
-        sizes = np.abs(parts)
-        scale = min(1.0, float(np.divide(allowed, sizes, out=np.ones_like(sizes), where=sizes > 0.0).min()))
-        self._J, self._x = J, scale * x
-        speeds = np.divide(scale * parts, values, out=np.zeros_like(values), where=values > 0.0)
+        sizes, possible = np.abs(parts), values > NEVER
+        scale = np.divide(allowed, sizes, out=np.ones_like(sizes), where=possible & (sizes > 0.0)).min(initial=1.0)
+        self._J, self._x = J, float(scale) * x
+        speeds = np.divide(scale * parts, values, out=np.zeros_like(values), where=possible)
         self.velocity: Array = np.clip(speeds, -most, most) @ Vt
 
     def within(self, lower: Array, upper: Array) -> Array:

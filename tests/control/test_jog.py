@@ -185,6 +185,15 @@ def test_a_redundant_joint_at_its_limit_does_not_stop_the_tool() -> None:
     assert (np.abs(within) <= tight + 1e-12).all()
 
 
+def test_directions_in_which_the_joints_never_move_the_tool_are_left_out() -> None:
+    """Parallel axes and a joint beyond the tool: the nearest velocity, as by the pseudo-inverse."""
+    J = np.zeros((6, 5))
+    J[:2, :4] = np.random.default_rng(4).normal(size=(2, 4))
+    J[5, :4] = 1.0
+    x = np.array([0.1, 0.2, 0.3, 0.1, 0.0, 0.1])
+    np.testing.assert_allclose(TaskVelocity(J, x).velocity, np.linalg.pinv(J) @ x, atol=1e-12)
+
+
 def controller(**more: object) -> JointTrajectoryController:
     return JointTrajectoryController(
         name="arm", joints=ARM, command_interfaces=("position",), stop_planner=stopped,
