@@ -122,7 +122,7 @@ class Link:
 
     def give_back(self, commands: Sequence[Command]) -> None:
         """Take these again, before all others."""
-        self._given_back += commands
+        self._given_back[:0] = commands
 
     def _receive(self) -> None:
         try:

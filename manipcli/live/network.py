@@ -186,7 +186,7 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
             return
         hub.server = server
         hub.subscribed()
-        _report(transport, {"port": port})
+        _report(transport, {"port": port, "notices": [outlet.notice for outlet in hub.outlets if outlet.notice]})
         running = asyncio.create_task(hub.run())
         over = asyncio.create_task(stream.over.wait())
         await asyncio.wait((running, over), return_when=asyncio.FIRST_COMPLETED)

@@ -51,6 +51,7 @@ class NetworkProcess:
     Attributes:
         link: the end of the control loop.
         port: that the WebSocket server listens on.
+        notices: of its outlets, for the user.
 
     Raises:
         InvalidInput: USE131 a port cannot be used; USE132 a library is not installed.
@@ -76,13 +77,13 @@ class NetworkProcess:
             os.close(descriptor)
         self._end = ours
         try:
-            self.port = self._started(setup)
+            self.port, self.notices = self._started(setup)
         except BaseException:
             self._kill()
             raise
         self.link = Link(ours, numbers)
 
-    def _started(self, setup: Setup) -> int:
+    def _started(self, setup: Setup) -> tuple[int, list[str]]:
         self._end.settimeout(PATIENCE)
         try:
             self._end.sendall(framed(pickle.dumps(setup, 5)))
@@ -93,7 +94,7 @@ class NetworkProcess:
             raise NetworkFailed(f"the process of the network did not start: {error}") from error
         if "findings" in found:
             raise InvalidInput([Diagnostic(code, text, hint=hint) for code, text, hint in found["findings"]])
-        return int(found["port"])
+        return int(found["port"]), [str(notice) for notice in found["notices"]]
 
     @property
     def lost(self) -> str:

@@ -28,7 +28,13 @@ class Network:
 
 
 class Outlet(Protocol):
-    """An open outlet. Its methods are called in the thread of the network and must not block."""
+    """An open outlet. Its methods are called in the thread of the network and must not block.
+
+    Attributes:
+        notice: for the user at the begin of the session, such as its address; "": nothing.
+    """
+
+    notice: str
 
     def wanted(self) -> Collection[str]:
         """The topics whose messages it takes now."""

@@ -18,11 +18,13 @@ from manipcli.live.access import Access
 from manipcli.live.command import Command
 from manipcli.live.feed import Feed
 from manipcli.live.loop import Outside, simulate_live
+from manipcli.live.outlet import OutletOptions
 from manipcli.live.pace import Pace
 from manipcli.live.session import LiveOptions
 from manipcli.live.source import Schedule
 from manipcli.logs.judge_log import judge_log
 from manipcli.run.execute import build_manager
+from manipcli.run.observer import SILENT, Progress
 from manipcli.run.run_log import open_log, run_metadata, verdict_metadata
 from manipcli.task.part import LIVE, Part
 
@@ -63,6 +65,8 @@ def serving(
     use: Callable[[str], Awaitable[None]],
     *,
     token: str | None = TOKEN,
+    outlets: Sequence[OutletOptions] = (),
+    progress: Progress = SILENT,
     task: Path | str = SMALL,
     speed: float | None = None,
 ) -> Path:
@@ -84,10 +88,16 @@ def serving(
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=speed)
+        options = LiveOptions(Access(token), port=0, speed=speed, outlets=outlets)
         try:
             _, failure = pipeline.serve_task(
-                file, options, log=log, between=between, announce=announced.put, allow_outside=True
+                file,
+                options,
+                log=log,
+                progress=progress,
+                between=between,
+                announce=announced.put,
+                allow_outside=True,
             )
             failures.extend([failure] if failure else [])
         except BaseException as error:  # noqa: BLE001 (raised again by the test)

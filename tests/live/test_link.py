@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import pickle
 import signal
@@ -107,6 +108,7 @@ def test_a_session_whose_network_is_killed_ends_and_its_log_is_complete(tmp_path
         (network,) = {word for task in tasks for word in (task / "children").read_text().split()}
         os.kill(int(network), signal.SIGKILL)
         await client.socket.wait_closed()
+        await asyncio.sleep(1.0)  # the control loop notices it, too
 
     with pytest.raises(AssertionError):  # of a session with a failure
         serving(tmp_path, use)
