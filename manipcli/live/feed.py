@@ -51,6 +51,8 @@ class Feed:
         wanted: whether somebody subscribes to a topic of samples.
         tick_now: the last tick.
         dropped: samples and messages that nobody took in time.
+        newest: the sample that was asked for last; None before the first.
+        on_message: called with each message, in the thread of the control loop; it must not block.
     """
 
     def __init__(self, period: float) -> None:
@@ -59,6 +61,9 @@ class Feed:
         self.wanted = False
         self.tick_now = 0
         self.dropped = 0
+        self.newest: Sample | None = None
+        self.on_message: Callable[[Event], object] = lambda _: None
+        self._asked = False
         self._every = max(1, round(SAMPLE_PERIOD / period))
         self._samples: deque[Sample] = deque()
         self._events: deque[Event] = deque()
@@ -68,14 +73,23 @@ class Feed:
         """Call `wake`, in the thread of the control loop, when there is something to take."""
         self._wake = wake
 
+    def ask(self) -> None:
+        """Sample the next tick for `newest`."""
+        self._asked = True
+
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         if self.observer is not None:
             self.observer.tick(tick, state, outputs)
         self.tick_now = tick
-        if not self.wanted or tick % self._every:
+        wanted = self.wanted and not tick % self._every
+        if not wanted and not self._asked:
             return
         rows = tuple(None if output is None else output.rows.copy() for output in outputs)
-        self._put(self._samples, KEPT_SAMPLES, Sample(tick, state.numbers.copy(), rows))
+        sample = Sample(tick, state.numbers.copy(), rows)
+        if self._asked:
+            self._asked, self.newest = False, sample
+        if wanted:
+            self._put(self._samples, KEPT_SAMPLES, sample)
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
         if self.observer is not None:
@@ -83,7 +97,9 @@ class Feed:
 
     def message(self, topic: str, ns: int, data: bytes) -> None:
         """Takes each message that the recorder writes at an event."""
-        self._put(self._events, KEPT_MESSAGES, Event(topic, data))
+        event = Event(topic, data)
+        self.on_message(event)
+        self._put(self._events, KEPT_MESSAGES, event)
 
     def _put(self, queue: deque[Sample] | deque[Event], kept: int, item: Sample | Event) -> None:
         if len(queue) >= kept:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -34,12 +34,16 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
+        page: whether there is a page for browsers.
+        page_port: see `LocalServer`.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
+    page: bool = False
+    page_port: int | None = None
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -63,7 +67,7 @@ def served(
         task, manager: of the session.
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        announce: called with the URL when clients can connect.
+        announce: called with each URL when clients can connect.
         late: called once with a text if the simulation is slower than asked.
 
     Raises:
@@ -77,8 +81,25 @@ def served(
     feed, inbox = Feed(period), Inbox()
     publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
-    with LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port) as server:
-        yield Outside(inbox, feed, pace, between, lambda: announce(options.url(server.port)))
+    with ExitStack() as opened:
+        server = opened.enter_context(
+            LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port)
+        )
+        addresses = [options.url(server.port)]
+        if options.page:
+            from manipcli.live.page.page import LivePage
+
+            page = LivePage(
+                task.robot, task.true.scene, manager.controllers, offer, feed, inbox.put,
+                access=options.access, port=options.page_port,
+            )  # fmt: skip
+            addresses.append(opened.enter_context(page).address)
+
+        def ready() -> None:
+            for address in addresses:
+                announce(address)
+
+        yield Outside(inbox, feed, pace, between, ready)
 
 
 def recorded_session(recording: Recording, log: Path) -> Outside:

@@ -21,6 +21,17 @@ def serve(
     port: Annotated[
         int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port of the server; 0 is any free port.")
     ] = 9090,
+    page_port: Annotated[
+        int | None,
+        typer.Option(
+            "--page-port",
+            metavar="N",
+            min=0,
+            max=65535,
+            help="Port of the page for browsers [default: first free port from 8080].",
+        ),
+    ] = None,
+    no_page: Annotated[bool, typer.Option("--no-page", help="Serve no page for browsers.")] = False,
     host: Annotated[
         str,
         typer.Option("--host", metavar="ADDRESS", help="Address to listen on; others than the default need a token."),
@@ -65,7 +76,7 @@ def serve(
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
 
-        live = LiveOptions(Access(token, host), port, factor, wall)
+        live = LiveOptions(Access(token, host), port, factor, wall, not no_page, page_port)
 
         def announce(url: str) -> None:
             console.result(url)

@@ -1,0 +1,224 @@
+"""The page of a live session in the browser: what the robot does, and for visitors with the token, its controls.
+
+A thread of its own copies the newest state to the browsers, at most 20 times per second of wall time and in at most a
+tenth of it; while no browser is connected it samples nothing. Commands go the way of all others, through the inbox.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from queue import SimpleQueue
+from types import TracebackType
+from typing import TYPE_CHECKING, Final
+
+from manipcli.control.controller import Controller
+from manipcli.live.access import Access
+from manipcli.live.command import Answer, Command
+from manipcli.live.feed import Feed, Sample
+from manipcli.live.interface import Offer
+from manipcli.live.page import service_calls, texts
+from manipcli.live.page.controls import Controls
+from manipcli.live.page.door import MAY_COMMAND, door
+from manipcli.live.page.drive import drives_of
+from manipcli.live.page.panel import Panel
+from manipcli.live.page.snapshot import Snapshot
+from manipcli.live.page.story import Story
+from manipcli.model.configuration import configuration
+from manipcli.model.robot import RobotModel
+from manipcli.replay.drawing import draw, floors_of
+from manipcli.replay.placing import Placing
+from manipcli.replay.view.viser_scene import ViserScene
+from manipcli.replay.view.viser_server import LocalServer
+from manipcli.scene.scene import Scene
+
+if TYPE_CHECKING:
+    import viser
+
+PERIOD: Final = 0.05
+"""[s] Of wall time between two updates."""
+SHARE: Final = 9.0
+"""Pause after an update, in its own duration."""
+ASKING: Final = 0.5
+"""[s] Between two questions for the states of controllers and simulation, and two texts."""
+IDLE: Final = 0.2
+"""[s] Between two looks for visitors."""
+
+
+class LivePage(LocalServer):
+    """A served page. A context manager that stops it.
+
+    Args:
+        robot, scene: of the session.
+        controllers: of the session.
+        offer: of the session; what it does not have gets no control.
+        feed: of the session.
+        put: hands a command to the control loop; False if too many wait.
+        access: whose token commands need; the page is on 127.0.0.1 whatever its host.
+        port: see `LocalServer`.
+
+    Raises:
+        InvalidInput: the port cannot be used.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        scene: Scene,
+        controllers: Sequence[Controller],
+        offer: Offer,
+        feed: Feed,
+        put: Callable[[Command], bool],
+        *,
+        access: Access,
+        port: int | None,
+    ) -> None:
+        self._access = Access(access.token)
+        super().__init__(robot.name, port=port, option="--page-port", check=door(self._access))
+        # A browser that leaves during an update is no fault.
+        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
+        self._robot, self._offer, self._feed, self._put = robot, offer, feed, put
+        self._sizes = len(robot.moving_joints), len(scene.movable)
+        self._drives = drives_of(robot, controllers, offer)
+        self._placing = Placing(robot, scene)
+        self._story = Story()
+        self._panels: dict[int, Panel] = {}
+        self._answers: SimpleQueue[tuple[int | None, str, Answer]] = SimpleQueue()
+        self._controllers: dict[str, str] = {}
+        self._simulation: int | None = None
+        self._clock: deque[tuple[float, int]] = deque(maxlen=5)
+        self._sample: Sample | None = None
+        self._asked = 0.0
+        self._over = threading.Event()
+        drawing = draw(robot, scene)
+        self._notes = drawing.missing
+        try:
+            start = self._placing.start(configuration(robot))
+            self._scene = ViserScene(self.viser, drawing, start, floors=floors_of(scene))
+        except BaseException:
+            self.stop()
+            raise
+        gui = self.viser.gui
+        self._status = gui.add_html(texts.status(None, None), order=1)
+        self._steps_folder = gui.add_folder("Steps", order=3, visible=False)
+        with self._steps_folder:
+            self._steps = gui.add_html("")
+        self._controllers_folder = gui.add_folder("Controllers", order=6)
+        with self._controllers_folder:
+            self._states = gui.add_html("")
+        with gui.add_folder("Messages", order=7):
+            self._messages = gui.add_html("")
+        feed.on_message = self._story.hear
+        self.viser.on_client_connect(self._came)
+        self.viser.on_client_disconnect(self._left)
+        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+        self._thread.start()
+
+    @property
+    def address(self) -> str:
+        """URL to open in a browser, with the token."""
+        return self.url if self._access.token is None else f"{self.url}/?token={self._access.token}"
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._over.set()
+        self._thread.join(timeout=5.0)
+        super().__exit__(kind, error, at)
+
+    async def _came(self, client: viser.ClientHandle) -> None:
+        if not MAY_COMMAND.get():
+            client.gui.add_html(texts.read_only(), order=0)
+            return
+        answered = partial(self._answered, client.client_id)
+        controls = Controls(self._robot, self._drives, self._offer, self._put, answered)
+        self._panels[client.client_id] = Panel(
+            client, self._controllers_folder, self._robot, self._scene, self._offer, controls
+        )
+
+    async def _left(self, client: viser.ClientHandle) -> None:
+        self._panels.pop(client.client_id, None)
+
+    def _answered(self, visitor: int | None, name: str, answer: Answer) -> None:
+        self._answers.put((visitor, name, answer))
+
+    def _run(self) -> None:
+        pause = IDLE
+        while not self._over.wait(pause):
+            began = time.monotonic()
+            news = self._story.read()
+            if not self.viser.get_clients():
+                self._sample = None
+                pause = IDLE
+                continue
+            self._update(began, news)
+            pause = max(PERIOD, SHARE * (time.monotonic() - began))
+
+    def _update(self, now: float, news: bool) -> None:
+        """Show what is new, and send what visitors ask."""
+        self._take_answers()
+        sample = self._feed.newest
+        self._feed.ask()
+        if sample is None:
+            return
+        snapshot = replace(
+            Snapshot.of(sample, self._feed.period, *self._sizes),
+            controllers=self._controllers,
+            simulation=self._simulation,
+        )
+        if sample is not self._sample:
+            state = snapshot.state
+            self._scene.place(self._placing.at(state.position, state.body_position, state.body_quat_xyzw))
+            self._sample = sample
+        for panel in list(self._panels.values()):
+            panel.update(snapshot, now)
+        if news or not self._messages.content:
+            self._tell()
+        if now - self._asked >= ASKING:
+            self._asked = now
+            self._ask(now, snapshot)
+
+    def _ask(self, now: float, snapshot: Snapshot) -> None:
+        """Show the time, and ask for the states of controllers and simulation."""
+        self._clock.append((now, self._feed.tick_now))
+        self._status.content = texts.status(snapshot, self._factor(), self._notes)
+        for kind in (service_calls.LIST, service_calls.GET_STATE):
+            service = service_calls.service_of(self._offer, kind)
+            if service is not None and service in self._offer.readers:
+                self._put(service_calls.call(self._offer, service, answer=partial(self._answered, None, kind)))
+
+    def _factor(self) -> float | None:
+        """Simulated seconds per second of wall time, over the last two seconds."""
+        (before, first), (now, last) = self._clock[0], self._clock[-1]
+        return (last - first) * self._feed.period / (now - before) if now > before and last >= first else None
+
+    def _tell(self) -> None:
+        story = self._story
+        self._messages.content = texts.messages(story.messages)
+        self._steps.content = texts.steps(story.steps)
+        self._steps_folder.visible = bool(story.steps)
+
+    def _take_answers(self) -> None:
+        while not self._answers.empty():
+            visitor, name, answer = self._answers.get()
+            if visitor is None:
+                self._states_of(name, answer.values)
+                continue
+            why = service_calls.failure(answer)
+            panel = self._panels.get(visitor)
+            if why is not None and panel is not None:
+                panel.failed(name, why)
+
+    def _states_of(self, kind: str, values: Mapping[str, object]) -> None:
+        """Keep the states of controllers, or of the simulation."""
+        match values:
+            case {"controller": list(found)}:
+                self._controllers = {each["name"]: each["state"] for each in found}
+                self._states.content = texts.controllers(self._controllers)
+                for panel in list(self._panels.values()):
+                    panel.show_controllers(self._controllers)
+            case {"state": {"state": int(state)}}:
+                self._simulation = state

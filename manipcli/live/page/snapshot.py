@@ -1,0 +1,53 @@
+"""The newest state of the session, as the page shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.live.feed import Sample
+from manipcli.live.page.drive import Drive
+from manipcli.model.state import WorldState
+
+ACTIVE = "active"
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """One state.
+
+    Attributes:
+        time: simulated [s].
+        state: of joints and bodies.
+        rows: of the outputs of controllers, see `ControllerOutput`; None while one is inactive.
+        controllers: their states by name, as in list_controllers.
+        simulation: as in simulation_interfaces/SimulationState; None if it is unknown.
+    """
+
+    time: float
+    state: WorldState
+    rows: tuple[Array | None, ...] = ()
+    controllers: Mapping[str, str] = field(default_factory=dict)
+    simulation: int | None = None
+
+    @classmethod
+    def of(cls, sample: Sample, period: float, joints: int, bodies: int) -> Snapshot:
+        """From a sample of a session with this control period [s] and numbers of joints and movable bodies."""
+        state = WorldState.room(joints, bodies)
+        np.copyto(state.numbers, sample.numbers)
+        return cls(sample.tick * period, state, sample.rows)
+
+    def is_active(self, controller: str) -> bool:
+        """Whether a controller is active, or not yet known."""
+        return self.controllers.get(controller, ACTIVE) == ACTIVE
+
+    def reference(self, drive: Drive) -> tuple[Array, Array]:
+        """(n) positions and (n) velocities where a drive is: its references; as measured while it has none."""
+        rows = self.rows[drive.index] if drive.index < len(self.rows) else None
+        if rows is not None and rows.shape[0] >= 2 and rows.shape[1] == len(drive.joints) and np.isfinite(rows[:2]).all():
+            return rows[0], rows[1]
+        columns = list(drive.columns)
+        return self.state.position[columns], self.state.velocity[columns]
