@@ -82,9 +82,7 @@ def served(
     publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with ExitStack() as opened:
-        server = opened.enter_context(
-            LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port)
-        )
+        server = opened.enter_context(LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port))
         addresses = [options.url(server.port)]
         if options.page:
             from manipcli.live.page.page import LivePage

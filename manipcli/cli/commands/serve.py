@@ -78,11 +78,15 @@ def serve(
 
         live = LiveOptions(Access(token, host), port, factor, wall, not no_page, page_port)
 
+        urls: list[str] = []
+
         def announce(url: str) -> None:
+            if not urls:
+                if token is None:
+                    console.talk("--open: every program of this machine can command the robot.")
+                console.talk("Press Ctrl-C to end the session.")
+            urls.append(url)
             console.result(url)
-            if token is None:
-                console.talk("--open: every program of this machine can command the robot.")
-            console.talk("Press Ctrl-C to end the session.")
 
         with StepProgress(verbose=False, quiet=quiet, interrupts=interrupts) as progress:
             report, failure = pipeline.serve_task(

@@ -70,10 +70,14 @@ class Controls:
         self.drives = tuple(drives)
 
     @property
-    def poses(self) -> tuple[str, ...]:
-        """Named poses of the robot that move a drive."""
-        joints = {joint for drive in self.drives for joint in drive.joints}
-        return tuple(pose.name for pose in self._robot.poses if joints & set(pose.joints))
+    def poses(self) -> dict[str, list[str]]:
+        """Named poses of the robot that move a drive: under "hand" those that move hands alone, the others "robot"."""
+        found: dict[str, list[str]] = {}
+        for pose in self._robot.poses:
+            moved = [drive for drive in self.drives if set(drive.joints) & set(pose.joints)]
+            if moved:
+                found.setdefault("hand" if all(drive.hand for drive in moved) else "robot", []).append(pose.name)
+        return found
 
     def slide(self, drive: Drive, joint: str, value: float, now: float) -> None:
         """Move a joint to `value` [rad or m] at the next `send`; `now`: wall time [s]."""

@@ -1,7 +1,7 @@
 """Who may see the page, and who may command: the rules of `live/access.py` on the requests of a browser.
 
-The address `/?token=...` leads on to the page that opens its WebSocket with the token: viser's page takes the address of
-its WebSocket from its query. A connection that came without the token is read-only.
+The address `/?token=...` leads on to the page that opens its WebSocket with the token: viser's page takes the address
+of its WebSocket from its query. A connection that came without the token is read-only.
 """
 
 from __future__ import annotations

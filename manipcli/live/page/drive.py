@@ -1,4 +1,4 @@
-"""What the page sends to move joints: a trajectory of one point, or the goal of a hand, from where the joints are now."""
+"""What the page sends to move joints: a trajectory of one point, or the goal of a hand."""
 
 from __future__ import annotations
 
@@ -75,11 +75,12 @@ class Drive:
     def duration(self, here: Array, velocity: Array, target: Array) -> float:
         """[s] of a cubic from `here` (n), moving at `velocity` (n), to rest at `target` (n), within speed and rise.
 
-        The peak velocity of a cubic over a distance d from rest in a time T is 1.5 d / T, its acceleration 6 d / T^2; an
-        initial velocity v adds an acceleration of 4 v / T.
+        The peak velocity of a cubic over a distance d from rest in a time T is 1.5 d / T, its acceleration 6 d / T^2;
+        an initial velocity v adds an acceleration of 4 v / T.
         """
         distance, acceleration = np.abs(target - here), self.speed / RISE
-        times = (1.5 * distance / self.speed, np.sqrt(6.0 * distance / acceleration), 4 * np.abs(velocity) / acceleration)
+        cruise, rise = 1.5 * distance / self.speed, np.sqrt(6.0 * distance / acceleration)
+        times = (cruise, rise, 4.0 * np.abs(velocity) / acceleration)
         return max(SHORTEST, float(np.max(times)))
 
     def command(self, target: Array, seconds: float, offer: Offer, *, id_: str) -> Command:

@@ -26,7 +26,7 @@ from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.door import MAY_COMMAND, door
 from manipcli.live.page.drive import drives_of
-from manipcli.live.page.panel import Panel
+from manipcli.live.page.panel import Panel, Reader
 from manipcli.live.page.snapshot import Snapshot
 from manipcli.live.page.story import Story
 from manipcli.model.configuration import configuration
@@ -87,7 +87,7 @@ class LivePage(LocalServer):
         self._drives = drives_of(robot, controllers, offer)
         self._placing = Placing(robot, scene)
         self._story = Story()
-        self._panels: dict[int, Panel] = {}
+        self._visitors: dict[int, Panel | Reader] = {}
         self._answers: SimpleQueue[tuple[int | None, str, Answer]] = SimpleQueue()
         self._controllers: dict[str, str] = {}
         self._simulation: int | None = None
@@ -109,8 +109,6 @@ class LivePage(LocalServer):
         with self._steps_folder:
             self._steps = gui.add_html("")
         self._controllers_folder = gui.add_folder("Controllers", order=6)
-        with self._controllers_folder:
-            self._states = gui.add_html("")
         with gui.add_folder("Messages", order=7):
             self._messages = gui.add_html("")
         feed.on_message = self._story.hear
@@ -131,19 +129,19 @@ class LivePage(LocalServer):
 
     async def _came(self, client: viser.ClientHandle) -> None:
         if not MAY_COMMAND.get():
-            client.gui.add_html(texts.read_only(), order=0)
+            self._visitors[client.client_id] = Reader(client, self._controllers_folder)
             return
         answered = partial(self._answered, client.client_id)
         controls = Controls(self._robot, self._drives, self._offer, self._put, answered)
-        self._panels[client.client_id] = Panel(
+        self._visitors[client.client_id] = Panel(
             client, self._controllers_folder, self._robot, self._scene, self._offer, controls
         )
 
     async def _left(self, client: viser.ClientHandle) -> None:
-        self._panels.pop(client.client_id, None)
+        self._visitors.pop(client.client_id, None)
 
-    def _answered(self, visitor: int | None, name: str, answer: Answer) -> None:
-        self._answers.put((visitor, name, answer))
+    def _answered(self, number: int | None, name: str, answer: Answer) -> None:
+        self._answers.put((number, name, answer))
 
     def _run(self) -> None:
         pause = IDLE
@@ -173,8 +171,8 @@ class LivePage(LocalServer):
             state = snapshot.state
             self._scene.place(self._placing.at(state.position, state.body_position, state.body_quat_xyzw))
             self._sample = sample
-        for panel in list(self._panels.values()):
-            panel.update(snapshot, now)
+        for visitor in list(self._visitors.values()):
+            visitor.update(snapshot, now)
         if news or not self._messages.content:
             self._tell()
         if now - self._asked >= ASKING:
@@ -203,22 +201,21 @@ class LivePage(LocalServer):
 
     def _take_answers(self) -> None:
         while not self._answers.empty():
-            visitor, name, answer = self._answers.get()
-            if visitor is None:
-                self._states_of(name, answer.values)
+            number, name, answer = self._answers.get()
+            if number is None:
+                self._states_of(answer.values)
                 continue
             why = service_calls.failure(answer)
-            panel = self._panels.get(visitor)
-            if why is not None and panel is not None:
-                panel.failed(name, why)
+            visitor = self._visitors.get(number)
+            if why is not None and visitor is not None:
+                visitor.failed(name, why)
 
-    def _states_of(self, kind: str, values: Mapping[str, object]) -> None:
+    def _states_of(self, values: Mapping[str, object]) -> None:
         """Keep the states of controllers, or of the simulation."""
         match values:
             case {"controller": list(found)}:
                 self._controllers = {each["name"]: each["state"] for each in found}
-                self._states.content = texts.controllers(self._controllers)
-                for panel in list(self._panels.values()):
-                    panel.show_controllers(self._controllers)
+                for visitor in list(self._visitors.values()):
+                    visitor.show_controllers(self._controllers)
             case {"state": {"state": int(state)}}:
                 self._simulation = state

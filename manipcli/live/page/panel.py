@@ -1,13 +1,13 @@
-"""The controls of one visitor who may command: buttons, sliders and switches in his browser alone."""
+"""What one visitor has in his browser alone: controls if he may command, else the states of the controllers."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from manipcli.live.interface import Offer
-from manipcli.live.page import service_calls
+from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.drive import Drive
 from manipcli.live.page.service_calls import EMERGENCY_STOP, SWITCH, service_of
@@ -56,17 +56,21 @@ class Panel:
             stop = gui.add_button("EMERGENCY STOP", color="red", icon="hand-stop", order=0)  # type: ignore[arg-type]
             stop.on_click(self._handed(EMERGENCY_STOP, lambda: service_calls.emergency_stop(offer)))
         self._add_simulation(gui)
-        with gui.add_folder("Poses", order=4, visible=bool(controls.poses)):
-            for row in rows(controls.poses, ROW):
-                group = gui.add_button_group("", row)
-                group.on_click(self._posed(group))
+        with gui.add_folder("Move to", order=4, visible=bool(controls.poses)):
+            for label, names in controls.poses.items():
+                for k, row in enumerate(rows(names, ROW)):
+                    group = gui.add_button_group(label if k == 0 else "", row)
+                    group.on_click(self._posed(group))
         for drive in controls.drives:
-            with gui.add_folder(f"{drive.controller} [rad, m]", order=5):
+            with gui.add_folder(f"{drive.controller} [{units(robot, drive)}]", order=5):
                 self._sliders[drive] = [self._slider(gui, robot, drive, joint) for joint in drive.joints]
         with gui.add_folder("Show", order=8, expand_by_default=False):
             add_layers(gui, scene)
             dark = gui.add_checkbox("dark", False)
-            dark.on_update(lambda _: gui.configure_theme(dark_mode=dark.value, show_logo=False, show_share_button=False))
+
+            @dark.on_update
+            async def _(event: viser.GuiEvent[Any]) -> None:
+                gui.configure_theme(dark_mode=dark.value, show_logo=False, show_share_button=False)
 
     def _add_simulation(self, gui: viser.GuiApi) -> None:
         names = [name for name, (kind, _) in service_calls.BUTTONS.items() if service_of(self._offer, kind)]
@@ -123,11 +127,12 @@ class Panel:
                 follows = self._controls.follows(drive, snapshot, now)
                 for slider, k in zip(sliders, drive.columns, strict=True):
                     slider.disabled = not active or slider.max <= slider.min
-                    value = min(max(float(snapshot.state.position[k]), slider.min), slider.max)
-                    if follows and abs(value - slider.value) >= 0.5 * slider.step:
+                    value = slider.step * round(float(snapshot.state.position[k]) / slider.step)
+                    value = min(max(value, slider.min), slider.max)
+                    if follows and abs(value - slider.value) > 0.5 * slider.step:
                         slider.value = value  # type: ignore[misc]  # viser's setter hides from mypy
 
-    def show_controllers(self, states: dict[str, str]) -> None:
+    def show_controllers(self, states: Mapping[str, str]) -> None:
         """Set the switches to the states of the controllers."""
         if service_of(self._offer, SWITCH) is None:
             return
@@ -144,7 +149,37 @@ class Panel:
         self._client.add_notification(name, why, color="red", auto_close_seconds=_CLEAR)
 
 
-def rows(names: tuple[str, ...], most: int) -> list[list[str]]:
+class Reader:
+    """What a visitor has who may only read.
+
+    Args:
+        client: his browser.
+        folder: of the controllers, which all visitors see.
+    """
+
+    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
+        client.gui.add_html(texts.read_only(), order=0)
+        with folder:
+            self._states = client.gui.add_html("")
+
+    def update(self, snapshot: Snapshot, now: float) -> None:
+        """Nothing is his own."""
+
+    def show_controllers(self, states: Mapping[str, str]) -> None:
+        """List the controllers."""
+        self._states.content = texts.controllers(states)
+
+    def failed(self, name: str, why: str) -> None:
+        """He commands nothing."""
+
+
+def units(robot: RobotModel, drive: Drive) -> str:
+    """Of the sliders of a drive."""
+    found = {"m" if robot.joint(name).type == "prismatic" else "rad" for name in drive.joints}
+    return ", ".join(sorted(found, reverse=True))
+
+
+def rows(names: Sequence[str], most: int) -> list[list[str]]:
     """Names in rows of at most `most` characters, at least one in each."""
     found: list[list[str]] = []
     for name in names:

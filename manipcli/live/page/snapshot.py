@@ -47,7 +47,12 @@ class Snapshot:
     def reference(self, drive: Drive) -> tuple[Array, Array]:
         """(n) positions and (n) velocities where a drive is: its references; as measured while it has none."""
         rows = self.rows[drive.index] if drive.index < len(self.rows) else None
-        if rows is not None and rows.shape[0] >= 2 and rows.shape[1] == len(drive.joints) and np.isfinite(rows[:2]).all():
+        if (
+            rows is not None
+            and rows.shape[0] >= 2
+            and rows.shape[1] == len(drive.joints)
+            and np.isfinite(rows[:2]).all()
+        ):
             return rows[0], rows[1]
         columns = list(drive.columns)
         return self.state.position[columns], self.state.velocity[columns]
