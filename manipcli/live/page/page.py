@@ -166,6 +166,7 @@ class LivePage(LocalServer):
             Snapshot.of(sample, self._feed.period, *self._sizes),
             controllers=self._controllers,
             simulation=self._simulation,
+            stopped=self._story.stopped,
         )
         if sample is not self._sample:
             state = snapshot.state

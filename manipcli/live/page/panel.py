@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from manipcli.live.interface import Offer
 from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.drive import Drive
-from manipcli.live.page.service_calls import EMERGENCY_STOP, SWITCH, service_of
+from manipcli.live.page.service_calls import EMERGENCY_STOP, PAUSE, PLAYING, RELEASE, STEP, STEPS, SWITCH, service_of
 from manipcli.live.page.snapshot import Snapshot
 from manipcli.model.robot import RobotModel
 from manipcli.replay.view.view import add_layers, joint_slider
@@ -51,10 +51,10 @@ class Panel:
         self._sliders: dict[Drive, list[viser.GuiSliderHandle[float]]] = {}
         self._switches: dict[str, viser.GuiCheckboxHandle] = {}
         self._folder = folder
+        self._playing = False
         gui = client.gui
-        if EMERGENCY_STOP in offer.services:
-            stop = gui.add_button("EMERGENCY STOP", color="red", icon="hand-stop", order=0)  # type: ignore[arg-type]
-            stop.on_click(self._handed(EMERGENCY_STOP, lambda: service_calls.emergency_stop(offer)))
+        self._add_button("EMERGENCY STOP", EMERGENCY_STOP, color="red", order=0.0)
+        self._release = self._add_button("Release emergency stop", RELEASE, color=None, order=0.5)
         self._add_simulation(gui)
         with gui.add_folder("Move to", order=4, visible=bool(controls.poses)):
             for label, names in controls.poses.items():
@@ -72,23 +72,31 @@ class Panel:
             async def _(event: viser.GuiEvent[Any]) -> None:
                 gui.configure_theme(dark_mode=dark.value, show_logo=False, show_share_button=False)
 
+    def _add_button(
+        self, label: str, service: str, *, color: Literal["red"] | None, order: float
+    ) -> viser.GuiButtonHandle | None:
+        """Add a button that calls a service without a request; None if the offer does not have it."""
+        if service not in self._offer.services:
+            return None
+        button = self._client.gui.add_button(label, color=color, order=order)
+
+        @button.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            self._controls.put(label, service_calls.call(self._offer, service))
+
+        return button
+
     def _add_simulation(self, gui: viser.GuiApi) -> None:
         names = [name for name, (kind, _) in service_calls.BUTTONS.items() if service_of(self._offer, kind)]
         if not names:
             return
-        group = gui.add_button_group("simulation", names, order=2)
+        group = gui.add_button_group("simulation", names, order=2, hint=f"Step: {STEPS} control ticks, then pause")
 
-        async def clicked(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                self._controls.put(group.value, service_calls.press(self._offer, group.value))
-
-        group.on_click(clicked)
-
-    def _handed(self, name: str, make: Callable[[], Any]) -> Callable[[Any], Coroutine[Any, Any, None]]:
-        async def clicked(event: viser.GuiEvent[Any]) -> None:
-            self._controls.put(name, make())
-
-        return clicked
+        @group.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if group.value == STEP and self._playing:
+                self._controls.put(PAUSE, service_calls.press(self._offer, PAUSE))
+            self._controls.put(group.value, service_calls.press(self._offer, group.value))
 
     def _posed(self, group: viser.GuiButtonGroupHandle[str]) -> Callable[[Any], Coroutine[Any, Any, None]]:
         async def clicked(event: viser.GuiEvent[Any]) -> None:
@@ -113,7 +121,7 @@ class Panel:
 
         async def switched(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                self._controls.put(name, service_calls.switch(self._offer, name, box.value))
+                self._controls.put(name, service_calls.switch(self._offer, name, active=box.value))
 
         box.on_update(switched)
         return box
@@ -121,6 +129,9 @@ class Panel:
     def update(self, snapshot: Snapshot, now: float) -> None:
         """Send what waits, then show the state; `now`: wall time [s]."""
         self._controls.send(snapshot, now)
+        self._playing = snapshot.simulation == PLAYING
+        if self._release is not None:
+            self._release.visible = snapshot.stopped
         with self._client.atomic():
             for drive, sliders in self._sliders.items():
                 active = snapshot.is_active(drive.controller)

@@ -12,22 +12,24 @@ from manipcli.live.interface import Offer, request_type
 from manipcli.record.json_message import definition, from_json
 
 EMERGENCY_STOP: Final = "/emergency_stop"
+RELEASE: Final = "/emergency_stop_release"
 SWITCH: Final = "controller_manager_msgs/srv/SwitchController"
 LIST: Final = "controller_manager_msgs/srv/ListControllers"
 GET_STATE: Final = "simulation_interfaces/srv/GetSimulationState"
 SET_STATE: Final = "simulation_interfaces/srv/SetSimulationState"
-STEP: Final = "simulation_interfaces/srv/StepSimulation"
-RESET: Final = "simulation_interfaces/srv/ResetSimulation"
+STEP_SIMULATION: Final = "simulation_interfaces/srv/StepSimulation"
+RESET_SIMULATION: Final = "simulation_interfaces/srv/ResetSimulation"
 PLAYING: Final = 1
 PAUSED: Final = 2
 """simulation_interfaces/SimulationState"""
 STEPS: Final = 10
 """Control ticks of the button Step."""
+PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 BUTTONS: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
-    "Play": (SET_STATE, {"state": {"state": PLAYING}}),
-    "Pause": (SET_STATE, {"state": {"state": PAUSED}}),
-    "Step": (STEP, {"steps": STEPS}),
-    "Reset": (RESET, {}),
+    PLAY: (SET_STATE, {"state": {"state": PLAYING}}),
+    PAUSE: (SET_STATE, {"state": {"state": PAUSED}}),
+    STEP: (STEP_SIMULATION, {"steps": STEPS}),
+    RESET: (RESET_SIMULATION, {}),
 }
 """Buttons of the simulation: the type of a service, and the request."""
 SUCCEEDED: Final = 4
@@ -48,26 +50,18 @@ def call(
     return Command(words.CALL_SERVICE, service, json=compact(message), answer=answer)
 
 
-def emergency_stop(offer: Offer, answer: Callable[[Answer], None] = nobody) -> Command | None:
-    """The command that stops the robot; None if the offer has none."""
-    kind = offer.services.get(EMERGENCY_STOP)
-    if kind is None:
-        return None
-    return call(offer, EMERGENCY_STOP, {"data": True} if kind.endswith("/SetBool") else {}, answer)
-
-
-def switch(offer: Offer, controller: str, active: bool, answer: Callable[[Answer], None] = nobody) -> Command | None:
+def switch(offer: Offer, controller: str, *, active: bool) -> Command | None:
     """The command that activates or deactivates a controller; None if the offer has none."""
     service = service_of(offer, SWITCH)
     field = "activate_controllers" if active else "deactivate_controllers"
-    return None if service is None else call(offer, service, {field: [controller]}, answer)
+    return None if service is None else call(offer, service, {field: [controller]})
 
 
-def press(offer: Offer, button: str, answer: Callable[[Answer], None] = nobody) -> Command | None:
+def press(offer: Offer, button: str) -> Command | None:
     """The command of a button of the simulation; None if the offer has none."""
     kind, request = BUTTONS[button]
     service = service_of(offer, kind)
-    return None if service is None else call(offer, service, request, answer)
+    return None if service is None else call(offer, service, request)
 
 
 def failure(answer: Answer) -> str | None:

@@ -25,6 +25,7 @@ class Snapshot:
         rows: of the outputs of controllers, see `ControllerOutput`; None while one is inactive.
         controllers: their states by name, as in list_controllers.
         simulation: as in simulation_interfaces/SimulationState; None if it is unknown.
+        stopped: whether the emergency stop is active.
     """
 
     time: float
@@ -32,6 +33,7 @@ class Snapshot:
     rows: tuple[Array | None, ...] = ()
     controllers: Mapping[str, str] = field(default_factory=dict)
     simulation: int | None = None
+    stopped: bool = False
 
     @classmethod
     def of(cls, sample: Sample, period: float, joints: int, bodies: int) -> Snapshot:
@@ -47,12 +49,8 @@ class Snapshot:
     def reference(self, drive: Drive) -> tuple[Array, Array]:
         """(n) positions and (n) velocities where a drive is: its references; as measured while it has none."""
         rows = self.rows[drive.index] if drive.index < len(self.rows) else None
-        if (
-            rows is not None
-            and rows.shape[0] >= 2
-            and rows.shape[1] == len(drive.joints)
-            and np.isfinite(rows[:2]).all()
-        ):
+        n = len(drive.joints)
+        if rows is not None and len(rows) >= 2 and rows.shape[1] == n and bool(np.isfinite(rows[:2]).all()):
             return rows[0], rows[1]
         columns = list(drive.columns)
         return self.state.position[columns], self.state.velocity[columns]

@@ -13,6 +13,8 @@ from manipcli.record.json_message import definition, to_json
 SHOWN: Final = 12
 """Messages."""
 MOST_STEPS: Final = 200
+STARTED, STOPPED, RELEASED = "session_started", "emergency_stop", "emergency_stop_released"
+"""Kinds of events."""
 RUNNING: Final = "running"
 DONE: Final = "done"
 WAITING: Final = 2000
@@ -24,10 +26,12 @@ class Story:
 
     Attributes:
         steps: verb or text, and state ("running" or the outcome), by step, in the order of their first start.
+        stopped: whether the emergency stop is active.
         messages: time [s], level and text of the last ones.
     """
 
     def __init__(self) -> None:
+        self.stopped = False
         self.steps: dict[str, tuple[str, str]] = {}
         self.messages: deque[tuple[float, int, str]] = deque(maxlen=SHOWN)
         self._waiting: deque[Event] = deque(maxlen=WAITING)
@@ -55,8 +59,10 @@ class Story:
 
     def _step(self, event: dict[str, Any]) -> None:
         step, kind, verb, text = (event[key] for key in ("step", "kind", "verb", "text"))
-        if kind == "session_started":  # also after a reset
+        if kind == STARTED:  # also after a reset
             self.steps.clear()
+        if kind in (STARTED, STOPPED, RELEASED):
+            self.stopped = kind == STOPPED
         if not step or (step not in self.steps and len(self.steps) >= MOST_STEPS):
             return
         match kind:

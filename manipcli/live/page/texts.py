@@ -10,6 +10,7 @@ from manipcli.live.page.service_calls import PAUSED
 from manipcli.live.page.snapshot import ACTIVE, Snapshot
 
 READ_ONLY: Final = "Read only: open the address with <code>?token=</code> that <code>manipcli serve</code> printed."
+STOPPED: Final = '<br><b style="color:#e03131">emergency stop: the brakes hold</b>'
 _SIGNS: Final = {"running": ("▸", "#228be6"), "done": ("✓", "#2f9e44"), "skipped": ("–", "inherit")}
 _FAILED: Final = ("✗", "#e03131")
 _COLORS: Final = {30: "#e8890c", 40: "#e03131", 50: "#e03131"}
@@ -24,6 +25,7 @@ def status(snapshot: Snapshot | None, factor: float | None, notes: Iterable[str]
     paused = snapshot.simulation == PAUSED
     speed = "" if factor is None or paused else f" · real-time factor {factor:.2f}"
     word = " · <b>paused</b>" if paused else ""
+    word += STOPPED if snapshot.stopped else ""
     lines = [f"<b>t = {snapshot.time:.2f} s</b>{speed}{word}", *(escape(note) for note in notes)]
     return _box("<br>".join(lines))
 

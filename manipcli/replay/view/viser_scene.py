@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 import numpy as np
+import numpy.typing as npt
 
-from manipcli.core.geometry import Array, Transform
+from manipcli.core.geometry import Transform
 from manipcli.replay.camera import framing
 from manipcli.replay.drawing import WORLD, Drawable, Drawing, ground_height
 from manipcli.replay.placing import Poses
@@ -143,9 +144,9 @@ class _Placed:
     def __init__(self, frames: int) -> None:
         self._position, self._quat = np.full((frames, 3), np.inf), np.full((frames, 4), np.inf)
 
-    def moved(self, poses: Poses) -> Array:
+    def moved(self, poses: Poses) -> npt.NDArray[np.bool_]:
         """(F,) whether each frame is visibly elsewhere than at its last move, which this call is."""
-        far = np.abs(poses.position - self._position).max(axis=1) > STILL
+        far: npt.NDArray[np.bool_] = np.abs(poses.position - self._position).max(axis=1) > STILL
         far |= np.abs(poses.quat_xyzw - self._quat).max(axis=1) > STILL
         self._position[far], self._quat[far] = poses.position[far], poses.quat_xyzw[far]
         return far
