@@ -26,7 +26,8 @@ from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.door import MAY_COMMAND, door
 from manipcli.live.page.drive import drives_of
-from manipcli.live.page.panel import Panel, Reader
+from manipcli.live.page.panel import Panel
+from manipcli.live.page.reader import Reader
 from manipcli.live.page.snapshot import Snapshot
 from manipcli.live.page.story import Story
 from manipcli.model.configuration import configuration
@@ -134,7 +135,7 @@ class LivePage(LocalServer):
         answered = partial(self._answered, client.client_id)
         controls = Controls(self._robot, self._drives, self._offer, self._put, answered)
         self._visitors[client.client_id] = Panel(
-            client, self._controllers_folder, self._robot, self._scene, self._offer, controls
+            client, self._controllers_folder, self._robot, self._scene, self._offer, controls, self._feed.period
         )
 
     async def _left(self, client: viser.ClientHandle) -> None:

@@ -1,4 +1,4 @@
-"""What one visitor has in his browser alone: controls if he may command, else the states of the controllers."""
+"""The controls of one visitor who may command, in his browser alone."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from manipcli.live.interface import Offer
-from manipcli.live.page import service_calls, texts
+from manipcli.live.page import service_calls
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.drive import Drive
-from manipcli.live.page.service_calls import EMERGENCY_STOP, PAUSE, PLAYING, RELEASE, STEP, STEPS, SWITCH, service_of
+from manipcli.live.page.service_calls import (
+    EMERGENCY_STOP,
+    PAUSE,
+    PLAYING,
+    RELEASE,
+    STEP,
+    STEP_TIME,
+    SWITCH,
+    service_of,
+)
 from manipcli.live.page.snapshot import Snapshot
 from manipcli.model.robot import RobotModel
 from manipcli.replay.view.view import add_layers, joint_slider
@@ -34,6 +43,7 @@ class Panel:
         robot, scene: what is shown.
         offer: of the session; what it does not have gets no control.
         controls: of the visitor.
+        period: [s] of the control loop.
 
     viser's callbacks are coroutines in its own thread: they only hand over. `update` is called in the page's thread.
     """
@@ -46,11 +56,13 @@ class Panel:
         scene: ViserScene,
         offer: Offer,
         controls: Controls,
+        period: float,
     ) -> None:
         self._client, self._offer, self._controls = client, offer, controls
         self._sliders: dict[Drive, list[viser.GuiSliderHandle[float]]] = {}
         self._switches: dict[str, viser.GuiCheckboxHandle] = {}
         self._folder = folder
+        self._period = period
         self._playing = False
         gui = client.gui
         self._add_button("EMERGENCY STOP", EMERGENCY_STOP, color="red", order=0.0)
@@ -90,15 +102,15 @@ class Panel:
         names = [name for name, (kind, _) in service_calls.BUTTONS.items() if service_of(self._offer, kind)]
         if not names:
             return
-        group = gui.add_button_group("simulation", names, order=2, hint=f"Step: {STEPS} control ticks, then pause")
+        group = gui.add_button_group("simulation", names, order=2, hint=f"Step: {STEP_TIME:g} s, then pause")
 
         @group.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
             if group.value == STEP and self._playing:
-                self._controls.put(PAUSE, service_calls.press(self._offer, PAUSE))
-            self._controls.put(group.value, service_calls.press(self._offer, group.value))
+                self._controls.put(PAUSE, service_calls.press(self._offer, PAUSE, self._period))
+            self._controls.put(group.value, service_calls.press(self._offer, group.value, self._period))
 
-    def _posed(self, group: viser.GuiButtonGroupHandle[str]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+    def _posed(self, group: viser.GuiButtonGroupHandle) -> Callable[[Any], Coroutine[Any, Any, None]]:
         async def clicked(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 self._controls.go(group.value)
@@ -158,30 +170,6 @@ class Panel:
         """Report that a command was refused."""
         self._controls.refused(name)
         self._client.add_notification(name, why, color="red", auto_close_seconds=_CLEAR)
-
-
-class Reader:
-    """What a visitor has who may only read.
-
-    Args:
-        client: his browser.
-        folder: of the controllers, which all visitors see.
-    """
-
-    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
-        client.gui.add_html(texts.read_only(), order=0)
-        with folder:
-            self._states = client.gui.add_html("")
-
-    def update(self, snapshot: Snapshot, now: float) -> None:
-        """Nothing is his own."""
-
-    def show_controllers(self, states: Mapping[str, str]) -> None:
-        """List the controllers."""
-        self._states.content = texts.controllers(states)
-
-    def failed(self, name: str, why: str) -> None:
-        """He commands nothing."""
 
 
 def units(robot: RobotModel, drive: Drive) -> str:

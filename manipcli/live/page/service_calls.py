@@ -22,13 +22,13 @@ RESET_SIMULATION: Final = "simulation_interfaces/srv/ResetSimulation"
 PLAYING: Final = 1
 PAUSED: Final = 2
 """simulation_interfaces/SimulationState"""
-STEPS: Final = 10
-"""Control ticks of the button Step."""
+STEP_TIME: Final = 0.1
+"""[s] Of the button Step."""
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
 BUTTONS: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
     PLAY: (SET_STATE, {"state": {"state": PLAYING}}),
     PAUSE: (SET_STATE, {"state": {"state": PAUSED}}),
-    STEP: (STEP_SIMULATION, {"steps": STEPS}),
+    STEP: (STEP_SIMULATION, {}),
     RESET: (RESET_SIMULATION, {}),
 }
 """Buttons of the simulation: the type of a service, and the request."""
@@ -57,9 +57,11 @@ def switch(offer: Offer, controller: str, *, active: bool) -> Command | None:
     return None if service is None else call(offer, service, {field: [controller]})
 
 
-def press(offer: Offer, button: str) -> Command | None:
-    """The command of a button of the simulation; None if the offer has none."""
+def press(offer: Offer, button: str, period: float) -> Command | None:
+    """The command of a button of the simulation; None if the offer has none; `period` [s] of the control loop."""
     kind, request = BUTTONS[button]
+    if button == STEP:
+        request = {"steps": max(1, round(STEP_TIME / period))}
     service = service_of(offer, kind)
     return None if service is None else call(offer, service, request)
 
