@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 import time
-import warnings
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -81,8 +80,6 @@ class LivePage(LocalServer):
     ) -> None:
         self._access = Access(access.token)
         super().__init__(robot.name, port=port, option="--page-port", check=door(self._access))
-        # A browser that leaves during an update is no fault.
-        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
         self._robot, self._offer, self._feed, self._put = robot, offer, feed, put
         self._sizes = len(robot.moving_joints), len(scene.movable)
         self._drives = drives_of(robot, controllers, offer)

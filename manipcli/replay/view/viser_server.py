@@ -13,6 +13,7 @@ import http
 import io
 import logging
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -34,6 +35,8 @@ Answer = Callable[["ServerConnection", "Request"], "Response | None"]
 MAX_BROWSERS: Final = 16
 MAX_MESSAGE: Final = 1 << 20
 """Largest message from a browser [byte]."""
+MESSAGES: Final = ("ViewerCameraMessage", "GuiUpdateMessage")
+"""Those that a browser may send: its camera, and what somebody clicks and slides."""
 RATE: Final = 400.0
 """Messages per second from a browser, and as many at once; a camera that moves sends 50."""
 
@@ -68,6 +71,9 @@ class LocalServer:
             def request_share_url(self, verbose: bool = True) -> str | None:
                 return None
 
+        # A browser that leaves during an update, or sends nonsense, is nothing for the user.
+        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
+        warnings.filterwarnings("ignore", message=r"\[viser\] .* does not match annotation")
         with _silent(), _checked_requests(check or of_this_machine) as made:
             server = Private(host=HOST, port=DEFAULT_PORT if port is None else port, label=title, verbose=False)
         self.viser: viser.ViserServer = server
@@ -126,6 +132,7 @@ def _checked_requests(check: Answer) -> Iterator[list[object]]:
 
     Yields a list that is not empty once a server was started with the check.
     """
+    from viser.infra import Message
     from websockets.asyncio import server as library
     from websockets.protocol import State
 
@@ -134,18 +141,20 @@ def _checked_requests(check: Answer) -> Iterator[list[object]]:
     connected: WeakSet[ServerConnection] = WeakSet()
 
     class Limited(library.ServerConnection):
-        """Closes itself when too many messages come."""
+        """Drops messages that no page of ours needs, and closes itself when too many come."""
 
         _left, _filled = RATE, 0.0
 
         async def recv(self, decode: bool | None = None) -> Any:
-            data = await super().recv(decode)
-            now = time.monotonic()
-            self._left = min(RATE, self._left + (now - self._filled) * RATE) - 1.0
-            self._filled = now
-            if self._left < 0.0:
-                await self.close(1008, f"more than {RATE:g} messages per second")
-            return data
+            while True:
+                data = await super().recv(decode)
+                now = time.monotonic()
+                self._left = min(RATE, self._left + (now - self._filled) * RATE) - 1.0
+                self._filled = now
+                if self._left < 0.0:
+                    await self.close(1008, f"more than {RATE:g} messages per second")
+                if type(Message.deserialize(data)).__name__ in MESSAGES:  # type: ignore[arg-type]
+                    return data
 
     class Checked(library.serve):
         def __init__(self, *arguments: object, process_request: Answer, **options: object) -> None:
