@@ -165,6 +165,7 @@ def test_nothing_is_sampled_while_no_browser_is_connected(served: Served) -> Non
     assert served.feed.newest is last
 
 
+@pytest.mark.filterwarnings("ignore:.*does not match annotation")
 def test_hostile_visitors_are_closed_and_nothing_is_printed(served: Served, capfd: pytest.CaptureFixture[str]) -> None:
     with Visitor(served.page.port) as good:
         for data in ("text", b"", b"\xff" * 50, b"\x81\xa4type\xa4None"):
