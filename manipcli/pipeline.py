@@ -7,21 +7,19 @@ alone: the log is read back from its file before the file gets its name.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Unpack
 
-from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Diagnostic, InvalidInput, NotPlannable
 from manipcli.core.stopwatch import timed
 from manipcli.judge.agreement import compare
 from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.live.loop import Outside, simulate_live
-from manipcli.live.session import LiveOptions, recorded_session, served
+from manipcli.live.session import LiveOptions, next_log, recorded_session, served
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
 from manipcli.logs.part_of import task_part
@@ -264,23 +262,28 @@ def serve_task(
     progress: Progress = SILENT,
     between: Callable[[], None],
     announce: Callable[[str], None],
+    ended: Callable[[RunReport, str], None] = lambda report, failure: None,
     **options: Unpack[LoadOptions],
 ) -> tuple[RunReport, str]:
     """Opens the scene of a task, and lets clients command its controllers until the session ends.
 
+    A reset ends its log, and begins the next session with a log of its own.
+
     Args:
         path: the task file; its steps are not run.
         live: how it is served.
-        log: path of the log; default `runs/<task>@live.mcap`, which is replaced.
+        log: path of the log; default `runs/<task>@live.mcap`, which is replaced. The next ones end with -2, -3, ...
         force: replace `log` if it exists.
         embed_meshes: see `run_task`.
         progress: receives warnings.
         between: called before each tick; raises KeyboardInterrupt to end the session.
         announce: called with the URL when clients can connect.
+        ended: called with what is returned when a reset has ended a session.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the log by the expectations of the task that need no step; and why the simulation failed, or "".
+        The verdict on the last log by the expectations of the task that need no step; and why the simulation failed, or
+        "".
 
     Raises:
         InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
@@ -294,20 +297,19 @@ def serve_task(
     def late(text: str) -> None:
         progress.message(text, detail=False)
 
-    failures: list[str] = []
-
-    @contextmanager
-    def opened(manager: ControllerManager) -> Iterator[Outside]:
-        with served(task, manager, live, between=between, announce=announce, late=late) as outside:
-            yield outside
-        failures.append(outside.failure)
-
-    verdict, timing = _record(
-        task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress, live=opened
-    )
-    timing = replace(timing, load=loading)
-    report = RunReport(verdict, timing, log=str(where), warnings=task.warnings, meshes=mesh_files(task))
-    return report, failures[0]
+    first, overwrite, number = where, force or log is None, 1
+    manager = build_manager(task, plan.planner.kinematics)
+    with served(task, manager, live, between=between, announce=announce, late=late) as outside:
+        while True:
+            verdict, timing = _record(
+                task, plan, where, overwrite=overwrite, embed_meshes=embed_meshes, progress=progress, live=outside
+            )
+            timing, loading = replace(timing, load=loading), 0.0
+            report = RunReport(verdict, timing, log=str(where), warnings=task.warnings, meshes=mesh_files(task))
+            if not outside.again():
+                return report, outside.failure
+            ended(report, outside.failure)
+            where, number = next_log(first, number, overwrite=overwrite)
 
 
 def verify_log(
@@ -346,7 +348,7 @@ def verify_log(
             overwrite=False,
             embed_meshes=recorded.embedded,
             progress=progress,
-            live=(lambda _: nullcontext(recorded_session(recording, log))) if recorded.task.part.live else None,
+            live=recorded_session(recording, log) if recorded.task.part.live else None,
         )
         if any(finding.code == INTERRUPTED for finding in verdict.errors):
             raise KeyboardInterrupt
@@ -381,18 +383,15 @@ def _record(
     overwrite: bool,
     embed_meshes: bool,
     progress: Progress,
-    live: Callable[[ControllerManager], AbstractContextManager[Outside]] | None = None,
+    live: Outside | None = None,
 ) -> tuple[Verdict, Timing]:
     """Simulates into a log, which is judged before it gets its name; `live`: a session instead of steps."""
     manager = build_manager(task, plan.planner.kinematics)
-    with (
-        nullcontext() if live is None else live(manager) as outside,
-        open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder,
-    ):
-        if outside is None:
+    with open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder:
+        if live is None:
             end, simulating = timed(simulate, task, plan, manager, recorder, progress)
         else:
-            end, simulating = timed(simulate_live, task, plan, manager, recorder, outside)
+            end, simulating = timed(simulate_live, task, plan, manager, recorder, live)
         recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
         verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))

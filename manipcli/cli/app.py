@@ -18,6 +18,7 @@ from typer.exceptions import TyperException
 
 from manipcli.cli import console, option_defaults
 from manipcli.cli.commands import (
+    action,
     at,
     bless,
     check,
@@ -29,6 +30,7 @@ from manipcli.cli.commands import (
     info,
     init,
     judge,
+    param,
     plan,
     plot,
     repair,
@@ -36,8 +38,11 @@ from manipcli.cli.commands import (
     run,
     schema,
     serve,
+    service,
     test,
     topic,
+    topic_echo,
+    topic_pub,
     tune,
     view,
 )
@@ -75,6 +80,13 @@ _JARGON = (
 )
 """Wording of pydantic in messages of Typer, and its replacement."""
 
+GROUPS: Final = {
+    "topic": "List, print, measure and publish topics of a running robot.",
+    "service": "List and call services of a running robot.",
+    "action": "List actions of a running robot, and send goals.",
+    "param": "List, print and set parameters of a running robot.",
+}
+"""Commands with sub-commands."""
 COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "init": init.init,
     "run": run.run,
@@ -96,7 +108,19 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "view": view.view,
     "replay": replay.replay,
     "serve": serve.serve,
-    "topic": topic.topic,
+    "topic list": topic.list_,
+    "topic info": topic.info,
+    "topic echo": topic_echo.echo,
+    "topic hz": topic.hz,
+    "topic pub": topic_pub.pub,
+    "service list": service.list_,
+    "service type": service.type_,
+    "service call": service.call,
+    "action list": action.list_,
+    "action send": action.send,
+    "param list": param.list_,
+    "param get": param.get,
+    "param set": param.set_,
     "list": list_.list_,
     "schema": schema.schema,
 }
@@ -117,11 +141,23 @@ def _app(words: Sequence[str]) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback(epilog=_EXIT_CODES)(_root)
-    called = next((word for word in words if not word.startswith("-")), None)
+    called = _called(words)
+    groups: dict[str, typer.Typer] = {}
     for name, function in COMMANDS.items():
         shown = name == called or _COMPLETION in os.environ
-        app.command(name)(with_volume(function) if shown else _without_parameters(function))
+        group, _, last = name.rpartition(" ")
+        if group and group not in groups:
+            groups[group] = typer.Typer(rich_markup_mode=None, help=GROUPS[group])
+            app.add_typer(groups[group], name=group)
+        command = with_volume(function) if shown else _without_parameters(function)
+        (groups[group] if group else app).command(last)(command)
     return app
+
+
+def _called(words: Sequence[str]) -> str | None:
+    """The called command: `check`, or `topic echo` with its group."""
+    names = [word for word in words if not word.startswith("-")]
+    return " ".join(names[: 2 if names and names[0] in GROUPS else 1]) or None
 
 
 def _defaults(words: Sequence[str]) -> tuple[dict[str, object], tuple[str, ...]]:
@@ -132,7 +168,7 @@ def _defaults(words: Sequence[str]) -> tuple[dict[str, object], tuple[str, ...]]
     """
     from pathlib import Path
 
-    called = next((word for word in words if not word.startswith("-")), None)
+    called = _called(words)
     if called not in COMMANDS or option_defaults.WITHOUT in os.environ:
         return {}, ()
     try:
@@ -142,7 +178,10 @@ def _defaults(words: Sequence[str]) -> tuple[dict[str, object], tuple[str, ...]]
     if {"-v", "--verbose"} & {*words}:
         for line in found.told:
             console.error(f"default: {line}")
-    return {called: dict(found.values)}, found.told
+    values: dict[str, object] = dict(found.values)
+    for word in reversed(called.split()):
+        values = {word: values}
+    return values, found.told
 
 
 def _without_parameters(function: Callable[..., object]) -> Callable[[], None]:
@@ -178,9 +217,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with announced_to(console.talk):
             defaults, told = _defaults(words)
-            code = _app(words)(
-                args=words or ["--help"], prog_name="manipcli", standalone_mode=False, default_map=defaults
-            )
+            asked = words if words and "".join(words) not in GROUPS else [*words, "--help"]
+            code = _app(words)(args=asked, prog_name="manipcli", standalone_mode=False, default_map=defaults)
         if code == _INTERRUPTED_BY_TYPER:
             raise KeyboardInterrupt
         return int(code or ExitCode.PASSED)

@@ -26,7 +26,7 @@ _COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[":
 _PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
 
 
-_quiet = _verbose = False
+_quiet = _verbose = _closed = False
 
 
 def set_volume(*, quiet: bool, verbose: bool) -> None:
@@ -41,6 +41,8 @@ def prepare() -> None:
     A command line begins with the usual volume. Started with `>&-`, the next opened file would get descriptor 1 and
     receive what libraries print.
     """
+    global _closed
+    _closed = False
     set_volume(quiet=False, verbose=False)
     for descriptor in (0, 1, 2):
         try:
@@ -56,6 +58,11 @@ def prepare() -> None:
 def result(text: str) -> None:
     """Prints a result to stdout."""
     _write(sys.stdout, f"{_dressed(text, sys.stdout)}\n")
+
+
+def reader_is_gone() -> bool:
+    """Whether the reader of stdout has closed the pipe: a command without an end then ends."""
+    return _closed
 
 
 def result_is_terminal() -> bool:
@@ -164,6 +171,8 @@ def _through(stream: TextIO, *, whole: bool = False) -> Iterator[None]:
 
 def _abandon(stream: TextIO) -> None:
     """Discards what is still buffered: the interpreter would flush it at exit and change the exit code."""
+    global _closed
+    _closed = _closed or stream is sys.stdout
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, stream.fileno())
     os.close(null)

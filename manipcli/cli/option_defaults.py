@@ -5,6 +5,9 @@
     [test]
     samples = 10
 
+    [topic.echo]                  # a command with a sub-command
+    url = "ws://robot.lan:9090"
+
 The nearest such file of the working directory and the folders above is read. It may come with somebody's task, so it
 cannot lift a protection, and its paths, relative to it, stay below its folder.
 """
@@ -15,7 +18,7 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, get_args, get_origin
 
@@ -94,6 +97,7 @@ def defaults_of(command: str, commands: Commands, *, folder: Path) -> OptionDefa
     file = next((found for place in (folder, *folder.parents) if (found := _file(place)) is not None), None)
     if file is None:
         return OptionDefaults({})
+    file = replace(file, table=dict(_sections(file.table, commands)))
     return _Reader(file, {name: options_of(function) for name, function in commands.items()}).read(command)
 
 
@@ -123,6 +127,17 @@ def _file(folder: Path) -> _File | None:
     return None
 
 
+def _sections(table: Mapping[str, Any], commands: Commands) -> Iterator[tuple[str, Any]]:
+    """The entries of a file; the table of a sub-command, `[topic.echo]`, becomes the section `topic echo`."""
+    for key, value in table.items():
+        names = [name for name in value if f"{key} {name}" in commands] if isinstance(value, dict) else []
+        yield from ((f"{key} {name}", value[name]) for name in names)
+        if not names:
+            yield key, value
+        elif others := {name: each for name, each in value.items() if name not in names}:
+            yield key, others
+
+
 def _syntax(path: Path, cause: str) -> Diagnostic:
     where = re.search(r"\(at line (\d+), column (\d+)\)", cause)
     line, column = (int(where[1]), int(where[2])) if where else (0, 0)
@@ -141,11 +156,11 @@ class _File:
         at = ""
         for number, line in enumerate(self.text.splitlines(), 1):
             head = re.fullmatch(r"\s*\[\s*(?:tool\.manipcli)?\.?([\w.-]*)\s*\]\s*(?:#.*)?", line)
-            at = head[1] if head is not None else at
+            at = head[1].replace(".", " ") if head is not None else at
             entry = re.match(rf"""(\s*)["']?{re.escape(key)}["']?\s*=""", line)
             if entry is not None and at == section:
                 return Place(str(self.path), number, len(entry[1]) + 1)
-            if head is not None and not section and head[1] == key:
+            if head is not None and not section and at == key:
                 return Place(str(self.path), number, line.index(key) + 1)
         return Place(str(self.path), 1, 1)
 

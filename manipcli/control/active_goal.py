@@ -10,9 +10,10 @@ from typing import Final, Literal
 
 import numpy as np
 
-from manipcli.control.action import ErrorCode, GoalHandle
-from manipcli.control.active_trajectory import INSTANT
+from manipcli.control.action import ErrorCode, GoalHandle, GoalRejected
+from manipcli.control.active_trajectory import INSTANT, Reference
 from manipcli.control.trajectory_goal import JointFacts, TrajectoryGoal
+from manipcli.control.transitions import Transitions
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
@@ -181,6 +182,24 @@ class ActiveGoal:
     _before: tuple[float, Array] | None = None
     _now: tuple[float, Array] | None = None
 
+    def reachable(
+        self, transitions: Transitions, reference: Reference, time: float, period: float, position: Array
+    ) -> bool:
+        """Whether its first point can be reached in time from `position` (n); if not, it is aborted.
+
+        Args:
+            transitions: of the controller.
+            reference, time, period: of the tick at which it begins.
+            position: measured.
+        """
+        try:
+            transitions.check_way(self.trajectory, self.start_time, reference, time - period, period, position)
+        except GoalRejected as refused:
+            text = f"controller '{self.controller}': {refused.findings[0].message}"
+            self.handle.end("aborted", ErrorCode.INVALID_GOAL, text, time)
+            return False
+        return True
+
     def judge_path(
         self, errors: Array, acceleration: Array, measured_velocity: Array, time: float, clock: float
     ) -> Then:
@@ -236,11 +255,11 @@ class ActiveGoal:
         self.handle.end("aborted", code, f"controller '{self.controller}': {text}", time)
         return "hold measured"
 
-    def preempt(self, time: float, *, as_canceled: bool) -> None:
+    def preempt(self, time: float, *, as_canceled: bool, by: str = "a new goal") -> None:
         if as_canceled:
-            self.handle.end("canceled", ErrorCode.SUCCESSFUL, "preempted by a new goal", time)
+            self.handle.end("canceled", ErrorCode.SUCCESSFUL, f"preempted by {by}", time)
         else:
-            self.handle.end("aborted", ErrorCode.INVALID_GOAL, "preempted by a new goal", time)
+            self.handle.end("aborted", ErrorCode.INVALID_GOAL, f"preempted by {by}", time)
 
     def next_point(self, clock: float) -> int:
         """Index of the next point of its trajectory, or of its last."""

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.compiled import bind
+from manipcli.control.trajectory_clock import TrajectoryClock
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import Interface
@@ -118,7 +119,7 @@ BLOCK: Final = 32
 
 
 class Reference:
-    """Follows successive active trajectories, on a clock that runs `speed` seconds per second.
+    """Follows successive active trajectories, on a `TrajectoryClock`.
 
     At full speed and at the ticks of the period with which a trajectory began, it is sampled in advance; otherwise it
     is sampled in blocks.
@@ -131,6 +132,7 @@ class Reference:
         rows: (3, n) written in place: position, velocity, acceleration; rad or m, per second, per second squared.
         interfaces: (k) of the command.
         velocity_scale: (n) of the feed-forward beside a PID; None: there is no PID.
+        acceleration: (n) limits, which a smooth change of the speed keeps; None: there are none.
 
     Attributes:
         rows: see above.
@@ -139,32 +141,38 @@ class Reference:
         moving: whether `advance` has anything to do.
         ended: whether the trajectory is over.
         end: [s] of the trajectory's clock.
-        speed: of the clock.
         scales: whether `rescale` has an effect; a stop is not scaled.
     """
 
     __slots__ = (
-        "_active", "_at", "_before", "_dt", "_end_row", "_feeds", "_interfaces", "_last", "_origin", "_scale", "_since",
-        "_table", "end", "ended", "feed_room", "feeds", "moving", "rows", "scales", "speed",
+        "_active", "_at", "_clock", "_dt", "_end_row", "_feeds", "_interfaces", "_last", "_limits", "_origin", "_scale",
+        "_table", "end", "ended", "feed_room", "feeds", "moving", "rows", "scales",
     )  # fmt: skip
 
-    def __init__(self, rows: Array, interfaces: Sequence[Interface], *, velocity_scale: Array | None = None) -> None:
+    def __init__(
+        self,
+        rows: Array,
+        interfaces: Sequence[Interface],
+        *,
+        velocity_scale: Array | None = None,
+        acceleration: Array | None = None,
+    ) -> None:
         self.rows = rows
+        self._limits = np.full(rows.shape[1], np.inf) if acceleration is None else acceleration
         self._interfaces = tuple(interfaces)
         self._scale = velocity_scale
         self.feed_room = np.zeros((len(self._interfaces) if velocity_scale is None else 1, rows.shape[1]))
-        self.speed = 1.0
         self.hold(ActiveTrajectory.hold(np.zeros(rows.shape[1])), time=0.0)
 
-    def hold(self, active: ActiveTrajectory, *, time: float) -> None:
-        """From now on, hold the rest position of `active`."""
+    def hold(self, active: ActiveTrajectory, *, time: float, ahead: Array | None = None) -> None:
+        """From now on, the rest of `active`; `ahead` (4, n): what is fed forward, where the rest is for one tick."""
         self._active = active
         self.rows[:] = active.rest[:EFFORT]
-        feed = self._feed(active.rest[None])
+        feed = self._feed((active.rest if ahead is None else ahead)[None])
         self.feeds = feed is not None
         self.feed_room[:] = 0.0 if feed is None else feed[0]
         self.moving, self.ended, self.scales = False, True, False
-        self.end, self._before, self._since, self.speed = 0.0, 0.0, time, 1.0
+        self.end, self._clock = 0.0, TrajectoryClock(time)
         self._table = np.zeros((0, EFFORT, self.rows.shape[1]))
         self._feeds: Array | None = None
         self._origin, self._dt, self._end_row = time, math.inf, 0
@@ -177,23 +185,40 @@ class Reference:
         self._active = active
         self.scales = speed is not None
         self.end = active.end
-        self._before, self._since, self.speed = 0.0, time, 1.0 if speed is None else speed
+        self._clock = TrajectoryClock(time, 1.0 if speed is None else speed)
         self._take(samples, time, period)
         self._end_row = len(samples) - 2
-        if self.speed != 1.0:
+        if speed not in (None, 1.0):
             self._drop()
         self.moving, self.ended = True, False
 
     def clock(self, time: float) -> float:
         """Time [s] of the trajectory at `time`."""
-        return self._before + (time - self._since) * self.speed
+        return self._clock.now(time)[0]
+
+    def speed(self, time: float) -> tuple[float, float]:
+        """Trajectory seconds per second at `time`, and the rate of that [1/s]."""
+        return self._clock.now(time)[1:]
 
     def rescale(self, speed: float, *, time: float) -> None:
         """From `time` on the clock runs at this speed; samples made in advance are dropped."""
-        if self.moving and self.scales and speed != self.speed:
-            self._before, self._since = self.clock(time), time
+        if self.moving and self.scales and (speed, 0.0) != self.speed(time):
+            self._clock.jump(speed, time)
             self._drop()
-            self.speed = speed
+
+    def change_speed(self, speed: float, *, time: float, period: float) -> None:
+        """From the tick at `time` on, change to this speed smoothly."""
+        if self.moving and self.scales and (speed, 0.0) != self.speed(time):
+            path = self._active.sample
+            self._clock.change(speed, time, period, lambda s: path(np.array([s]))[0], self._limits)
+            self._drop()
+            self.advance(time, period)
+
+    def scale_feed(self, scale: Array) -> None:
+        """From the next tick on, `velocity_scale` is `scale` (n)."""
+        if not np.array_equal(scale, self._scale):  # type: ignore[arg-type]
+            self._scale = scale
+            self._drop()
 
     def advance(self, time: float, period: float) -> None:
         """Writes `rows`, `feed_room` and `ended` of `time` [s], where the next is a `period` later."""
@@ -216,9 +241,9 @@ class Reference:
 
     def _look_ahead(self, time: float, period: float) -> None:
         """Samples the next ticks, for a time that is not sampled yet."""
-        step = self.speed * period
-        clocks = np.maximum(self.clock(time) + step * np.arange(BLOCK + 1), 0.0)
-        self._take(self._sample(clocks), time, period)
+        clocks, speeds, rates = self._clock.ahead(time, period, BLOCK + 1)
+        np.maximum(clocks, 0.0, out=clocks)
+        self._take(self._sample(clocks, speeds, rates), time, period)
         self._end_row = int(np.searchsorted(clocks, self.end - 1e-6 * period))
         if clocks[0] > self.end + 1e-6 * period:
             self.moving = False
@@ -247,16 +272,19 @@ class Reference:
             feed = feed + ahead[:, EFFORT]
         return feed[:, None] if feed.any() else None
 
-    def _sample(self, clock: Array) -> Array:
-        rows = self._active.sample(clock)
-        if self.speed != 1.0:
-            rows[:, VELOCITY] *= self.speed
-            rows[:, ACCELERATION] *= self.speed**2
+    def _sample(self, clocks: Array, speeds: Array, rates: Array) -> Array:
+        """(T, 4, n) at clocks (T), with derivatives per second of real time."""
+        rows = self._active.sample(clocks)
+        if (speeds != 1.0).any() or rates.any():
+            rows[:, ACCELERATION] *= speeds[:, None] ** 2
+            rows[:, ACCELERATION] += rows[:, VELOCITY] * rates[:, None]
+            rows[:, VELOCITY] *= speeds[:, None]
         return rows
 
     def row(self, time: float) -> Array:
         """(4, n) the reference at `time`, with derivatives per second of real time."""
-        return np.asarray(self._sample(np.array([max(0.0, self.clock(time))]))[0])
+        clock, speed, rate = self._clock.now(time)
+        return np.asarray(self._sample(np.array([max(0.0, clock)]), np.array([speed]), np.array([rate]))[0])
 
     def now(self, time: float) -> ActiveTrajectory:
         """The remaining trajectory at `time`."""

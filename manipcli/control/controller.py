@@ -7,7 +7,7 @@ not allocate. The manager adds the model-based efforts (gravity, inverse dynamic
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
@@ -71,6 +71,7 @@ class ControllerOutput:
         position, velocity, acceleration: (n) the reference; rad or m and its derivatives.
         commands: k arrays (n), one for each of the controller's interfaces, in their order; before limits.
         wanted_acceleration: (n) input of inverse dynamics; that of the reference, unless the law adds to it.
+        speed: (1) trajectory seconds per second.
     """
 
     rows: Array
@@ -79,13 +80,14 @@ class ControllerOutput:
     acceleration: Array
     commands: tuple[Array, ...]
     wanted_acceleration: Array
+    speed: Array = field(default_factory=lambda: np.ones(1))
 
     @classmethod
-    def of(cls, joints: int, interfaces: int, *, wanted_acceleration: Array | None = None) -> ControllerOutput:
-        """Zeros for this number of joints and interfaces."""
+    def of(cls, joints: int, interfaces: int, *, speed: Array | None = None) -> ControllerOutput:
+        """Zeros for this number of joints and interfaces; `speed`: that of another output."""
         rows = np.zeros((REFERENCE_ROWS + interfaces, joints))
-        wanted = rows[2] if wanted_acceleration is None else wanted_acceleration
-        return cls(rows, rows[0], rows[1], rows[2], tuple(rows[REFERENCE_ROWS:]), wanted)
+        commands = tuple(rows[REFERENCE_ROWS:])
+        return cls(rows, rows[0], rows[1], rows[2], commands, rows[2], np.ones(1) if speed is None else speed)
 
     @classmethod
     def published(cls, count: int) -> ControllerOutput:

@@ -60,6 +60,20 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
     Raises:
         InvalidArgument: the gains of a joint are all zero, without velocity feed-forward: it would never move.
     """
+    return Pid(
+        **_numbers(name, joints, gains),
+        antiwindup=[_antiwindup(g, compat) for g in gains],
+        compat="ros2" if compat is None else compat,
+    )
+
+
+def tune_pid(pid: Pid, name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...]) -> None:
+    """Replace the gains (n) of a PID of `build_pid`, except its anti-windup; raises as that, and then changes none."""
+    pid.set_gains(**_numbers(name, joints, gains))
+
+
+def _numbers(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...]) -> dict[str, list[float]]:
+    """What `Pid.set_gains` takes."""
     for joint, g in zip(joints, gains, strict=True):
         if g.idle:
             raise InvalidArgument(
@@ -67,19 +81,17 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
                 f"controller '{name}': the gains of joint '{joint}' are all zero; it would not move",
                 hint=f"give gains.{joint}.p",
             )
-    return Pid(
-        p=[g.p for g in gains],
-        i=[g.i for g in gains],
-        d=[g.d for g in gains],
-        u_min=[-math.inf if g.u_clamp_min is None else g.u_clamp_min for g in gains],
-        u_max=[math.inf if g.u_clamp_max is None else g.u_clamp_max for g in gains],
-        i_min=[g.integral_bounds[0] for g in gains],
-        i_max=[g.integral_bounds[1] for g in gains],
-        antiwindup=[_antiwindup(g, compat) for g in gains],
-        tracking_time=[g.tracking_time_constant for g in gains],
-        error_deadband=[g.error_deadband for g in gains],
-        compat="ros2" if compat is None else compat,
-    )
+    return {
+        "p": [g.p for g in gains],
+        "i": [g.i for g in gains],
+        "d": [g.d for g in gains],
+        "u_min": [-math.inf if g.u_clamp_min is None else g.u_clamp_min for g in gains],
+        "u_max": [math.inf if g.u_clamp_max is None else g.u_clamp_max for g in gains],
+        "i_min": [g.integral_bounds[0] for g in gains],
+        "i_max": [g.integral_bounds[1] for g in gains],
+        "tracking_time": [g.tracking_time_constant for g in gains],
+        "error_deadband": [g.error_deadband for g in gains],
+    }
 
 
 def _antiwindup(gains: GainsSpec, compat: Compat | None) -> AntiWindup:

@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal, refuse_inactive
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
-from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.gains import build_pid, joint_gains, tune_pid
 from manipcli.control.tracking_error import TrackingError
+from manipcli.control.tunable_gains import TunableGains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
@@ -59,6 +60,9 @@ class GripperController:
         feed_forward: added to the effort by the manager.
         compat: order of the PID integration.
 
+    Attributes:
+        gains: of its PID, which may change; None without one.
+
     Raises:
         InvalidArgument: duplicate joints, gains of an unknown joint or all zero, fingers that are not a partition of
             the joints, a maximum effort on the position interface.
@@ -95,6 +99,7 @@ class GripperController:
         n = len(self.joints)
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = None if interface == "position" else build_pid(name, self.joints, chosen, compat)
+        self.gains = None if interface == "position" else TunableGains(name, self.joints, chosen, self._tune)
         self._default_fingers = self._parted(fingers)
         self._speed = speed
         self._default_effort = self._efforts(np.inf if max_effort is None else max_effort)
@@ -185,6 +190,12 @@ class GripperController:
         self._goal = GoalHandle(cancel=self._cancel, feedback=self._feedback)
         return self._goal
 
+    def halt(self, time: float, reason: str) -> None:
+        """Abort its goal for this reason; the references stay where they are, and the fingers go on pressing."""
+        if self._goal is not None:
+            self._goal.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
+            self._end_motion()
+
     @property
     def senses_contact(self) -> bool:
         """True while a goal stops fingers by force."""
@@ -242,11 +253,18 @@ class GripperController:
         self._velocity[:] = 0.0
         if self._goal is None:
             self._effort[:] = self._default_effort
+            self._stops = []
 
     def _unwind(self, position: Array) -> None:
         """Reset references that push away from their targets to the joint positions."""
         wrong = (self._target - position) * (self._reference - position) < 0.0
         self._reference[wrong] = position[wrong]
+
+    def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
+        assert self._pid is not None
+        tune_pid(self._pid, self.name, self.joints, gains)
+        if self._stops:
+            self._freeze()
 
     def _freeze(self) -> None:
         """Freeze the integrals of fingers that have reached the requested force."""

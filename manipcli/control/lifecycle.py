@@ -34,18 +34,20 @@ class SwitchResult:
 
 @dataclass(frozen=True, slots=True)
 class ControllerInfo:
-    """A loaded controller: `interfaces`, the `joint/interface` that it needs; `claimed`, the same while active."""
+    """A loaded controller: `interfaces`, the `joint/interface` that it needs; `claimed`, the same while active;
+    `every`, control ticks per update."""
 
     name: str
     state: ControllerState
     interfaces: tuple[str, ...]
     claimed: tuple[str, ...]
+    every: int = 1
 
     @staticmethod
-    def of(controller: Claimant, state: ControllerState) -> ControllerInfo:
+    def of(controller: Claimant, state: ControllerState, every: int = 1) -> ControllerInfo:
         """The info of a controller in this state."""
         wants = tuple(f"{joint}/{interface}" for joint in resources(controller) for interface in controller.interfaces)
-        return ControllerInfo(controller.name, state, wants, wants if state == "active" else ())
+        return ControllerInfo(controller.name, state, wants, wants if state == "active" else (), every)
 
 
 class Slot:
@@ -57,7 +59,7 @@ class Slot:
     """
 
     __slots__ = (
-        "_state", "contact_force", "controller", "every", "first", "gathered", "index", "measured", "period",
+        "_state", "contact_force", "controller", "every", "first", "gathered", "index", "loaded", "measured", "period",
         "scattered",
     )  # fmt: skip
 
@@ -68,6 +70,7 @@ class Slot:
         self.every = every
         self.first = 0
         self.period = every * period
+        self.loaded = True
         self.state: ControllerState = "unconfigured"
         none = np.zeros(0)
         self.measured = JointState(none, none, none)

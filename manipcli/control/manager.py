@@ -63,6 +63,9 @@ class ControllerManager:
         following: joints that cannot be commanded, because they follow others (mimic).
         feed_forward: adds gravity or inverse dynamics for the controllers that want it.
 
+    Attributes:
+        locked: why no controller can be activated; "": they can.
+
     Raises:
         InvalidInput: every conflict at once: duplicate names or claims, joints that are unknown or follow others.
         InvalidArgument: a period that is not above 0.
@@ -85,6 +88,7 @@ class ControllerManager:
         self.command = JointCommand(len(self.joints))
         self.outputs: tuple[ControllerOutput | None, ...] = ()
         self.faults: tuple[Diagnostic, ...] = ()
+        self.locked = ""
         self._feed_forward = feed_forward if feed_forward is not None else NoDynamics()
         self._slots: dict[str, Slot] = {}
         self._active: tuple[Slot, ...] = ()
@@ -113,7 +117,7 @@ class ControllerManager:
 
     @property
     def controllers(self) -> tuple[Controller, ...]:
-        """All loaded controllers, in the order of loading."""
+        """All controllers in the order of their first loading, also those that were unloaded and may be reloaded."""
         return tuple(slot.controller for slot in self._slots.values())
 
     def load(self, controller: Controller, *, update_rate: float | None = None) -> None:
@@ -159,21 +163,39 @@ class ControllerManager:
         """
         slot = self._slot(name)
         if slot.state != "inactive":
-            raise InvalidArgument(
-                "CTRL160", f"controller '{name}' is {slot.state}; only an inactive controller can be cleaned up"
-            )
+            message = f"controller '{name}' is {slot.state}; only an inactive controller can be cleaned up"
+            raise InvalidArgument("CTRL160", message)
         slot.state = "unconfigured"
 
-    def unload(self, name: str) -> None:
-        """Unload a controller that is not active.
+    def unload(self, name: str, *, keep: bool = False) -> None:
+        """Unload a controller that is not active; `keep`: with its place in `controllers` and `outputs`, for `reload`.
 
         Raises:
             InvalidArgument: it is unknown or active.
         """
-        if self._slot(name).state == "active":
+        slot = self._slot(name)
+        if slot.state == "active":
             raise InvalidArgument("CTRL160", f"controller '{name}' is active; deactivate it before unloading it")
-        del self._slots[name]
+        if keep:
+            slot.state, slot.loaded = "unconfigured", False
+        else:
+            del self._slots[name]
         self._rearrange()
+
+    def reload(self, name: str) -> Controller:
+        """Load a controller again that was unloaded and kept; it is unconfigured.
+
+        Raises:
+            InvalidArgument: it is unknown or loaded.
+        """
+        slot = self._slots.get(name)
+        if slot is None:
+            hint = did_you_mean(name, self._slots, kind="controllers")
+            raise InvalidArgument("CTRL161", f"unknown controller '{name}'", hint=hint)
+        if slot.loaded:
+            raise InvalidArgument("CTRL141", f"controller '{name}' is loaded already")
+        slot.loaded = True
+        return slot.controller
 
     def switch(
         self,
@@ -208,8 +230,10 @@ class ControllerManager:
 
     def carry_out(self, switch: Switch, *, time: float) -> SwitchResult:
         """Carry out the switch of a step; see `switch` and `switch_to`."""
-        controllers = {name: (slot.controller, slot.state) for name, slot in self._slots.items()}
+        controllers = {name: (slot.controller, slot.state) for name, slot in self._slots.items() if slot.loaded}
         decision = decided(controllers, switch, self.joints, self.following)
+        if decision.activated and self.locked:
+            decision = SwitchResult(False, (*decision.messages, self.locked))
         if not decision.ok:
             return decision
         for name in decision.deactivated:
@@ -223,16 +247,17 @@ class ControllerManager:
 
     def list(self) -> tuple[ControllerInfo, ...]:
         """All loaded controllers, and their claims."""
-        return tuple(ControllerInfo.of(slot.controller, slot.state) for slot in self._slots.values())
+        return tuple(ControllerInfo.of(s.controller, s.state, s.every) for s in self._slots.values() if s.loaded)
 
     def __getitem__(self, name: str) -> Controller:
         return self._slot(name).controller
 
     def _slot(self, name: str) -> Slot:
-        if name not in self._slots:
-            hint = did_you_mean(name, self._slots, kind="controllers")
+        slot = self._slots.get(name)
+        if slot is None or not slot.loaded:
+            hint = did_you_mean(name, [own.name for own in self.list()], kind="controllers")
             raise InvalidArgument("CTRL161", f"controller '{name}' is not loaded", hint=hint)
-        return self._slots[name]
+        return slot
 
     def serving(self, joints: Sequence[str]) -> Controller:
         """The active controller that claims all of `joints`.
@@ -246,7 +271,8 @@ class ControllerManager:
                 return controller
         claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "no controller is active"
         message = f"no active controller claims all of {', '.join(joints)} ({claims})"
-        raise InvalidArgument("CTRL140", message, hint=self.faults[-1].message if self.faults else None)
+        fault = self.faults[-1].message if self.faults else None
+        raise InvalidArgument("CTRL140", message, hint=self.locked or fault)
 
     def keep_references(self) -> None:
         """Include the references in the command from now on."""
@@ -301,15 +327,11 @@ class ControllerManager:
             "acceleration": command.acceleration,
             "effort": command.effort,
         }
-        copies = (
-            []
-            if target_of(slot.controller)
-            else [
-                (commands[i], slot.index, row)
-                for i, row in zip(slot.controller.interfaces, output.commands, strict=True)
-            ]
-        )
-        if self._references and slot.controller.interfaces and not target_of(slot.controller):
+        if target_of(slot.controller):
+            return ()
+        pairs = zip(slot.controller.interfaces, output.commands, strict=True)
+        copies = [(commands[interface], slot.index, row) for interface, row in pairs]
+        if self._references and slot.controller.interfaces:
             copies.append((command.reference_position, slot.index, output.position))
             copies.append((command.reference_velocity, slot.index, output.velocity))
         return tuple(copies)

@@ -7,6 +7,7 @@ from typing import Protocol, TypeGuard
 
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.controller import Controller
+from manipcli.control.jog import JogTarget
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
@@ -35,11 +36,27 @@ class Hand(Controller, Protocol):
         """
         ...
 
+    def halt(self, time: float, reason: str) -> None:
+        """Abort its goal, and keep the grip as it is."""
+        ...
+
 
 class GoalTaker(Controller, Protocol):
     """Executes goals; `accepts_goals` is False while its manager has it inactive."""
 
     accepts_goals: bool
+
+
+class Jogged(Controller, Protocol):
+    """Follows velocities that change at any time; see `jog.py`."""
+
+    def jog(self, target: JogTarget, *, until: float) -> None:
+        """Follow the velocities of `target` until the time `until` [s], then stop; an active goal is aborted.
+
+        Raises:
+            GoalRejected: the controller is inactive.
+        """
+        ...
 
 
 class SensorReader(Controller, Protocol):
@@ -63,6 +80,11 @@ def is_hand(controller: Controller) -> TypeGuard[Hand]:
 def takes_goals(controller: Controller) -> TypeGuard[GoalTaker]:
     """Whether it executes goals."""
     return hasattr(controller, "accepts_goals")
+
+
+def is_jogged(controller: Controller) -> TypeGuard[Jogged]:
+    """Whether it can be jogged."""
+    return hasattr(controller, "jog")
 
 
 def reads_sensors(controller: Controller) -> TypeGuard[SensorReader]:

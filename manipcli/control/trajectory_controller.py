@@ -10,11 +10,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejected, refuse_inactive
+from manipcli.control.action import ErrorCode, Feedback, GoalHandle, refuse_inactive
 from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
 from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Reference
-from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
-from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
+from manipcli.control.gains import build_pid, joint_gains, tune_pid
+from manipcli.control.jog import Jogging, JogTarget
+from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.stopping import Stopping, StopPlanner
 from manipcli.control.tracking_error import TrackingError
 from manipcli.control.trajectory_goal import (
@@ -27,6 +29,7 @@ from manipcli.control.trajectory_goal import (
     refused,
 )
 from manipcli.control.transitions import Transitions
+from manipcli.control.tunable_gains import TunableGains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
@@ -89,6 +92,8 @@ class JointTrajectoryController:
 
     Attributes:
         notes: arguments that have no effect, and why.
+        scaling: speed of its trajectories, and pauses.
+        gains: of its PID, which may change; None without one.
 
     Raises:
         InvalidArgument: no or duplicate joints, incompatible interfaces, gains of an unknown joint, gains all zero
@@ -132,8 +137,7 @@ class JointTrajectoryController:
         self.interfaces: tuple[Interface, ...] = tuple(command_interfaces)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
-        wrong = refused(command_interfaces, state_interfaces)
-        if wrong is not None:
+        if (wrong := refused(command_interfaces, state_interfaces)) is not None:
             raise InvalidArgument("CTRL107", f"controller '{name}': {wrong[0]}", hint=wrong[1])
         for what, value in (
             ("cmd_timeout", cmd_timeout), ("stop_trajectory_duration", stop_trajectory_duration),
@@ -154,6 +158,7 @@ class JointTrajectoryController:
             smooth=positions_upsampling, interpolation=interpolation_method,
         )  # fmt: skip
         planner = stop_planner if compat is None else None
+        self._jogging = Jogging(self._facts, limits)
         self._stopping = Stopping.of(self._facts, self._constraints, stop_trajectory_duration, planner)
         self._default_tolerances = Tolerances.of(self.joints, self._constraints, patient=compat == "ros2")
         self.notes: tuple[str, ...] = ()
@@ -164,10 +169,13 @@ class JointTrajectoryController:
         by_error = controlled_by_error(self.interfaces)
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
+        self.gains = TunableGains(name, self.joints, chosen, self._tune) if by_error else None
         scale = np.array([gain.ff_velocity_scale for gain in chosen])
         self.output = ControllerOutput.of(n, len(self.interfaces))
         rows = self.output.rows
-        self._reference = Reference(rows[:3], self.interfaces, velocity_scale=scale if by_error else None)
+        self._reference = Reference(
+            rows[:3], self.interfaces, velocity_scale=scale if by_error else None, acceleration=self._facts.acceleration
+        )
         self._desired, self._desired_velocity = rows[0], rows[1]
         self._commands = rows[3:]
         self._tracking = TrackingError(rows[:2], self._facts)
@@ -175,18 +183,19 @@ class JointTrajectoryController:
         self._error, self._error_rate = self._errors
         feed = self._reference.feed_room[0]
         self._control = None if self._pid is None else self._pid.loop(self._errors, rows[3], feed=feed)
-        self._initial_speed = self._speed = speed_scaling
+        self.scaling = SpeedScaling(self._reference, speed_scaling, now=lambda: self._time, ask=self._ask)
         self._clear(time=0.0)
 
     def _clear(self, *, time: float) -> None:
-        self._activated = False
-        self._waiting = True
+        self._activated, self._waiting = False, True
         self._time, self._period = time, 0.0
         self._goal: ActiveGoal | None = None
         self._next: ActiveGoal | None = None
+        self._jogging.end()
         self._stop = False
         self._bound = np.inf
-        self._speed = self._initial_speed
+        self.scaling.reset()
+        self._scaled = True
 
     @property
     def tolerances(self) -> Tolerances:
@@ -194,24 +203,10 @@ class JointTrajectoryController:
         goal = self._next or self._goal
         return self._default_tolerances if goal is None else goal.tolerances
 
-    @property
-    def speed_scaling(self) -> float:
-        """Trajectory seconds per second."""
-        return self._speed
-
-    def set_speed_scaling(self, speed: float) -> bool:
-        """Set the speed of trajectories from the last update on: 0 pauses, 1 is nominal. Stops are not scaled.
-
-        The reference's velocity is multiplied by `speed`, its acceleration by the square.
-
-        Returns:
-            False for a negative or non-finite speed, which has no effect.
-        """
-        if not 0.0 <= speed < np.inf:
-            return False
-        self._speed = float(speed)
-        self._reference.rescale(self._speed, time=self._time)
-        return True
+    def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
+        assert self._pid is not None
+        tune_pid(self._pid, self.name, self.joints, gains)
+        self._reference.scale_feed(np.array([gain.ff_velocity_scale for gain in gains]))
 
     def send_goal(
         self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
@@ -237,10 +232,7 @@ class JointTrajectoryController:
         if constraints is not None:
             tolerances = Tolerances.of(self.joints, constraints, patient=self._compat == "ros2")
         tolerances, notes = tolerances.adopted(goal, self.joints)
-        for old in (self._goal, self._next):
-            if old is not None:
-                old.preempt(self._time, as_canceled=self._compat == "ros1")
-        self._goal = None
+        self._preempt("a new goal")
         ends = zip(self.joints, np.isfinite(tolerances.goal[0]).tolist(), strict=True)
         bounded = frozenset(joint for joint, finite in ends if finite)
         handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes, bounded=bounded)
@@ -251,11 +243,26 @@ class JointTrajectoryController:
         self._waiting = True
         return handle
 
+    def _preempt(self, by: str) -> None:
+        for old in filter(None, (self._goal, self._next)):
+            old.preempt(self._time, as_canceled=self._compat == "ros1", by=by)
+        self._goal = self._next = None
+
+    def jog(self, target: JogTarget, *, until: float) -> None:
+        """Follow the velocities of `target` until the time `until` [s], then stop; see `jog.py`. A goal ends it.
+
+        Raises:
+            GoalRejected: the controller is inactive.
+        """
+        refuse_inactive(self.name, self.accepts_goals)
+        self._preempt("jogging")
+        self._bound, self._stop = np.inf, False
+        self._jogging.begin(target, until)
+
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""
-        for goal in (self._goal, self._next):
-            if goal is not None:
-                goal.handle.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
+        for goal in filter(None, (self._goal, self._next)):
+            goal.handle.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
         self._clear(time=time)
 
     def update(
@@ -283,6 +290,10 @@ class JointTrajectoryController:
             reference.advance(time, period)
         if self._waiting:
             self._handle_requests(time, period, measured)
+        if self._jogging.active:
+            self._jogging.step(reference, time, period, min(self.scaling.wanted, 1.0))
+        if self._scaled:
+            self._report_speed(time)
         if not self._tracking.update(measured, self._bound):
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
@@ -297,11 +308,7 @@ class JointTrajectoryController:
 
     def _look_closer(self, time: float, measured: JointState) -> None:
         """Abort the goal if a joint exceeds its path tolerance."""
-        for what, values in (("position", measured.position), ("velocity", measured.velocity)):
-            if not np.isfinite(values).all():
-                j = int(np.flatnonzero(~np.isfinite(values))[0])
-                message = f"the measured {what} of joint '{self.joints[j]}' is {values[j]} at t = {time:.3f} s"
-                raise InvalidArgument("CTRL106", f"controller '{self.name}': {message}")
+        refuse_not_finite(self.name, self.joints, measured, time)
         goal, reference = self._goal, self._reference
         if goal is None:
             return
@@ -322,8 +329,7 @@ class JointTrajectoryController:
             self._tracking.update(measured, self._bound)
 
     def _forget(self) -> None:
-        self._goal = None
-        self._bound = np.inf
+        self._goal, self._bound = None, np.inf
 
     def _handle_requests(self, time: float, period: float, measured: JointState) -> None:
         """Carry out the requests since the last update: activation, a new goal, a stop."""
@@ -333,20 +339,31 @@ class JointTrajectoryController:
             if self._pid is not None:
                 self._pid.reset()
             self._reference.hold(ActiveTrajectory.hold(measured.position), time=time)
+        if (self._next is not None or self._stop) and (row := self._jogging.end()) is not None:
+            self._come_to_rest(row, time, period)
         if self._next is not None:
             self._begin(self._next, time, period, measured)
         elif self._stop:
             self._come_to_rest(self._reference.row(time), time, period)
         self._next, self._stop = None, False
+        self.scaling.approach(time, period)
+
+    def _ask(self) -> None:
+        self._waiting = self._scaled = True
+
+    def _report_speed(self, time: float) -> None:
+        self.output.speed[0] = speed = self.scaling.pace(time)[0]
+        self._scaled = not speed == self.scaling.wanted == 1.0
 
     def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
         """Make the waiting goal active, and sample its references for every tick."""
         reference = self._reference
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
-        at = (measured.position, measured.velocity)
-        if goal.unchecked and not self._reachable(goal, time, period, measured):
+        if goal.unchecked and not goal.reachable(self._transitions, reference, time, period, measured.position):
             return
-        active = self._transitions.to_goal(goal.trajectory, later, reference, time, self._speed, at)
+        speed = self.scaling.pace(time)
+        at = (measured.position, measured.velocity)
+        active = self._transitions.to_goal(goal.trajectory, later, reference, time, speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)
         if broken is not None:
@@ -356,20 +373,8 @@ class JointTrajectoryController:
         goal.begin = later
         self._goal = goal
         self._bound = goal.tolerances.bound
-        reference.follow(active, samples, time=time, period=period, speed=self._speed)
+        reference.follow(active, samples, time=time, period=period, speed=speed[0])
         reference.advance(time, period)
-
-    def _reachable(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> bool:
-        """Whether the first point of a goal that was sent before activation can be reached; if not, it is aborted."""
-        try:
-            self._transitions.check_way(
-                goal.trajectory, goal.start_time, self._reference, time - period, period, measured.position
-            )
-        except GoalRejected as refused:
-            text = f"controller '{self.name}': {refused.findings[0].message}"
-            goal.handle.end("aborted", ErrorCode.INVALID_GOAL, text, time)
-            return False
-        return True
 
     def _come_to_rest(self, row: Array, time: float, period: float) -> None:
         active = self._stopping.to_rest(row, period)

@@ -45,7 +45,7 @@ class Transitions:
         later: float,
         reference: Reference,
         time: float,
-        speed: float,
+        speed: tuple[float, float],
         measured: tuple[Array, Array],
     ) -> ActiveTrajectory:
         """The active trajectory from `time` [s] on.
@@ -55,13 +55,16 @@ class Transitions:
             later: [s] delay of its time 0; negative: its points up to now are left out.
             reference: the present reference.
             time: now.
-            speed: of the new trajectory.
+            speed: of the new trajectory, and its rate [1/s].
             measured: position and velocity (n).
         """
         now = reference.row(time)
-        if speed not in (0.0, 1.0):  # in seconds of the trajectory; while it is paused, nothing moves
-            now[VELOCITY] /= speed
-            now[ACCELERATION] /= speed**2
+        f, rate = speed
+        if f == 0.0:  # while it is paused, nothing moves
+            now[ACCELERATION] = 0.0
+        elif (f, rate) != (1.0, 0.0):  # in seconds of the trajectory
+            now[VELOCITY] /= f
+            now[ACCELERATION] = (now[ACCELERATION] - now[VELOCITY] * rate) / f**2
         active = reference.now(time) if self.replaces else ActiveTrajectory.hold(now[POSITION], now[EFFORT])
         begin = max(later, 0.0) if self.replaces else 0.0
         start = now

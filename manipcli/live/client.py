@@ -1,47 +1,35 @@
-"""One client of the rosbridge protocol 2: its operations, its rights and its limits."""
+"""One client of the rosbridge protocol 2: its frames, and the operations that they name."""
 
 from __future__ import annotations
 
-import json
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 from manipcli.core.text import did_you_mean
-from manipcli.live import command as words
+from manipcli.live.action_operations import ActionOperations
 from manipcli.live.budget import RATE, Budget
-from manipcli.live.command import Answer, Command
-from manipcli.live.fields import MAX_NAME, Refused, check_type, near, number_of, text_of, topic_of
+from manipcli.live.command import Answer
+from manipcli.live.connection import LEVELS, Connection, Services
+from manipcli.live.fields import Refused, text_of
 from manipcli.live.frames import BadFrame, read_frame
-from manipcli.live.interface import goal_type, request_type
-from manipcli.live.outbox import MAX_QUEUE, Outbox, Subscription
-from manipcli.live.publisher import Publisher
-from manipcli.live.rosapi import Rosapi
-from manipcli.record.json_message import BadMessage, definition, from_json
+from manipcli.live.service_operations import ServiceOperations
+from manipcli.live.topic_operations import TopicOperations
+from manipcli.record.json_message import BadMessage
 
-MAX_SUBSCRIPTIONS: Final = 100
-MAX_GOALS: Final = 100
-"""Goals and services of one client that wait for an answer."""
-LEVELS: Final = ("none", "error", "warning", "info")
-QUEUE: Final = 10
-"""Default of `queue_length`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Services:
-    """What all clients share: the published messages, the services of rosapi, and where commands go."""
-
-    publisher: Publisher
-    rosapi: Rosapi
-    put: Callable[[Command], bool]
-    in_network: Callable[[Callable[[], None]], None]
-    subscribed: Callable[[], None]
+_NO_SERVERS = "clients cannot offer services or actions to this server"
+UNSUPPORTED: Final = {
+    "auth": "the token is in the URL: ws://.../?token=...",
+    "fragment": "send whole messages of at most 1 MiB",
+    "png": "send JSON text",
+    **dict.fromkeys(("advertise_service", "unadvertise_service", "service_response"), _NO_SERVERS),
+    **dict.fromkeys(("advertise_action", "unadvertise_action", "action_feedback", "action_result"), _NO_SERVERS),
+}
+"""Operations of rosbridge that this server does not have, and what to do instead."""
 
 
 class Client:
-    """A connection.
+    """A connection and its operations.
 
     Args:
         number: of the connection in the session.
@@ -50,61 +38,49 @@ class Client:
     """
 
     def __init__(self, number: int, *, commands: bool, services: Services) -> None:
-        self.outbox = Outbox()
-        self._number = number
-        self._commands = commands
-        self._services = services
-        self._offer = services.publisher.offer
-        self._goals: dict[str, str] = {}
-        self._calls = 0
-        self._sent = 0
-        self._level = "warning"
+        self._connection = Connection(number, commands=commands, services=services)
+        topics = TopicOperations(self._connection)
+        self._services, self._actions = ServiceOperations(self._connection), ActionOperations(self._connection)
         self._budget = Budget()
         self._warned = 0.0
-        self._operations: dict[str, Callable[[dict[str, Any]], None]] = {
-            "advertise": self._advertise,
-            "unadvertise": lambda frame: None,
-            "publish": self._publish,
-            "subscribe": self._subscribe,
-            "unsubscribe": self._unsubscribe,
-            "call_service": self._call_service,
-            "send_action_goal": self._send_goal,
-            "cancel_action_goal": self._cancel_goal,
+        self._operations: dict[str, Callable[[Mapping[str, Any]], None]] = {
+            "advertise": topics.advertise,
+            "unadvertise": topics.unadvertise,
+            "publish": topics.publish,
+            "subscribe": topics.subscribe,
+            "unsubscribe": topics.unsubscribe,
+            "call_service": self._services.call,
+            "send_action_goal": self._actions.send_goal,
+            "cancel_action_goal": self._actions.cancel,
             "set_level": self._set_level,
         }
+        self.outbox, self.status = self._connection.outbox, self._connection.status
 
     def receive(self, text: str | bytes) -> None:
-        """Carry out one frame; whatever is wrong with it is a status message."""
+        """Carry out one frame; whatever is wrong with it is a status message, or the answer that the client expects."""
         if not self._within_rate():
             return
         frame: dict[str, Any] = {}
         try:
             frame = read_frame(text)
             op = text_of(frame, "op")
+            if op in UNSUPPORTED:
+                raise Refused(f"op '{op}' is not supported: {UNSUPPORTED[op]}")
             if op not in self._operations:
                 raise Refused(f"unknown op '{op[:60]}'; {did_you_mean(op[:60], self._operations, kind='ops')}")
             self._operations[op](frame)
         except (BadFrame, BadMessage, Refused) as error:
-            self._failed(frame, str(error))
+            self._refuse(frame, str(error))
 
-    def _failed(self, frame: Mapping[str, Any], text: str) -> None:
+    def _refuse(self, frame: Mapping[str, Any], text: str) -> None:
         """An operation that waits for a response gets one; others get a status."""
-        op, name = frame.get("op"), frame.get("service")
-        if op == "call_service" and isinstance(name, str):
-            self._respond(frame, Answer(False, {}, text=text))
+        op = frame.get("op")
+        if op == "call_service" and isinstance(frame.get("service"), str):
+            self._services.respond(frame, Answer(False, {}, text=text))
         elif op == "send_action_goal" and isinstance(frame.get("action"), str):
-            self._result(frame, Answer(False, {}, text=text, status=6))
+            self._actions.result(frame, Answer(False, {}, text=text))
         else:
             self.status("error", text, frame.get("id"))
-
-    def status(self, level: str, text: str, id_: object = None) -> None:
-        """Send a status message, if the client wants this level."""
-        if LEVELS.index(level) <= LEVELS.index(self._level):
-            found = {"op": "status", "level": level, "msg": text}
-            self._answer(found if not isinstance(id_, str) else {**found, "id": id_})
-
-    def _answer(self, message: Mapping[str, object]) -> None:
-        self.outbox.answer(json.dumps(message, separators=(",", ":")))
 
     def _within_rate(self) -> bool:
         now = time.monotonic()
@@ -115,130 +91,8 @@ class Client:
             self.status("error", f"more than {RATE:g} operations per second; the others are dropped")
         return False
 
-    def _set_level(self, frame: dict[str, Any]) -> None:
+    def _set_level(self, frame: Mapping[str, Any]) -> None:
         level = text_of(frame, "level")
         if level not in LEVELS:
             raise Refused(f"unknown level '{level[:60]}'; expected {', '.join(LEVELS)}")
-        self._level = level
-
-    def _advertise(self, frame: dict[str, Any]) -> None:
-        topic = topic_of(frame)
-        check_type(topic, self._input(topic), frame)
-
-    def _input(self, topic: str) -> str:
-        kind = self._offer.received.get(topic)
-        if kind is None:
-            raise Refused(f"topic '{topic}' takes no messages; {near(topic, self._offer.received)}")
-        return kind
-
-    def _publish(self, frame: dict[str, Any]) -> None:
-        topic = topic_of(frame)
-        message = from_json(definition(self._input(topic)), frame.get("msg", {}))
-
-        def refused(answer: Answer) -> None:
-            if not answer.ok:
-                self.status("error", f"{topic}: {answer.text}", frame.get("id"))
-
-        self._put(words.PUBLISH, topic, "", message, refused)
-
-    def _put(self, op: str, name: str, id_: str, message: object, answer: Callable[[Answer], None]) -> None:
-        """Hand a command to the control loop, whose thread calls back; `answer` is called in this thread."""
-        if not self._commands and name not in self._offer.readers:
-            raise Refused("this connection may only read: connect with the token that `manipcli serve` printed")
-
-        def back(found: Answer) -> None:
-            self._services.in_network(lambda: answer(found))
-
-        text = json.dumps(message, separators=(",", ":"), allow_nan=False)
-        if not self._services.put(Command(op, name, id_, text, back)):
-            raise Refused("too many commands wait for the next tick")
-
-    def _subscribe(self, frame: dict[str, Any]) -> None:
-        topic = topic_of(frame)
-        kind = self._offer.published.get(topic)
-        if kind is None:
-            raise Refused(f"topic '{topic}' is not published; {near(topic, self._offer.published)}")
-        check_type(topic, kind, frame)
-        if topic not in self.outbox.subscriptions and len(self.outbox.subscriptions) >= MAX_SUBSCRIPTIONS:
-            raise Refused(f"more than {MAX_SUBSCRIPTIONS} subscriptions")
-        throttle = number_of(frame, "throttle_rate", 0.0) / 1000.0
-        length = int(min(number_of(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE
-        self.outbox.subscriptions[topic] = Subscription(topic, throttle, deque(maxlen=length))
-        last = self._services.publisher.latched(topic)
-        if last is not None:
-            self.outbox.publish(topic, last, time.monotonic())
-        self._services.subscribed()
-
-    def _unsubscribe(self, frame: dict[str, Any]) -> None:
-        self.outbox.subscriptions.pop(topic_of(frame), None)
-        self._services.subscribed()
-
-    def _call_service(self, frame: dict[str, Any]) -> None:
-        name = "/" + text_of(frame, "service").lstrip("/")
-        request = frame.get("args", {})
-        if name.startswith("/rosapi/"):
-            self._respond(frame, Answer(True, self._services.rosapi.call(name, request)))
-            return
-        kind = self._offer.services.get(name)
-        if kind is None:
-            raise Refused(f"unknown service '{name[:80]}'; {near(name, [*self._offer.services, *self._rosapi_names])}")
-        if self._calls >= MAX_GOALS:
-            raise Refused(f"more than {MAX_GOALS} services wait for a response")
-        message = from_json(definition(request_type(kind)), request if request != [] else {})
-
-        def answered(answer: Answer) -> None:
-            self._calls -= 1
-            self._respond(frame, answer)
-
-        self._put(words.CALL_SERVICE, name, "", message, answered)
-        self._calls += 1
-
-    @property
-    def _rosapi_names(self) -> list[str]:
-        return [*self._services.rosapi.names]
-
-    def _respond(self, frame: Mapping[str, Any], answer: Answer) -> None:
-        values: object = answer.values if answer.ok else answer.text
-        found = {"op": "service_response", "service": frame["service"], "values": values, "result": answer.ok}
-        self._answer({**found, "id": frame["id"]} if isinstance(frame.get("id"), str) else found)
-
-    def _send_goal(self, frame: dict[str, Any]) -> None:
-        name = "/" + text_of(frame, "action").lstrip("/")
-        kind = self._offer.actions.get(name)
-        if kind is None:
-            raise Refused(f"unknown action '{name[:80]}'; {near(name, self._offer.actions)}")
-        check_type(name, kind, {"type": frame.get("action_type")})
-        asked = frame.get("id")
-        if not isinstance(asked, str) or not asked or len(asked) > MAX_NAME:
-            raise Refused("send_action_goal needs an id, a text")
-        if asked in self._goals:
-            raise Refused(f"goal '{asked[:60]}' is still active; each goal needs its own id")
-        if len(self._goals) >= MAX_GOALS:
-            raise Refused(f"more than {MAX_GOALS} goals are active")
-        message = from_json(definition(goal_type(kind)), frame.get("args", {}))
-        self._sent += 1
-        own = f"{self._number}.{self._sent}"
-
-        def answered(answer: Answer) -> None:
-            if answer.status is None:
-                if frame.get("feedback") is True:
-                    found = {"op": "action_feedback", "action": frame["action"], "values": answer.values, "id": asked}
-                    self._answer(found)
-                return
-            self._goals.pop(asked, None)
-            self._result(frame, answer)
-
-        self._put(words.SEND_GOAL, name, own, message, answered)
-        self._goals[asked] = own
-
-    def _result(self, frame: Mapping[str, Any], answer: Answer) -> None:
-        values: object = answer.values or answer.text
-        found = {"op": "action_result", "action": frame["action"], "values": values, "status": answer.status}
-        found["result"] = answer.ok
-        self._answer({**found, "id": frame["id"]} if isinstance(frame.get("id"), str) else found)
-
-    def _cancel_goal(self, frame: dict[str, Any]) -> None:
-        own = self._goals.get(text_of(frame, "id"))
-        if own is None:
-            raise Refused(f"goal '{text_of(frame, 'id')[:60]}' is not active")
-        self._put(words.CANCEL_GOAL, "/" + text_of(frame, "action").lstrip("/"), own, {}, words.nobody)
+        self._connection.level = level

@@ -25,11 +25,11 @@ KEPT_MESSAGES: Final = 1000
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The state of one tick; `rows`: those of each controller, None while it is inactive."""
+    """The state of one tick; `outputs`: rows and speed of each controller, None while it is inactive."""
 
     tick: int
     numbers: Array
-    rows: tuple[Array | None, ...]
+    outputs: tuple[tuple[Array, Array] | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,7 @@ class Feed:
 
     Args:
         period: [s] of the control loop.
+        latched: topics and messages that are sent again when a session begins after a reset.
 
     Attributes:
         observer: the observer that sees each tick first.
@@ -55,8 +56,9 @@ class Feed:
         on_message: called with each message, in the thread of the control loop; it must not block.
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, latched: Sequence[tuple[str, bytes]] = ()) -> None:
         self.period = period
+        self._latched = latched
         self.observer: Observer | None = None
         self.wanted = False
         self.tick_now = 0
@@ -77,6 +79,12 @@ class Feed:
         """Sample the next tick for `newest`."""
         self._asked = True
 
+    def restart(self) -> None:
+        """The next session begins, with tick 0."""
+        self.observer, self.tick_now = None, 0
+        for topic, data in self._latched:
+            self.message(topic, 0, data)
+
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         if self.observer is not None:
             self.observer.tick(tick, state, outputs)
@@ -84,8 +92,8 @@ class Feed:
         wanted = self.wanted and not tick % self._every
         if not wanted and not self._asked:
             return
-        rows = tuple(None if output is None else output.rows.copy() for output in outputs)
-        sample = Sample(tick, state.numbers.copy(), rows)
+        copies = tuple(None if output is None else (output.rows.copy(), output.speed.copy()) for output in outputs)
+        sample = Sample(tick, state.numbers.copy(), copies)
         if self._asked:
             self._asked, self.newest = False, sample
         if wanted:

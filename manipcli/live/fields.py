@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from manipcli.core.text import did_you_mean
+from manipcli.record.definition import Message
+from manipcli.record.json_message import from_json
 
 MAX_NAME: Final = 256
 """Longest name or id [characters]."""
@@ -23,9 +25,28 @@ def text_of(frame: Mapping[str, Any], key: str) -> str:
     return value
 
 
+def rooted(name: str) -> str:
+    """The name with one leading slash."""
+    return "/" + name.lstrip("/")
+
+
 def topic_of(frame: Mapping[str, Any]) -> str:
     """The topic, with a leading slash."""
-    return "/" + text_of(frame, "topic").lstrip("/")
+    return rooted(text_of(frame, "topic"))
+
+
+def arguments(kind: Message, args: object) -> dict[str, object]:
+    """The complete request or goal: `args` is an object, or a list of the values of its fields in order.
+
+    Raises:
+        BadMessage: it is not valid for this type.
+    """
+    if not isinstance(args, list):
+        return from_json(kind, args)
+    names = [field.name for field in kind.fields]
+    if len(args) > len(names):
+        raise Refused(f"{len(args)} args; {kind.name} has {len(names)} fields")
+    return from_json(kind, dict(zip(names, args, strict=False)))
 
 
 def number_of(frame: Mapping[str, Any], key: str, default: float) -> float:

@@ -8,13 +8,31 @@ from typing import Final
 
 from manipcli.control.controller import Controller
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces import controller_manager, controllers
+from manipcli.live.interfaces import (
+    controller_manager,
+    controllers,
+    emergency_stop,
+    entities,
+    jog,
+    parameters,
+    path,
+    simulation,
+)
 from manipcli.record import schemas
 from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
 from manipcli.task.task import Task
 
 CLOCK: Final = "/clock"
-INTERFACES: Final = (controllers.endpoints, controller_manager.endpoints)
+INTERFACES: Final = (
+    controllers.endpoints,
+    path.endpoints,
+    jog.endpoints,
+    emergency_stop.endpoints,
+    controller_manager.endpoints,
+    parameters.endpoints,
+    simulation.endpoints,
+    entities.endpoints,
+)
 """Groups of endpoints: (task, controllers) -> its endpoints."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from manipcli.control.manager import ControllerManager
 from manipcli.live.command import Goal
 from manipcli.live.pace import Pace
+from manipcli.live.play_state import PlayState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.observer import Observer
 from manipcli.simulate.session import Session
@@ -25,6 +26,7 @@ class LiveRobot:
         observer: records goals.
         pace: of the control loop.
         goals: the active goals of clients.
+        play: whether it plays, is paused or ends.
     """
 
     task: Task
@@ -34,6 +36,7 @@ class LiveRobot:
     observer: Observer
     pace: Pace
     goals: list[Goal] = field(default_factory=list)
+    play: PlayState = field(default_factory=PlayState)
 
     @property
     def manager(self) -> ControllerManager:

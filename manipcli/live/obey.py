@@ -32,7 +32,8 @@ class Obedience:
     def obey(self, command: Command) -> bool:
         """Carry out a command before the next tick; False if it ends the session."""
         endpoint = self._endpoints.get((KINDS.get(command.op, "topic"), command.name))
-        if endpoint is None or not endpoint.reads:
+        logged = endpoint is None or not endpoint.reads
+        if logged:
             tick = self._robot.session.ticks
             self._robot.recorder.live_command(tick, op=command.op, name=command.name, id_=command.id, json=command.json)
         if command.op == words.END:
@@ -41,11 +42,12 @@ class Obedience:
             self._carry_out(command, endpoint, json.loads(command.json))
         except ManipcliError as error:
             found = error.findings[0]
-            text = f"{found.message}; {found.hint}" if found.hint else found.message
-            self._refuse(command, text, getattr(error, "error_code", ErrorCode.INVALID_GOAL))
+            hint = self._robot.manager.locked or found.hint
+            text = f"{found.message}; {hint}" if hint else found.message
+            self._refuse(command, text, getattr(error, "error_code", ErrorCode.INVALID_GOAL), logged=logged)
         except (ArithmeticError, AssertionError, LookupError, MemoryError, TypeError, ValueError) as error:
             # A message that no check foresaw must not end the session of the others.
-            self._refuse(command, f"{type(error).__name__}: {error}", ErrorCode.INVALID_GOAL)
+            self._refuse(command, f"{type(error).__name__}: {error}", ErrorCode.INVALID_GOAL, logged=logged)
         return True
 
     def _carry_out(self, command: Command, endpoint: Endpoint | None, message: dict[str, Any]) -> None:
@@ -60,10 +62,20 @@ class Obedience:
         if values is not None:
             command.answer(Answer(True, values))
 
-    def _refuse(self, command: Command, text: str, code: ErrorCode) -> None:
-        self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
+    def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
+        if logged:
+            self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
+        command.answer(self._failed(command, text, code))
+
+    def _failed(self, command: Command, text: str, code: ErrorCode) -> Answer:
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}
-        command.answer(Answer(False, values, text=text, status=ABORTED))
+        return Answer(False, values, text=text, status=ABORTED)
+
+    def abort(self, why: str) -> None:
+        """End all goals of clients as aborted, and all services that wait."""
+        for goal in self._robot.goals:
+            goal.command.answer(self._failed(goal.command, why, ErrorCode.INVALID_GOAL))
+        self._robot.goals.clear()
 
     def after_tick(self) -> None:
         """Send feedback at 20 Hz, and results, to the clients of goals."""

@@ -34,16 +34,21 @@ class Pace:
         self._speed = speed
         self._lasting = lasting
         self._late: Callable[[str], None] | None = late
-        self._began = self._next = time.perf_counter()
+        self._began: float | None = None
+        self._next = 0.0
 
     def start(self) -> None:
-        """Start both clocks, before the first tick."""
-        self._began = self._next = time.perf_counter()
+        """The next tick is due now: at the start, and after a pause, which is not made up for."""
+        self._next = time.perf_counter()
+        if self._began is None:
+            self._began = self._next
 
     @property
     def over(self) -> bool:
-        """Whether the time of the session is over."""
-        return self._lasting is not None and time.perf_counter() - self._began >= self._lasting
+        """Whether the time from the first start on is over, pauses and resets included."""
+        if self._lasting is None or self._began is None:
+            return False
+        return time.perf_counter() - self._began >= self._lasting
 
     def wait(self) -> None:
         """Wait until the next tick is due."""

@@ -15,8 +15,8 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
-from manipcli.record.cdr import NS_PER_S
-from manipcli.record.channels import Recorded, channel_table
+from manipcli.record.cdr import NS_PER_S, CdrWriter
+from manipcli.record.channels import ControllerChannel, Recorded, channel_table
 from manipcli.record.definition import read_definition
 from manipcli.record.json_message import definition, to_json
 from manipcli.record.records import MESSAGE_HEAD, PAYLOAD
@@ -45,11 +45,7 @@ class Publisher:
         self._block: Block | None = None
         self._state = WorldState.room(len(robot.moving_joints), len(scene.movable))
         self._last: dict[str, str] = {}
-        for topic, data in (
-            (topics.ROBOT_DESCRIPTION, messages.string_message(robot.urdf)),
-            (topics.TF_STATIC, messages.tf_message(messages.static_transforms(robot, scene), 0)),
-            (topics.MARKERS, messages.marker_message(scene, 0)),
-        ):
+        for topic, data in begin_messages(robot, scene, recorded):
             self.event(topic, data)
 
     def event(self, topic: str, data: bytes) -> str:
@@ -97,7 +93,7 @@ class Publisher:
             every = Selection({word(topic): 1 for topic in wanted})
             self._block = Block(self._robot, self._scene, self._recorded, table, every, self._period, 1)
         np.copyto(self._state.numbers, sample.numbers)
-        outputs: Any = [None if rows is None else SimpleNamespace(rows=rows) for rows in sample.rows]
+        outputs: Any = [None if own is None else SimpleNamespace(rows=own[0], speed=own[1]) for own in sample.outputs]
         self._block.add(sample.tick, self._state, outputs)
         content = self._block.encode([])
         return b"" if content is None else content.data
@@ -107,6 +103,19 @@ class Publisher:
         kind = definition(channel.type) if not channel.definition else read_definition(channel.type, channel.definition)
         message = to_json(kind, data)
         return json.dumps({"op": "publish", "topic": topic, "msg": message}, separators=(",", ":"), allow_nan=False)
+
+
+def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]) -> tuple[tuple[str, bytes], ...]:
+    """The latched topics at the begin of a session, with their messages: there are no goals yet."""
+    no_goals = CdrWriter()
+    no_goals.u32(0)
+    actions = [each for each in recorded if isinstance(each, ControllerChannel) and each.action]
+    return (
+        (topics.ROBOT_DESCRIPTION, messages.string_message(robot.urdf)),
+        (topics.TF_STATIC, messages.tf_message(messages.static_transforms(robot, scene), 0)),
+        (topics.MARKERS, messages.marker_message(scene, 0)),
+        *((each.status_topic, no_goals.data) for each in actions),
+    )
 
 
 def is_sampled(topic: str, offer: Offer) -> bool:

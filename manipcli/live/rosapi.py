@@ -1,4 +1,4 @@
-"""Services of rosapi, which clients of rosbridge ask for names and types; they only read."""
+"""Services of rosapi, which clients of rosbridge ask for names and types; `interfaces/parameters.py` has the others."""
 
 from __future__ import annotations
 
@@ -6,126 +6,131 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from manipcli.live.command import Values
+from manipcli.live.fields import arguments, rooted
 from manipcli.live.interface import Offer
-from manipcli.record.definition import Array, Message, Number, Text, Type
+from manipcli.live.typedefs import typedefs
 from manipcli.record.json_message import BadMessage, definition
+from manipcli.record.schemas import schema_text
 
 NODE: Final = "/manipcli"
+"""The only node."""
+_PREFIX: Final = "/rosapi/"
+_Answer = Callable[[Mapping[str, Any]], Values]
 
 
 class Rosapi:
-    """Answers requests; `clock`: returns the simulated time."""
+    """Answers requests.
+
+    Args:
+        offer: names and types of the session.
+        clock: returns the simulated time, builtin_interfaces/Time.
+
+    Attributes:
+        names: of its services.
+    """
 
     def __init__(self, offer: Offer, clock: Callable[[], dict[str, int]]) -> None:
-        self._offer = offer
-        self._answers: dict[str, Callable[[Mapping[str, Any]], Values]] = {
-            "topics": lambda _: {"topics": [*offer.topics], "types": [*offer.topics.values()]},
-            "topic_type": lambda asked: {"type": offer.topics.get(_rooted(asked, "topic"), "")},
-            "topics_for_type": lambda asked: {"topics": _of_type(offer.topics, _text(asked, "type"))},
-            "services": lambda _: {"services": [*offer.services, *self.names]},
-            "service_type": lambda asked: {"type": self._service_types.get(_rooted(asked, "service"), "")},
-            "services_for_type": lambda asked: {"services": _of_type(self._service_types, _text(asked, "type"))},
-            "action_servers": lambda _: {"action_servers": [*offer.actions]},
-            "action_type": lambda asked: {"type": offer.actions.get(_rooted(asked, "action"), "")},
-            "nodes": lambda _: {"nodes": [NODE]},
-            "node_details": self._node_details,
-            "get_time": lambda _: {"time": clock()},
-            "get_ros_version": lambda _: {"version": 2, "distro": "manipcli"},
-            "get_param_names": lambda _: {"names": []},
-            "has_param": lambda _: {"exists": False},
-            "message_details": lambda asked: _details(_text(asked, "type")),
-            "service_request_details": lambda asked: _details(f"{_text(asked, 'type')}_Request"),
-            "service_response_details": lambda asked: _details(f"{_text(asked, 'type')}_Response"),
+        self._offer, self._clock = offer, clock
+        table: dict[str, tuple[str, _Answer]] = {
+            "topics": ("Topics", lambda _: {"topics": [*offer.topics], "types": [*offer.topics.values()]}),
+            "topics_and_raw_types": ("TopicsAndRawTypes", self._raw_types),
+            "topic_type": ("TopicType", lambda asked: {"type": offer.topics.get(rooted(asked["topic"]), "")}),
+            "topics_for_type": ("TopicsForType", lambda asked: {"topics": _of_type(offer.topics, asked["type"])}),
+            "publishers": ("Publishers", lambda asked: {"publishers": _node_if(asked["topic"], offer.published)}),
+            "subscribers": ("Subscribers", lambda asked: {"subscribers": _node_if(asked["topic"], offer.received)}),
+            "interfaces": ("Interfaces", lambda _: {"interfaces": sorted(self._interfaces)}),
+            "services": ("Services", lambda _: {"services": [*self._services]}),
+            "service_type": (
+                "ServiceType", lambda asked: {"type": self._services.get(rooted(asked["service"]), "")}
+            ),
+            "services_for_type": (
+                "ServicesForType", lambda asked: {"services": _of_type(self._services, asked["type"])}
+            ),
+            "service_providers": (
+                "ServiceProviders", lambda asked: {"providers": _node_if(asked["service"], self._services)}
+            ),
+            "service_node": (
+                "ServiceNode", lambda asked: {"node": "".join(_node_if(asked["service"], self._services))}
+            ),
+            "action_servers": ("GetActionServers", lambda _: {"action_servers": [*offer.actions]}),
+            "action_type": ("ActionType", lambda asked: {"type": offer.actions.get(rooted(asked["action"]), "")}),
+            "nodes": ("Nodes", lambda _: {"nodes": [NODE]}),
+            "node_details": ("NodeDetails", self._node_details),
+            "get_time": ("GetTime", lambda _: {"time": self._time()}),
+            "get_ros_version": ("GetROSVersion", lambda _: {"version": 2, "distro": "manipcli"}),
+            "message_details": ("MessageDetails", lambda asked: typedefs(asked["type"])),
+            **{
+                f"{_snake(what)}_details": (f"{what}Details", _details(half))
+                for what, half in (
+                    ("ServiceRequest", "_Request"), ("ServiceResponse", "_Response"), ("ActionGoal", "_Goal"),
+                    ("ActionResult", "_Result"), ("ActionFeedback", "_Feedback"),
+                )
+            },
+        }  # fmt: skip
+        self._table = {
+            f"{_PREFIX}{name}": (f"rosapi_msgs/srv/{kind}", answer) for name, (kind, answer) in table.items()
         }
-        self.names = tuple(f"/rosapi/{name}" for name in self._answers)
+        self.names = tuple(self._table)
 
     @property
-    def _service_types(self) -> dict[str, str]:
-        """Of all services; those of rosapi have the names of its package."""
-        own = {name: f"rosapi_msgs/srv/{''.join(map(str.title, name[8:].split('_')))}" for name in self.names}
-        return {**self._offer.services, **own}
+    def _services(self) -> dict[str, str]:
+        """All services and their types."""
+        return {**{name: kind for name, (kind, _) in self._table.items()}, **self._offer.services}
+
+    @property
+    def _interfaces(self) -> set[str]:
+        """All types that the session uses."""
+        offer = self._offer
+        return {*offer.topics.values(), *offer.actions.values(), *self._services.values()}
 
     def call(self, name: str, request: object) -> Values:
         """The response of a service.
 
+        Args:
+            name: one of `names`.
+            request: its fields, or a list of their values.
+
         Raises:
-            BadMessage: an unknown service, or a request without what it needs.
+            BadMessage: the request is not valid, or asks for something unknown.
         """
-        answer = self._answers.get(name.removeprefix("/rosapi/"))
-        if answer is None:
-            raise BadMessage(f"unknown service '{name[:80]}'")
-        if request == []:
-            request = {}
-        if not isinstance(request, dict):
-            raise BadMessage("the request must be an object")
-        return answer(request)
+        kind, answer = self._table[name]
+        return answer(arguments(definition(f"{kind}_Request"), request))
+
+    def _time(self) -> dict[str, int]:
+        """The fields of ROS 2 and those of ROS 1, which roslibpy reads."""
+        now = self._clock()
+        return {**now, "secs": now["sec"], "nsecs": now["nanosec"]}
+
+    def _raw_types(self, asked: Mapping[str, Any]) -> Values:
+        topics = self._offer.topics
+        texts = [schema_text(kind) for kind in topics.values()]
+        return {"topics": [*topics], "types": [*topics.values()], "typedefs_full_text": texts}
 
     def _node_details(self, asked: Mapping[str, Any]) -> Values:
-        if _rooted(asked, "node") != NODE:
+        if rooted(asked["node"]) != NODE:
             raise BadMessage(f"unknown node; the only one is {NODE}")
         offer = self._offer
         return {
             "subscribing": [*offer.received],
             "publishing": [*offer.published],
-            "services": [*offer.services, *self.names],
+            "services": [*self._services],
         }
 
 
-def _text(asked: Mapping[str, Any], key: str) -> str:
-    value = asked.get(key)
-    if not isinstance(value, str):
-        raise BadMessage(f"the request needs a text '{key}'")
-    return value
+def _details(half: str) -> _Answer:
+    """The types of a part of a service or an action, such as `_Request`."""
+    return lambda asked: typedefs(f"{asked['type']}{half}")
 
 
-def _rooted(asked: Mapping[str, Any], key: str) -> str:
-    return "/" + _text(asked, key).lstrip("/")
+def _node_if(name: str, names: Mapping[str, str]) -> list[str]:
+    """The node if it has this name."""
+    return [NODE] if rooted(name) in names else []
 
 
 def _of_type(names: Mapping[str, str], kind: str) -> list[str]:
     return [name for name, own in names.items() if kind in (own, own.replace("/msg/", "/").replace("/srv/", "/"))]
 
 
-def _details(kind: str) -> Values:
-    """The fields of a type and of all types that it uses, as rosapi_msgs/TypeDef."""
-    try:
-        root = definition(kind)
-    except KeyError:
-        raise BadMessage(f"unknown type '{kind[:80]}'") from None
-    found: dict[str, Values] = {}
-
-    def add(message: Message) -> None:
-        if message.name in found:
-            return
-        elements = [field.type.element if isinstance(field.type, Array) else field.type for field in message.fields]
-        sizes = [(field.type.length or 0) if isinstance(field.type, Array) else -1 for field in message.fields]
-        found[message.name] = {
-            "type": message.name,
-            "fieldnames": [field.name for field in message.fields],
-            "fieldtypes": [_name(element) for element in elements],
-            "fieldarraylen": sizes,
-            "examples": [_example(element, size) for element, size in zip(elements, sizes, strict=True)],
-            "constnames": [],
-            "constvalues": [],
-        }
-        for element in elements:
-            if isinstance(element, Message):
-                add(element)
-
-    add(root)
-    return {"typedefs": [*found.values()]}
-
-
-def _name(kind: Type) -> str:
-    match kind:
-        case Number():
-            return kind.name
-        case Message():
-            return kind.name
-    return "string"
-
-
-def _example(kind: Type, size: int) -> str:
-    if size >= 0:
-        return "[]"
-    return "" if isinstance(kind, Text) else "{}" if isinstance(kind, Message) else "0"
+def _snake(name: str) -> str:
+    """`service_request` of `ServiceRequest`."""
+    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("_")

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.access import Access
-from manipcli.live.client import Client, Services
+from manipcli.live.client import Client
 from manipcli.live.command import Command
+from manipcli.live.connection import Services
 from manipcli.live.feed import Feed
 from manipcli.live.frames import MAX_FRAME
 from manipcli.live.publisher import Publisher, is_sampled
@@ -59,7 +60,7 @@ class LiveServer:
         self._loop = asyncio.new_event_loop()
         self._something = asyncio.Event()
         rosapi = Rosapi(publisher.offer, lambda: publisher.clock(feed.tick_now))
-        self._services = Services(publisher, rosapi, put, self._soon, self._subscribed)
+        self._services = Services(publisher.offer, publisher.latched, rosapi, put, self._soon, self._subscribed)
         self._thread = threading.Thread(target=self._loop.run_forever, name="live", daemon=True)
         self._thread.start()
         try:

@@ -15,7 +15,7 @@ from manipcli.live.feed import Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
 from manipcli.live.pace import Pace
-from manipcli.live.publisher import Publisher
+from manipcli.live.publisher import Publisher, begin_messages
 from manipcli.live.source import Inbox, recorded_commands
 from manipcli.record.recording import Recording
 from manipcli.run.run_log import recorded
@@ -61,7 +61,7 @@ def served(
     announce: Callable[[str], None],
     late: Callable[[str], None],
 ) -> Iterator[Outside]:
-    """A session that clients can connect to.
+    """A session that clients can connect to; after a reset the same `Outside` is that of the next one (`again`).
 
     Args:
         task, manager: of the session.
@@ -78,7 +78,8 @@ def served(
     period = task.spec.simulation.control_period
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    feed, inbox = Feed(period), Inbox()
+    feed = Feed(period, begin_messages(task.robot, task.true.scene, channels))
+    inbox = Inbox()
     publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with ExitStack() as opened:
@@ -98,6 +99,18 @@ def served(
                 announce(address)
 
         yield Outside(inbox, feed, pace, between, ready)
+
+
+def next_log(first: Path, number: int, *, overwrite: bool) -> tuple[Path, int]:
+    """The log of the session after number `number`, `runs/pour@live-2.mcap` after `runs/pour@live.mcap`; its number.
+
+    Unless they may be replaced, numbers whose log exists are left out.
+    """
+    while True:
+        number += 1
+        path = first.with_name(f"{first.stem}-{number}{first.suffix}")
+        if overwrite or not path.exists():
+            return path, number
 
 
 def recorded_session(recording: Recording, log: Path) -> Outside:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +22,15 @@ class Source(Protocol):
     """Where the control loop gets its commands."""
 
     def take(self, tick: int) -> Sequence[Command]:
-        """The commands that take effect at control tick `tick`, in order; called once per tick."""
+        """The commands that take effect at control tick `tick`, in order; called again for a tick that waits."""
+        ...
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a command, at most this wall time; False: none will come at this tick."""
+        ...
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        """Take these again, before all others: they came after the command that ended the session."""
         ...
 
 
@@ -30,12 +39,14 @@ class Inbox:
 
     def __init__(self) -> None:
         self._waiting: deque[Command] = deque()
+        self._came = threading.Event()
 
     def put(self, command: Command) -> bool:
         """Add a command; False if too many wait already."""
         if len(self._waiting) >= WAITING:
             return False
         self._waiting.append(command)
+        self._came.set()
         return True
 
     def take(self, tick: int) -> Sequence[Command]:
@@ -45,15 +56,32 @@ class Inbox:
             return ()
         return [waiting.popleft() for _ in range(len(waiting))]
 
+    def wait(self, seconds: float) -> bool:
+        self._came.clear()
+        if not self._waiting:
+            self._came.wait(seconds)
+        return True
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        self._waiting.extendleft(reversed(commands))
+
 
 class Schedule:
     """Commands by tick: of a log, or of a test."""
 
     def __init__(self, commands: Mapping[int, Sequence[Command]]) -> None:
         self._commands = commands
+        self._taken = -1
 
     def take(self, tick: int) -> Sequence[Command]:
-        return self._commands.get(tick, ())
+        first, self._taken = tick != self._taken, tick
+        return self._commands.get(tick, ()) if first else ()
+
+    def wait(self, seconds: float) -> bool:
+        return False
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        """No effect: the session of a schedule ends with it."""
 
 
 def recorded_commands(log: Path, period: float, *, failed: bool) -> Schedule:

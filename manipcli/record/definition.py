@@ -63,10 +63,11 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a message."""
+    """One field of a message. `default`: of a number that has one other than 0, such as `float64 w 1`."""
 
     name: str
     type: Type
+    default: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +119,14 @@ def _short(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
+def _default(kind: Number | Text | Message, rest: str) -> float | None:
+    """The default of a field, from the rest of its line; None without one, or if it is no number."""
+    try:
+        return float(rest.partition("#")[0]) if isinstance(kind, Number) else None
+    except ValueError:
+        return None
+
+
 class _Reader:
     """Parses each type once."""
 
@@ -152,7 +161,10 @@ class _Reader:
             element = self._type(found["type"], package, above)
             bounded = "<=" in (found["array"] or "")
             length = int(found["bound"]) if found["bound"] and not bounded else None
-            yield Field(found["name"], element if found["array"] is None else Array(element, length))
+            if found["array"] is not None:
+                yield Field(found["name"], Array(element, length))
+            else:
+                yield Field(found["name"], element, _default(element, stripped[found.end() :]))
 
     def _type(self, word: str, package: str, above: tuple[str, ...]) -> Number | Text | Message:
         if word in NUMBERS:

@@ -13,7 +13,7 @@ import numpy as np
 
 from manipcli.core.text import did_you_mean
 from manipcli.record.cdr import CdrReader
-from manipcli.record.definition import Array, Message, Number, Text, Type, read_definition
+from manipcli.record.definition import Array, Field, Message, Number, Text, Type, read_definition
 from manipcli.record.schemas import schema_text
 
 MAX_VALUES = 200_000
@@ -79,7 +79,7 @@ class _Reading:
 
 
 def from_json(message: Message, value: object) -> dict[str, object]:
-    """The complete message: fields that are left out are 0, false, "" or empty.
+    """The complete message: fields that are left out have their default, else 0, false, "" or empty.
 
     Raises:
         BadMessage: a field that is unknown, of the wrong type, out of range or not finite; too many values.
@@ -103,7 +103,7 @@ class _Checking:
         return {
             field.name: self._value(field.type, given[field.name], _below(path, field.name))
             if field.name in given
-            else _default(field.type)
+            else _default(field)
             for field in message.fields
         }
 
@@ -160,16 +160,18 @@ def _number(kind: Number, value: object, path: str) -> float | int | bool:
     return number
 
 
-def _default(kind: Type) -> object:
+def _default(field: Field) -> object:
+    kind = field.type
     match kind:
-        case Number():
-            return False if kind.name == "bool" else 0.0 if kind.name.startswith("float") else 0
+        case Number(name=name):
+            given = field.default or 0.0
+            return bool(given) if name == "bool" else given if name.startswith("float") else int(given)
         case Text():
             return ""
         case Message():
-            return {field.name: _default(field.type) for field in kind.fields}
+            return {below.name: _default(below) for below in kind.fields}
         case Array(element=element, length=length):
-            return [_default(element) for _ in range(length or 0)]
+            return [_default(Field(field.name, element)) for _ in range(length or 0)]
 
 
 def _below(path: str, name: str) -> str:

@@ -6,6 +6,9 @@ line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schem
 
 from __future__ import annotations
 
+from manipcli.record.rosapi_definitions import ROSAPI
+from manipcli.record.simulation_schemas import SIMULATION
+
 STRING = "std_msgs/msg/String"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -24,6 +27,9 @@ TASK_EVENT = "manipcli_msgs/msg/TaskEvent"
 CLOCK = "rosgraph_msgs/msg/Clock"
 JOINT_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 FLOAT64_MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+TWIST = "geometry_msgs/msg/TwistStamped"
+JOINT_JOG = "control_msgs/msg/JointJog"
+TRIGGER = "std_srvs/srv/Trigger"
 LIVE_COMMAND = "manipcli_msgs/msg/LiveCommand"
 
 _CONTACT = (
@@ -47,6 +53,7 @@ DEFINITIONS: dict[str, str] = {
     "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
     "geometry_msgs/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
     "geometry_msgs/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
+    "geometry_msgs/TwistStamped": "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
     "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
     "geometry_msgs/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
     "geometry_msgs/TransformStamped": (
@@ -192,6 +199,12 @@ DEFINITIONS: dict[str, str] = {
         "control_msgs/JointComponentTolerance[] component_goal_tolerance\n"
         "builtin_interfaces/Duration goal_time_tolerance\n"
     ),
+    "control_msgs/JointJog": (
+        "std_msgs/Header header\nstring[] joint_names\nfloat64[] displacements\nfloat64[] velocities\n"
+        "float64 duration\n"
+    ),
+    "std_srvs/Trigger_Request": "",
+    "std_srvs/Trigger_Response": "bool success\nstring message\n",
     "control_msgs/ParallelGripperCommand_Goal": "sensor_msgs/JointState command\n",
     "controller_manager_msgs/ChainConnection": "string name\nstring[] reference_interfaces\n",
     "controller_manager_msgs/ControllerState": (
@@ -200,6 +213,7 @@ DEFINITIONS: dict[str, str] = {
         "bool is_chained\nstring[] exported_state_interfaces\nstring[] reference_interfaces\n"
         "controller_manager_msgs/ChainConnection[] chain_connections\n"
     ),
+    "controller_manager_msgs/HardwareInterface": "string name\nstring data_type\nbool is_available\nbool is_claimed\n",
     "controller_manager_msgs/ListControllers_Request": "",
     "controller_manager_msgs/ListControllers_Response": "controller_manager_msgs/ControllerState[] controller\n",
     "controller_manager_msgs/SwitchController_Request": (
@@ -208,6 +222,55 @@ DEFINITIONS: dict[str, str] = {
         "bool activate_asap\nbuiltin_interfaces/Duration timeout\n"
     ),
     "controller_manager_msgs/SwitchController_Response": "bool ok\nstring message\n",
+    **SIMULATION,
+    **ROSAPI,
+    "controller_manager_msgs/ListControllerTypes_Request": "",
+    "controller_manager_msgs/ListControllerTypes_Response": "string[] types\nstring[] base_classes\n",
+    "controller_manager_msgs/ListHardwareInterfaces_Request": "",
+    "controller_manager_msgs/ListHardwareInterfaces_Response": (
+        "controller_manager_msgs/HardwareInterface[] command_interfaces\n"
+        "controller_manager_msgs/HardwareInterface[] state_interfaces\n"
+    ),
+    **{
+        f"controller_manager_msgs/{verb}Controller_{part}": fields
+        for verb in ("Load", "Configure", "Cleanup", "Unload")
+        for part, fields in (("Request", "string name\n"), ("Response", "bool ok\n"))
+    },
+    "rcl_interfaces/ParameterType": (
+        "uint8 PARAMETER_NOT_SET=0\nuint8 PARAMETER_BOOL=1\nuint8 PARAMETER_INTEGER=2\nuint8 PARAMETER_DOUBLE=3\n"
+        "uint8 PARAMETER_STRING=4\nuint8 PARAMETER_BYTE_ARRAY=5\nuint8 PARAMETER_BOOL_ARRAY=6\n"
+        "uint8 PARAMETER_INTEGER_ARRAY=7\nuint8 PARAMETER_DOUBLE_ARRAY=8\nuint8 PARAMETER_STRING_ARRAY=9\n"
+    ),
+    "rcl_interfaces/ParameterValue": (
+        "uint8 type\nbool bool_value\nint64 integer_value\nfloat64 double_value\nstring string_value\n"
+        "byte[] byte_array_value\nbool[] bool_array_value\nint64[] integer_array_value\nfloat64[] double_array_value\n"
+        "string[] string_array_value\n"
+    ),
+    "rcl_interfaces/Parameter": "string name\nrcl_interfaces/ParameterValue value\n",
+    "rcl_interfaces/FloatingPointRange": "float64 from_value\nfloat64 to_value\nfloat64 step\n",
+    "rcl_interfaces/IntegerRange": "int64 from_value\nint64 to_value\nuint64 step\n",
+    "rcl_interfaces/ParameterDescriptor": (
+        "string name\nuint8 type\nstring description\nstring additional_constraints\nbool read_only false\n"
+        "bool dynamic_typing false\nrcl_interfaces/FloatingPointRange[<=1] floating_point_range\n"
+        "rcl_interfaces/IntegerRange[<=1] integer_range\n"
+    ),
+    "rcl_interfaces/SetParametersResult": "bool successful\nstring reason\n",
+    "rcl_interfaces/ListParametersResult": "string[] names\nstring[] prefixes\n",
+    "rcl_interfaces/ListParameters_Request": "uint64 DEPTH_RECURSIVE=0\nstring[] prefixes\nuint64 depth\n",
+    "rcl_interfaces/ListParameters_Response": "rcl_interfaces/ListParametersResult result\n",
+    "rcl_interfaces/GetParameters_Request": "string[] names\n",
+    "rcl_interfaces/GetParameters_Response": "rcl_interfaces/ParameterValue[] values\n",
+    "rcl_interfaces/GetParameterTypes_Request": "string[] names\n",
+    "rcl_interfaces/GetParameterTypes_Response": "uint8[] types\n",
+    "rcl_interfaces/DescribeParameters_Request": "string[] names\n",
+    "rcl_interfaces/DescribeParameters_Response": "rcl_interfaces/ParameterDescriptor[] descriptors\n",
+    "rcl_interfaces/SetParameters_Request": "rcl_interfaces/Parameter[] parameters\n",
+    "rcl_interfaces/SetParameters_Response": "rcl_interfaces/SetParametersResult[] results\n",
+    "rcl_interfaces/SetParametersAtomically_Request": "rcl_interfaces/Parameter[] parameters\n",
+    "rcl_interfaces/SetParametersAtomically_Response": "rcl_interfaces/SetParametersResult result\n",
+    "std_msgs/Float64": "float64 data\n",
+    "control_msgs/MultiDOFCommand": "string[] dof_names\nfloat64[] values\nfloat64[] values_dot\n",
+    "control_msgs/SpeedScalingFactor": "float64 factor\n",
 }
 
 CONTACTS_WITHOUT_POINTS = (
@@ -232,7 +295,7 @@ def schema_text(type_name: str) -> str:
 def _dependencies(name: str, found: list[str]) -> list[str]:
     """Types that `name` uses, in the order of their first use, depth first."""
     for line in DEFINITIONS[name].splitlines():
-        used = line.split()[0].removesuffix("[]")
+        used = line.split()[0].partition("[")[0]
         if "/" in used and used not in found:
             found.append(used)
             _dependencies(used, found)

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, Protocol
 
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Diagnostic, Loc
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
@@ -90,6 +90,26 @@ class Engine(Protocol):
 
     def detach(self, body: str) -> None:
         """Free an attached body."""
+        ...
+
+    def body_state(self, body: str) -> tuple[Transform, Array]:
+        """A movable body now, without a change of any other reading.
+
+        Returns:
+            `X_WO`, and the (6) velocity of O and angular velocity, in the world.
+        """
+        ...
+
+    def place(self, body: str, X_WO: Transform, twist: Array) -> None:
+        """Put a movable body, which is not attached, elsewhere between two ticks.
+
+        The contacts of the last physics step are kept until the next one.
+
+        Args:
+            body: its name.
+            X_WO: its new pose.
+            twist: (6) velocity of O and angular velocity, in the world; without effect in an engine without physics.
+        """
         ...
 
     def advance(self) -> None:

@@ -21,7 +21,7 @@ from pydantic_core import SchemaError
 from typer.testing import CliRunner
 
 import manipcli
-from manipcli.cli.app import COMMANDS, main
+from manipcli.cli.app import COMMANDS, GROUPS, main
 from manipcli.cli.volume import with_volume
 from manipcli.core import collector
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
@@ -439,10 +439,14 @@ def test_what_is_known_of_a_run_whose_log_the_disk_refused_is_told(
 def test_the_help_of_a_command_is_as_if_all_were_shown(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     whole = typer.Typer(rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
     whole.callback()(lambda: None)
+    groups = {group: typer.Typer(rich_markup_mode=None) for group in GROUPS}
+    for group, inner in groups.items():
+        whole.add_typer(inner, name=group)
     for name, function in COMMANDS.items():
-        whole.command(name)(with_volume(function))
-    expected = CliRunner().invoke(whole, [command, "--help"], prog_name="manipcli").output
-    assert main([command, "--help"]) == 0
+        group, _, last = name.rpartition(" ")
+        groups.get(group, whole).command(last)(with_volume(function))
+    expected = CliRunner().invoke(whole, [*command.split(), "--help"], prog_name="manipcli").output
+    assert main([*command.split(), "--help"]) == 0
     shown = capsys.readouterr().out
     assert shown.split() == expected.split()  # the width of the lines may differ
     assert f"manipcli {command} [OPTIONS]" in shown

@@ -15,7 +15,7 @@ from manipcli.core.errors import ExitCode
 def test_every_command_has_both_once_and_short_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     parameters = inspect.signature(with_volume(app.COMMANDS[name])).parameters
     assert {"quiet", "verbose"} <= set(parameters)
-    assert app.main([name, "-h"]) == ExitCode.PASSED
+    assert app.main([*name.split(), "-h"]) == ExitCode.PASSED
     text = capsys.readouterr().out
     assert text.count("-q, --quiet") == text.count("-v, --verbose") == text.count("-h, --help") == 1
 

@@ -58,10 +58,23 @@ def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path) 
         recorder.finish(verdict_metadata(judge_log(recorder.partial_path, being_written=True)))
 
 
-def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str | None = TOKEN) -> Path:
-    """Serve a small task as fast as possible while `use` runs with its URL; returns the log of the session."""
+def serving(
+    folder: Path,
+    use: Callable[[str], Awaitable[None]],
+    *,
+    token: str | None = TOKEN,
+    task: Path | str = SMALL,
+    speed: float | None = None,
+) -> Path:
+    """Serve a task, a file or its text, while `use` runs with its URL; returns the log.
+
+    `speed`: simulated seconds per second; None: as fast as possible.
+    """
     file, log = folder / "small.yaml", folder / "session.mcap"
-    file.write_text(SMALL)
+    if isinstance(task, Path):
+        file = task
+    else:
+        file.write_text(task)
     announced: queue.Queue[str] = queue.Queue()
     over = threading.Event()
     failures: list[BaseException | str] = []
@@ -71,9 +84,11 @@ def serving(folder: Path, use: Callable[[str], Awaitable[None]], *, token: str |
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=None)
+        options = LiveOptions(Access(token), port=0, speed=speed)
         try:
-            _, failure = pipeline.serve_task(file, options, log=log, between=between, announce=announced.put)
+            _, failure = pipeline.serve_task(
+                file, options, log=log, between=between, announce=announced.put, allow_outside=True
+            )
             failures.extend([failure] if failure else [])
         except BaseException as error:  # noqa: BLE001 (raised again by the test)
             failures.append(error)

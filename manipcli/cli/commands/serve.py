@@ -75,6 +75,7 @@ def serve(
         from manipcli.live.access import Access
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
+        from manipcli.report.run_report import RunReport
 
         live = LiveOptions(Access(token, host), port, factor, wall, not no_page, page_port)
 
@@ -88,6 +89,9 @@ def serve(
             urls.append(url)
             console.result(url)
 
+        def ended(report: RunReport, failure: str) -> None:
+            console.result(text.render_session(report, failure))
+
         with StepProgress(verbose=False, quiet=quiet, interrupts=interrupts) as progress:
             report, failure = pipeline.serve_task(
                 task,
@@ -97,6 +101,7 @@ def serve(
                 progress=progress,
                 between=interrupts.check,
                 announce=announce,
+                ended=ended,
                 overrides=tuple(overrides or ()),
                 seed=seed,
                 sample=sample,

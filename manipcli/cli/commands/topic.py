@@ -1,56 +1,68 @@
-"""`manipcli topic list|echo|pub`: topics of a live session, or of another rosbridge server."""
+"""`manipcli topic list|info|hz`: topics of a running robot, or of any other rosbridge server."""
 
 from __future__ import annotations
 
-import json
-from typing import Annotated, Literal
+import time
+from typing import Annotated
 
 import typer
 
 from manipcli.cli import console
-from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+from manipcli.cli.remote_options import LOCAL, ShowTypes, Topic, Url, connected, print_names, rooted
+from manipcli.core.errors import ExitCode
+
+REPORT_PERIOD = 1.0
+"""[s] Of wall time between two reports of `hz`."""
 
 
-def topic(
-    action: Annotated[Literal["list", "echo", "pub"], typer.Argument(help="list, echo or pub.", show_default=False)],
-    name: Annotated[str | None, typer.Argument(metavar="[TOPIC]", help="Topic of echo and pub.")] = None,
-    type_: Annotated[str | None, typer.Argument(metavar="[TYPE]", help="Its type, for pub.")] = None,
-    message: Annotated[str | None, typer.Argument(metavar="[MESSAGE]", help="Message as YAML, for pub.")] = None,
+def list_(*, show_types: ShowTypes = False, url: Url = LOCAL) -> ExitCode:
+    """List the topics."""
+    with connected(url) as remote:
+        from manipcli.live import remote_names
+
+        print_names(remote_names.topics(remote), show_types=show_types)
+    return ExitCode.PASSED
+
+
+def info(name: Topic, *, url: Url = LOCAL) -> ExitCode:
+    """Print the type of a topic, and the nodes that publish and subscribe it."""
+    name = rooted(name)
+    with connected(url) as remote:
+        from manipcli.live import remote_names
+
+        kind = remote_names.known_type(remote, remote_names.TOPICS, name)
+        console.result(f"Type: {kind or 'unknown'}")
+        for word, nodes in remote_names.nodes_of_topic(remote, name).items():
+            console.result(f"{word} count: {len(nodes)}" + (f" ({', '.join(nodes)})" if nodes else ""))
+    return ExitCode.PASSED
+
+
+def hz(
+    name: Topic,
     *,
-    url: Annotated[
-        str, typer.Option("--url", metavar="URL", help="Address of the server, with its token.")
-    ] = "ws://127.0.0.1:9090",
-    once: Annotated[bool, typer.Option("--once", help="pub: one message (needed); echo: end after one.")] = False,
+    window: Annotated[
+        int, typer.Option("--window", "-w", metavar="N", min=2, help="Number of the last messages that count.")
+    ] = 10_000,
+    once: Annotated[bool, typer.Option("--once", help="End after one report.")] = False,
+    url: Url = LOCAL,
 ) -> ExitCode:
-    """List the topics of a running robot, print their messages, or publish one.
+    """Print the rate at which messages arrive, in wall time, each second; press Ctrl-C to end."""
+    name = rooted(name)
+    with connected(url) as remote:
+        from manipcli.live import remote_names
+        from manipcli.live.rate import Rate
+        from manipcli.live.remote import is_message
 
-    Messages are printed as one JSON object per line. `serve` prints the URL; publishing needs its token.
-    """
-    if action != "list" and name is None:
-        raise InvalidInput([Diagnostic("USE135", f"topic {action} needs a TOPIC", hint="manipcli topic list")])
-    if action == "pub" and (type_ is None or message is None or not once):
-        hint = "manipcli topic pub --once TOPIC TYPE 'YAML'"
-        raise InvalidInput([Diagnostic("USE135", "topic pub needs --once, a TYPE and a MESSAGE", hint=hint)])
-    from manipcli.cli.interrupts import Interrupts
-    from manipcli.live.remote import Remote
-    from manipcli.report.table import table
-    from manipcli.spec.source.tree import plain
-    from manipcli.spec.source.yaml import parse
-
-    with Interrupts():
-        given = None
-        if message is not None:
-            node = parse(message, "MESSAGE")
-            given = {} if node is None else plain(node)
-        with Remote(url) as remote:
-            if action == "list":
-                console.result(table(("topic", "type"), [*remote.topics().items()]))
-            elif action == "pub":
-                remote.publish(str(name), str(type_), given)
-                console.talk(f"published on {name}")
-            else:
-                for found in remote.messages(str(name)):
-                    console.result(json.dumps(found))
-                    if once:
-                        break
+        rate = Rate(window)
+        try:
+            remote.subscribe(name, remote_names.known_type(remote, remote_names.TOPICS, name))
+            while True:
+                for frame in remote.received(REPORT_PERIOD):
+                    if is_message(frame, name):
+                        rate.arrived(time.monotonic())
+                console.result(rate.report())
+                if once or console.reader_is_gone():
+                    break
+        except KeyboardInterrupt:  # how it ends
+            pass
     return ExitCode.PASSED

@@ -39,6 +39,7 @@ from manipcli.control.control_loop import ControlLoop, NoLoop
 from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
+from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
@@ -164,6 +165,7 @@ class CartesianImpedanceController:
             types=types, compat=compat, stop_planner=stop_planner,
         )  # fmt: skip
         self.name, self.joints = self._follower.name, self._follower.joints
+        self.scaling = self._follower.scaling
         self.feed_forward: FeedForward = feed_forward
         self._stiffness = self._six("stiffness", stiffness)
         self._damping = None if damping is None else self._six("damping", damping)
@@ -184,7 +186,7 @@ class CartesianImpedanceController:
         self._block = np.ix_(self._columns, self._columns)
         self._q = np.zeros(len(kinematics.robot.joint_names))
         self._singular = SINGULAR**2 * np.eye(6)
-        self.output = ControllerOutput.of(len(self.joints), 1)
+        self.output = ControllerOutput.of(len(self.joints), 1, speed=self._follower.output.speed)
         self._error = np.zeros(6)
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))
@@ -224,6 +226,13 @@ class CartesianImpedanceController:
         handle = self._follower.send_goal(trajectory, constraints=constraints)
         self._pose = self._held = None
         return handle
+
+    def jog(self, target: JogTarget, *, until: float) -> None:
+        """Follow velocities until `until` [s], see `JointTrajectoryController.jog`; a pose that was set is cleared."""
+        if self._pose is not None:
+            self._follower.deactivate(self._time)
+        self._follower.jog(target, until=until)
+        self._pose = self._held = None
 
     def set_pose(self, X_WT: Transform) -> None:
         """Set the reference pose of the tool from the next update on; an active goal is aborted.

@@ -30,6 +30,7 @@ from manipcli.control.control_loop import ControlLoop, InverseDynamicsLoop, erro
 from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
+from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
@@ -122,6 +123,7 @@ class ComputedTorqueController:
             stop_planner=stop_planner,
         )
         self.name, self.joints = self._follower.name, self._follower.joints
+        self.scaling, self.gains = self._follower.scaling, self._follower.gains
         followed = self._follower.output
         self._correction = followed.command
         self._wanted = np.zeros(len(self.joints))
@@ -132,6 +134,7 @@ class ComputedTorqueController:
             acceleration=followed.acceleration,
             commands=followed.commands,
             wanted_acceleration=self._wanted,
+            speed=followed.speed,
         )
 
     @property
@@ -148,6 +151,10 @@ class ComputedTorqueController:
     ) -> GoalHandle:
         """Accept a trajectory; see `JointTrajectoryController.send_goal`."""
         return self._follower.send_goal(trajectory, constraints=constraints)
+
+    def jog(self, target: JogTarget, *, until: float) -> None:
+        """Follow velocities until `until` [s]; see `JointTrajectoryController.jog`."""
+        self._follower.jog(target, until=until)
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""

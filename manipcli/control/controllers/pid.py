@@ -40,7 +40,8 @@ from manipcli.control.controller import (
     refuse_not_finite,
 )
 from manipcli.control.controllers.forward_command import finite_values
-from manipcli.control.gains import build_pid, gains_of, own_joints, strangers
+from manipcli.control.gains import build_pid, gains_of, own_joints, strangers, tune_pid
+from manipcli.control.tunable_gains import TunableGains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
@@ -111,6 +112,9 @@ class PidController:
         compat: order of the PID integration.
         chained_to: the controller whose references it commands; None: it commands the joints.
 
+    Attributes:
+        gains: may change.
+
     Raises:
         InvalidArgument: no or duplicate joints; gains that are missing, invalid, zero or of other joints; other `led`.
     """
@@ -146,9 +150,8 @@ class PidController:
             kind = "has gains, but is not a joint of the controller" if joint in gains else "has no gains"
             raise InvalidArgument("CTRL102", f"controller '{name}': '{joint}' {kind}")
         own = tuple(gains_of(name, joint, gains[joint], PidGainsSpec) for joint in self.joints)
-        # Feed-forward alone makes a joint move, too.
-        counted = tuple(g.model_copy(update={"ff_velocity_scale": g.feedforward_gain}) for g in own)
-        self._pid = build_pid(name, self.joints, counted, compat)
+        self._pid = build_pid(name, self.joints, _counted(own), compat)
+        self.gains = TunableGains(name, self.joints, own, self._tune)
         self._forward = np.array([g.feedforward_gain for g in own])
         self._saves = np.array([g.save_i_term for g in own])
         if self._saves.any() != self._saves.all():
@@ -173,6 +176,11 @@ class PidController:
         self._has_before = False
         self._reference, self._rate = np.zeros((2, n))
         self._has_reference = self._activated = False
+
+    def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
+        counted = _counted(gains)
+        tune_pid(self._pid, self.name, self.joints, counted)
+        self._forward[:] = [g.ff_velocity_scale for g in counted]
 
     def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
         """Set the reference from the next update on, until deactivation.
@@ -262,6 +270,11 @@ class PidController:
             output.position[:] = self._reference
             output.velocity[:] = self._rate
         return output
+
+
+def _counted(gains: Sequence[GainsSpec]) -> tuple[GainsSpec, ...]:
+    """With the feed-forward where a PID has it: it alone makes a joint move, too."""
+    return tuple(g.model_copy(update={"ff_velocity_scale": getattr(g, "feedforward_gain", 0.0)}) for g in gains)
 
 
 def build(name: str, spec: PidSpec, context: BuildContext) -> PidController:

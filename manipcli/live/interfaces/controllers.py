@@ -11,6 +11,7 @@ import numpy.typing as npt
 from manipcli.control.action import Feedback, GoalHandle, refuse_inactive
 from manipcli.control.controller import Controller
 from manipcli.control.roles import is_follower, is_hand
+from manipcli.core.errors import InvalidArgument
 from manipcli.live.command import Answer, Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.goals import action_goal, gripper_goal, topic_goal
@@ -39,6 +40,23 @@ class Commanded(Controller, Protocol):
         ...
 
 
+class Referenced(Controller, Protocol):
+    """A controller with one reference per joint, and its rate."""
+
+    def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
+        """Set the reference from the next update on.
+
+        Raises:
+            InvalidArgument: not one finite number per joint, or rates where it has none.
+        """
+        ...
+
+
+def is_referenced(controller: Controller) -> TypeGuard[Referenced]:
+    """Whether it has a topic for references."""
+    return hasattr(controller, "set_reference")
+
+
 def is_commanded(controller: Controller) -> TypeGuard[Commanded]:
     """Whether it has a topic for commands."""
     return hasattr(controller, "set_command")
@@ -55,6 +73,8 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoin
             yield Endpoint("action", f"/{name}/{action}", _GRIP, _grip)
         if is_commanded(controller):
             yield Endpoint("topic", f"/{name}/commands", schemas.FLOAT64_MULTI_ARRAY, _command)
+        if is_referenced(controller):
+            yield Endpoint("topic", f"/{name}/reference", "control_msgs/msg/MultiDOFCommand", _refer)
 
 
 def controller_of(robot: LiveRobot, command: Command) -> Controller:
@@ -89,9 +109,34 @@ def _grip(robot: LiveRobot, command: Command, message: dict[str, Any]) -> None:
 def _command(robot: LiveRobot, command: Command, message: dict[str, Any]) -> None:
     controller = controller_of(robot, command)
     assert is_commanded(controller)
+    refuse_unless_active(robot, controller)
+    controller.set_command(message["data"])
+
+
+def _refer(robot: LiveRobot, command: Command, message: dict[str, Any]) -> None:
+    """The reference of a `pid`, by joint or in the order of its joints."""
+    controller = controller_of(robot, command)
+    assert is_referenced(controller)
+    refuse_unless_active(robot, controller)
+    names, values, rates = message["dof_names"], message["values"], message["values_dot"]
+    if names and sorted(names) != sorted(controller.joints):
+        text = f"dof_names are {', '.join(names)[:200]}; expected each joint of controller '{controller.name}' once"
+        raise InvalidArgument("LIVE154", text, hint=f"joints: {', '.join(controller.joints)}")
+    n = len(controller.joints)
+    if len(values) != n or len(rates) not in (0, n):
+        text = f"{len(values)} values and {len(rates)} values_dot for {n} joints of controller '{controller.name}'"
+        raise InvalidArgument("LIVE154", text, hint=f"joints: {', '.join(controller.joints)}")
+    order = [names.index(joint) for joint in controller.joints] if names else range(n)
+    controller.set_reference([values[k] for k in order], [rates[k] for k in order] if rates else None)
+
+
+def refuse_unless_active(robot: LiveRobot, controller: Controller) -> None:
+    """
+    Raises:
+        GoalRejected: the controller is not active.
+    """
     active = any(info.name == controller.name and info.state == "active" for info in robot.manager.list())
     refuse_inactive(controller.name, active)
-    controller.set_command(message["data"])
 
 
 def _accept(robot: LiveRobot, command: Command, controller: str, handle: GoalHandle, *, gripper: bool) -> None:

@@ -40,7 +40,8 @@ class Snapshot:
         """From a sample of a session with this control period [s] and numbers of joints and movable bodies."""
         state = WorldState.room(joints, bodies)
         np.copyto(state.numbers, sample.numbers)
-        return cls(sample.tick * period, state, sample.rows)
+        rows = tuple(None if output is None else output[0] for output in sample.outputs)
+        return cls(sample.tick * period, state, rows)
 
     def is_active(self, controller: str) -> bool:
         """Whether a controller is active, or not yet known."""

@@ -102,6 +102,7 @@ class _ControllerRows:
 
     def __init__(self, channel: ControllerChannel, robot: RobotModel, capacity: int) -> None:
         self.rows = np.zeros((capacity, REFERENCE_ROWS + len(channel.interfaces), len(channel.joints)))
+        self.speeds = np.ones((capacity, 1))
         self._outputs = [REFERENCE_ROWS + channel.interfaces.index(f) for f in FIELDS if f in channel.interfaces]
         self._columns = robot.indices(channel.joints)
         self._endless = np.array([robot.joint(name).type == "continuous" for name in channel.joints], dtype=bool)
@@ -112,7 +113,7 @@ class _ControllerRows:
         feedback, speed, force = (a[:, self._columns] for a in (position, velocity, effort))
         outputs = [rows[:, k] for k in self._outputs]
         errors = self.errors(at, position, velocity)
-        return [*self.reference(at), rows[:, 2], feedback, speed, force, *errors, *outputs]
+        return [*self.reference(at), rows[:, 2], feedback, speed, force, *errors, *outputs, self.speeds[at]]
 
     def reference(self, at: Ticks) -> list[Array]:
         """Reference positions and velocities."""
@@ -182,6 +183,7 @@ class Block:
         self._numbers = self._states.numbers
         self._actuators = Drivetrain.of(robot)
         self._rows: list[Array | None] = []
+        self._speeds: list[Array | None] = []
         self._seen: tuple[Array, Sequence[ControllerOutput | None]] | None = None
         self._compiled: Run | None = None
         self._idle = [*_NOBODY]
@@ -202,9 +204,12 @@ class Block:
         readings: list[_Source] = []
         plots: list[_Source] = []
         for index, c in enumerate(controllers):
+            if not isinstance(c, ControllerChannel):
+                self._speeds.append(None)
             if isinstance(c, ControllerChannel):
                 of = _ControllerRows(c, robot, self.capacity)
                 self._rows.append(of.rows)
+                self._speeds.append(of.speeds)
                 if c.state_topic in ids:
                     template = controller_state_template(ids[c.state_topic], c.joints, c.interfaces)
                     states.append(_Source(c.state_topic, template, partial(self._state, of), index))
@@ -250,9 +255,11 @@ class Block:
             self._compiled(k)
             return
         self._numbers[k] = numbers
-        for rows, output in zip(self._rows, outputs, strict=True):
+        for rows, speeds, output in zip(self._rows, self._speeds, outputs, strict=True):
             if rows is not None and output is not None:
                 rows[k] = output.rows
+                if speeds is not None:
+                    speeds[k] = output.speed
 
     @property
     def idle(self) -> tuple[tuple[int, frozenset[int]], ...]:
@@ -266,9 +273,9 @@ class Block:
         if idle != self._idle[-1][1]:
             self._idle.append((self.count - 1, idle))
         groups = [self._numbers, numbers]
-        for rows, output in zip(self._rows, outputs, strict=True):
+        for rows, speeds, output in zip(self._rows, self._speeds, outputs, strict=True):
             if rows is not None and output is not None and rows[0].size:
-                groups += [rows, output.rows]
+                groups += [rows, output.rows] if speeds is None else [rows, output.rows, speeds, output.speed]
         self._compiled = bind("rows", 0, *groups)
 
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:

@@ -70,7 +70,7 @@ def controller_state_template(channel: int, joints: Sequence[str], interfaces: S
     """control_msgs/JointTrajectoryControllerState.
 
     Runs: reference position, velocity, acceleration; feedback position, velocity, effort; error position, velocity;
-    output, one run per interface, in the order of their fields: position, velocity, acceleration, effort.
+    output, one run per interface, in the order of their fields: position, velocity, acceleration, effort; the speed.
     """
     n = len(joints)
     writer = CdrWriter()
@@ -89,7 +89,7 @@ def controller_state_template(channel: int, joints: Sequence[str], interfaces: S
         for _ in range(3):
             writer.u32(0)
         writer.time(0)
-    writer.f64(1.0)
+    runs.append((writer.f64(1.0), 1))
     return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=tuple(runs))
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.command import JointCommand
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
@@ -43,8 +43,9 @@ class KinematicEngine:
         self._commanded, self._coasts = np.zeros((2, n), dtype=np.bool_)
         state = self._state = WorldState.room(n, m)
         state.position[:] = settings.start
-        for k, body in enumerate(scene.movable):
-            state.body_position[k], state.body_quat_xyzw[k] = body.X_WO.p, body.X_WO.quat_xyzw
+        self._rows = {body.name: k for k, body in enumerate(scene.movable)}
+        for body in scene.movable:
+            self.place(body.name, body.X_WO, np.zeros(6))
 
     def read(self, *, velocities: bool = True) -> WorldState:
         if self._advanced:
@@ -78,6 +79,14 @@ class KinematicEngine:
 
     def detach(self, body: str) -> None:
         """No effect: objects do not move."""
+
+    def body_state(self, body: str) -> tuple[Transform, Array]:
+        state, k = self._state, self._rows[body]
+        return Transform.of(xyz=state.body_position[k], quat_xyzw=state.body_quat_xyzw[k]), np.zeros(6)
+
+    def place(self, body: str, X_WO: Transform, twist: Array) -> None:
+        state, k = self._state, self._rows[body]
+        state.body_position[k], state.body_quat_xyzw[k] = X_WO.p, X_WO.quat_xyzw
 
     def advance(self) -> None:
         self._advanced = True

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, SimulationFailed
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.normalised_urdf import massless_links
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
@@ -114,6 +114,12 @@ class MujocoEngine:
 
     def detach(self, body: str) -> None:
         self._attachments.detach(body)
+
+    def body_state(self, body: str) -> tuple[Transform, Array]:
+        return self._bodies.state_of(body)
+
+    def place(self, body: str, X_WO: Transform, twist: Array) -> None:
+        self._bodies.place(body, X_WO, twist)
 
     def advance(self) -> None:
         model, data, motors = self._model, self._data, self._motors

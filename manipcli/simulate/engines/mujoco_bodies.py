@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
 
@@ -31,6 +31,8 @@ class BodyStates:
         m = len(scene.movable)
         self._poses: Array = data.qpos[len(data.qpos) - 7 * m :].reshape(m, 7)
         self._twists: Array = data.qvel[len(data.qvel) - 6 * m :].reshape(m, 6)
+        self._warm: Array = data.qacc_warmstart[len(data.qvel) - 6 * m :].reshape(m, 6)
+        self._rows = {body.name: k for k, body in enumerate(scene.movable)}
         self._state = state
         offsets: list[Vector] = [(*map(float, body.X_OI.p),) for body in scene.movable]  # type: ignore[misc]
         first = state.numbers.size - 7 * m
@@ -55,14 +57,34 @@ class BodyStates:
 
     def move(self, twists: Array) -> None:
         """Give the bodies velocities (m, 6) of their frames O, linear then angular, in the world."""
-        for pose, twist, own, offset in zip(
-            self._poses.tolist(), twists.tolist(), self._twists, self._offsets, strict=True
-        ):
-            w, *vector = pose[3:]
-            angular = twist[3:]
-            arm = _rotated([w, *vector], offset or (0.0, 0.0, 0.0))
-            own[:3] = np.add(twist[:3], np.cross(angular, arm))
-            own[3:] = _rotated([w, *(-x for x in vector)], angular)
+        for k, twist in enumerate(twists.tolist()):
+            self._move(k, twist)
+
+    def _move(self, k: int, twist: Sequence[float]) -> None:
+        w, *vector = self._poses[k, 3:].tolist()
+        angular = twist[3:]
+        arm = _rotated([w, *vector], self._offsets[k] or (0.0, 0.0, 0.0))
+        self._twists[k, :3] = np.add(twist[:3], np.cross(angular, arm))
+        self._twists[k, 3:] = _rotated([w, *(-x for x in vector)], angular)
+
+    def place(self, body: str, X_WO: Transform, twist: Array) -> None:
+        """Put a body elsewhere; see `Engine.place`. The solver begins without its last acceleration."""
+        k = self._rows[body]
+        x, y, z, w = X_WO.quat_xyzw
+        self._poses[k, 3:] = w, x, y, z
+        self._poses[k, :3] = X_WO.apply(self._offsets[k] or (0.0, 0.0, 0.0))
+        self._move(k, twist.tolist())
+        self._warm[k] = 0.0
+
+    def state_of(self, body: str) -> tuple[Transform, Array]:
+        """See `Engine.body_state`."""
+        k = self._rows[body]
+        w, *vector = self._poses[k, 3:].tolist()
+        arm = np.array(_rotated([w, *vector], self._offsets[k] or (0.0, 0.0, 0.0)))
+        angular = np.array(_rotated([w, *vector], self._twists[k, 3:].tolist()))
+        linear = self._twists[k, :3] - np.cross(angular, arm)
+        X_WO = Transform.of(xyz=self._poses[k, :3] - arm, quat_xyzw=(*vector, w))
+        return X_WO, np.concatenate((linear, angular))
 
     def _read_velocities(self) -> None:
         linear, angular, at = self._linear, self._angular, 0

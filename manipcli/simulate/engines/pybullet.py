@@ -9,11 +9,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Final
 
+import numpy as np
 from pydantic import Field
 
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, SimulationFailed
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.description.lint.checks.joints import MAX_JOINTS
 from manipcli.model.batch_kinematics import still_links
 from manipcli.model.normalised_urdf import engine_urdf, massless_links
@@ -86,6 +87,7 @@ class PybulletEngine:
             (k, *centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
         self._start(robot, settings)
+        self._rows = {body.name: row for row, body in enumerate(scene.movable)}
         self._wrenches = WrenchSensors(p, client, self._robot, gravity=scene.gravity, step=settings.step)
         links = {name: k for k, name in self._links.items()}
         bodies = {body.name: k for body, k in zip(scene.bodies, self._bodies, strict=True)}
@@ -150,15 +152,33 @@ class PybulletEngine:
 
     def _move_bodies(self, twists: Array) -> None:
         """Give the movable bodies their velocities; Bullet's are those of their centres."""
+        for row, twist in enumerate(twists.tolist()):
+            self._move_body(row, twist)
+
+    def _move_body(self, row: int, twist: list[float]) -> None:
         p, client = self._p, self._client
-        for (k, offset, turned), twist in zip(self._movable, twists.tolist(), strict=True):
-            linear, angular = twist[:3], twist[3:]
-            if offset is not None:
-                _, quat = p.getBasePositionAndOrientation(k, client)
-                if turned is not None:
-                    _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
-                linear = [v + w for v, w in zip(linear, _cross(angular, _rotated(quat, offset)), strict=True)]
-            p.resetBaseVelocity(k, linear, angular, physicsClientId=client)
+        k, offset, _ = self._movable[row]
+        x, y, z, *angular = twist
+        if offset is not None:
+            wx, wy, wz = angular
+            ax, ay, az = _cross((wx, wy, wz), _rotated(self._pose(row)[1], offset))
+            x, y, z = x + ax, y + ay, z + az
+        p.resetBaseVelocity(k, (x, y, z), angular, physicsClientId=client)
+
+    def _pose(self, row: int) -> tuple[Vector, tuple[float, ...]]:
+        """Position and quaternion xyzw of the frame O of a movable body."""
+        p, client = self._p, self._client
+        k, offset, turned = self._movable[row]
+        position, quat = p.getBasePositionAndOrientation(k, client)
+        if turned is not None:
+            _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
+        return position if offset is None else _minus(position, _rotated(quat, offset)), quat
+
+    def _velocity(self, row: int, quat: tuple[float, ...]) -> tuple[Vector, Vector]:
+        """Velocity of O and angular velocity of a movable body with this orientation."""
+        k, offset, _ = self._movable[row]
+        linear, angular = self._p.getBaseVelocity(k, self._client)
+        return linear if offset is None else _minus(linear, _cross(angular, _rotated(quat, offset))), angular
 
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
@@ -167,21 +187,15 @@ class PybulletEngine:
         numbers = [s[0] for s in states]
         numbers += [s[1] for s in states]
         numbers += self._motors.efforts(states)
-        for k, offset, turned in self._movable:
-            position, quat = p.getBasePositionAndOrientation(k, client)
-            if turned is not None:
-                _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
-            numbers += position if offset is None else _minus(position, _rotated(quat, offset))
+        for row in range(len(self._movable)):
+            position, quat = self._pose(row)
+            numbers += position
             numbers += quat
         self._pack(self._buffer, 0, *numbers)
         if velocities:
-            for row, (k, offset, _) in enumerate(self._movable):
-                linear, angular = p.getBaseVelocity(k, client)
-                if offset is not None:
-                    arm = _rotated(tuple(state.body_quat_xyzw[row].tolist()), offset)
-                    linear = _minus(linear, _cross(angular, arm))
-                state.body_linear[row] = linear
-                state.body_angular[row] = angular
+            for row in range(len(self._movable)):
+                quat = tuple(state.body_quat_xyzw[row].tolist())
+                state.body_linear[row], state.body_angular[row] = self._velocity(row, quat)
         pulls = self._attachments.measure() if self._attachments else ()
         if self._wrenches:
             self._wrenches.measure(self._contact_points(), pulls)
@@ -200,6 +214,22 @@ class PybulletEngine:
 
     def detach(self, body: str) -> None:
         self._attachments.detach(body)
+
+    def body_state(self, body: str) -> tuple[Transform, Array]:
+        row = self._rows[body]
+        position, quat = self._pose(row)
+        twist = np.concatenate(self._velocity(row, quat))
+        return Transform.of(xyz=position, quat_xyzw=quat), twist
+
+    def place(self, body: str, X_WO: Transform, twist: Array) -> None:
+        p, client, row = self._p, self._client, self._rows[body]
+        k, offset, turned = self._movable[row]
+        quat = tuple(X_WO.quat_xyzw.tolist())
+        if turned is not None:
+            _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), p.invertTransform((0, 0, 0), turned)[1])
+        position = X_WO.p if offset is None else X_WO.apply(offset)
+        p.resetBasePositionAndOrientation(k, position.tolist(), quat, physicsClientId=client)
+        self._move_body(row, twist.tolist())
 
     def advance(self) -> None:
         last = self._substeps - 1

@@ -37,8 +37,7 @@ def written(spec: ControllerSpec) -> Written | None:
     table = next((table for table in TABLES if table.own == spec.type), None)
     if table is None:
         return None
-    interface = spec.interfaces[0] if spec.interfaces else ""
-    word = table.ros2.get(interface) or table.ros2[""]
+    word = _type(table, spec)
     data = table.unshape(_chosen(spec))
     names = _names(table.parameters)
     parameters = {names.get(key, key): value for key, value in data.items()}
@@ -46,6 +45,21 @@ def written(spec: ControllerSpec) -> Written | None:
     parameters = {key: value for key, value in parameters.items() if key not in implied}
     ignored = tuple(key for key in parameters if not _in_ros(table, key))
     return Written(word, parameters, ignored)
+
+
+def type_in_ros(spec: ControllerSpec) -> str | None:
+    """Its type in ROS 2; None if ROS has no such controller."""
+    return next((_type(table, spec) for table in TABLES if table.own == spec.type), None)
+
+
+def types_in_ros(own: str) -> tuple[str, ...]:
+    """The types of ROS 2 of our type `own`."""
+    return tuple(word for table in TABLES if table.own == own for word in table.ros2.values())
+
+
+def _type(table: Table, spec: ControllerSpec) -> str:
+    interface = spec.interfaces[0] if spec.interfaces else ""
+    return table.ros2.get(interface) or table.ros2[""]
 
 
 def _chosen(spec: ControllerSpec) -> Data:

@@ -305,21 +305,21 @@ def test_48_speed_scaling():
     bench = Bench(controller(), ideal=True)
     handle = bench.controller.send_goal(goal)
     bench.run(30)
-    bench.controller.set_speed_scaling(0.0)
+    bench.controller.scaling.set(0.0, at_once=True)
     bench.run(1)
     frozen = bench.run(1).command.copy()
     assert np.array_equal(bench.run(100).command, frozen)
     assert not bench.controller.output.velocity.any()
     assert handle.active
     assert handle.feedback().elapsed == pytest.approx(0.29)
-    assert bench.controller.set_speed_scaling(1.0)
+    assert bench.controller.scaling.set(1.0, at_once=True)
     assert bench.end(handle) == pytest.approx(0.71)
-    assert bench.controller.set_speed_scaling(0.765)
-    assert bench.controller.speed_scaling == 0.765
-    assert bench.controller.set_speed_scaling(0.45)
+    assert bench.controller.scaling.set(0.765, at_once=True)
+    assert bench.controller.scaling.factor == 0.765
+    assert bench.controller.scaling.set(0.45, at_once=True)
     for ignored in (-0.12, math.nan, math.inf):
-        assert not bench.controller.set_speed_scaling(ignored)
-    assert bench.controller.speed_scaling == 0.45
+        assert not bench.controller.scaling.set(ignored, at_once=True)
+    assert bench.controller.scaling.factor == 0.45
 
 
 def test_49_an_immediate_replacement_does_not_jump():

@@ -315,7 +315,7 @@ def test_speed_scales_the_reference_as_time_does():
     run(controller, 1)
     controller.send_goal(to(at(1.0, 1.0, 0.0, 0.0)))
     run(controller, 31, first=1)  # s = 0.3
-    controller.set_speed_scaling(0.5)
+    controller.scaling.set(0.5, at_once=True)
     whole = JointTrajectory(["j"], [at(1.0, 1.0, 0.0, 0.0)], at(0.0, 0.0, 0.0, 0.0))
     for k in range(32, 60):
         s = 0.3 + 0.5 * (k - 31) * PERIOD
@@ -333,7 +333,7 @@ def test_a_goal_that_replaces_another_begins_with_its_velocity_and_acceleration_
     new, same = made("position", "velocity", "acceleration"), made("position", "velocity", "acceleration")
     for controller in (new, same):
         run(controller, 1)
-        controller.set_speed_scaling(speed)
+        controller.scaling.set(speed, at_once=True)
         controller.send_goal(to(at(1.0, 1.0, 0.0, 0.0)))
         run(controller, 20, first=1)
     new.send_goal(to(at(2.0, 1.0, 0.0, 0.0)))
@@ -434,7 +434,7 @@ def test_two_runs_are_equal():
         run(controller, 1)
         controller.send_goal(to(at(1.0, 0.3), at(-1.0, 0.9)))
         rows = [run(controller, 40, first=1)]
-        controller.set_speed_scaling(0.7)
+        controller.scaling.set(0.7, at_once=True)
         controller.send_goal(TrajectoryGoal(to(at(0.5, 0.5)), start_time=0.6))
         rows.append(run(controller, 120, first=41))
         return np.vstack(rows)
@@ -515,13 +515,13 @@ def test_a_goal_that_replaces_a_paused_trajectory_starts_at_rest_and_goes_on_wit
     if begins == "now":
         controller.send_goal(TrajectoryGoal(to(at(1.0, 1.0))))
         run(controller, 50)
-    controller.set_speed_scaling(0.0)
+    controller.scaling.set(0.0, at_once=True)
     first = run(controller, 2, first=50)
     controller.send_goal(TrajectoryGoal(to(at(2.0, 1.0, velocity=0.0, acceleration=0.0))))
     paused = run(controller, 10, first=52)
     np.testing.assert_array_equal(paused[:, 1], first[-1][1])
     np.testing.assert_array_equal(paused[:, 2], 0.0)
-    controller.set_speed_scaling(1.0)
+    controller.scaling.set(1.0, at_once=True)
     after = run(controller, 110, first=62)
     assert np.isfinite(after).all()
     assert after[-1][1] == pytest.approx(2.0)
