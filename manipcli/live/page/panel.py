@@ -150,7 +150,7 @@ class Panel:
                 follows = self._controls.follows(drive, snapshot, now)
                 for slider, k in zip(sliders, drive.columns, strict=True):
                     slider.disabled = not active or slider.max <= slider.min
-                    value = slider.step * round(float(snapshot.state.position[k]) / slider.step)
+                    value = round(slider.step * round(float(snapshot.state.position[k]) / slider.step), 9)
                     value = min(max(value, slider.min), slider.max)
                     if follows and abs(value - slider.value) > 0.5 * slider.step:
                         slider.value = value  # type: ignore[misc]  # viser's setter hides from mypy

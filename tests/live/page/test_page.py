@@ -44,6 +44,7 @@ class Served:
     feed: Feed
     inbox: Inbox
     state: WorldState
+    readers: frozenset[str]
     ticks: int = 0
 
     def tick(self) -> list[Command]:
@@ -54,7 +55,7 @@ class Served:
         for command in found:
             if command.name.endswith("list_controllers"):
                 command.answer(Answer(True, dict(LISTED)))
-        return [command for command in found if not command.name.endswith("list_controllers")]
+        return [command for command in found if command.name not in self.readers]
 
     def live(self, visitor: Visitor, condition: Callable[[], object]) -> list[Command]:
         """Tick until something is true for a visitor; all that was commanded."""
@@ -79,7 +80,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     feed, inbox = Feed(0.001), Inbox()
     scene = task.true.scene
     with LivePage(task.robot, scene, manager.controllers, offer, feed, inbox.put, access=Access(TOKEN), port=0) as page:
-        yield Served(page, feed, inbox, WorldState.room(len(task.robot.moving_joints), len(scene.movable)))
+        yield Served(
+            page, feed, inbox, WorldState.room(len(task.robot.moving_joints), len(scene.movable)), offer.readers
+        )
 
 
 def test_a_slider_commands_and_follows_the_robot(served: Served) -> None:
@@ -114,7 +117,7 @@ def test_without_the_token_there_is_nothing_to_command_with(served: Served) -> N
         for uuid, one in visitor.inputs.items():  # forged: the elements of the other visitor
             if "value" in one:
                 reader.set(uuid, value=0.1)
-        reader.send(type="GuiFormDirtyMessage", uuid="x", dirty=True)
+        reader.send(type="GuiFormDirtyMessage", uuid="x")
         before = time.monotonic()
         assert served.live(visitor, lambda: time.monotonic() - before > 0.5) == []
 
