@@ -1,4 +1,4 @@
-"""`manipcli serve TASK`: a running robot that clients of rosbridge can command."""
+"""`manipcli serve TASK`: a running robot that clients of rosbridge, and a page for browsers, can command."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def serve(
     allow_outside: AllowOutside = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the result.")] = False,
 ) -> ExitCode:
-    """Simulate a task's scene live, and let clients of rosbridge command its robot.
+    """Simulate a task's scene live, and let clients of rosbridge and browsers command its robot.
 
     The controllers hold; the steps are not run. The session is recorded. Press Ctrl-C to end it.
     """
@@ -77,7 +77,7 @@ def serve(
         from manipcli.report import text
         from manipcli.report.run_report import RunReport
 
-        live = LiveOptions(Access(token, host), port, factor, wall, not no_page, page_port)
+        live = LiveOptions(Access(token, host), port, factor, wall, page=not no_page, page_port=page_port)
 
         urls: list[str] = []
 
