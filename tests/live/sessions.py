@@ -65,10 +65,11 @@ def serving(
     token: str | None = TOKEN,
     task: Path | str = SMALL,
     speed: float | None = None,
+    page: bool = False,
 ) -> Path:
     """Serve a task, a file or its text, while `use` runs with its URL; returns the log.
 
-    `speed`: simulated seconds per second; None: as fast as possible.
+    `speed`: simulated seconds per second; None: as fast as possible. `page`: use the page for browsers and its URL.
     """
     file, log = folder / "small.yaml", folder / "session.mcap"
     if isinstance(task, Path):
@@ -84,7 +85,7 @@ def serving(
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=speed)
+        options = LiveOptions(Access(token), port=0, speed=speed, page=page, page_port=0)
         try:
             _, failure = pipeline.serve_task(
                 file, options, log=log, between=between, announce=announced.put, allow_outside=True
@@ -97,8 +98,9 @@ def serving(
     thread = threading.Thread(target=serve)
     thread.start()
     try:
-        url = announced.get(timeout=60)
-        assert url, failures
+        for _ in range(1 + page):
+            url = announced.get(timeout=60)
+            assert url, failures
         asyncio.run(_within(use, url))
     finally:
         over.set()
