@@ -43,11 +43,12 @@ from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
 from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
 from manipcli.spec.simulation import SimulationSpec
+from manipcli.task.bare_task import bare_task
 from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.explanation import Explanation, explained
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
-from manipcli.task.part import LIVE
+from manipcli.task.part import LIVE, LIVE_RUN
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
 from manipcli.task.task import Task
 from manipcli.task.variants import overrides_of, simulation_of
@@ -57,6 +58,7 @@ __all__ = [
     "Diagnostic",
     "Plan",
     "Task",
+    "bare_task",
     "check_files",
     "compare_runs",
     "controllers_of",
@@ -270,28 +272,31 @@ def serve_task(
     A reset ends its log, and begins the next session with a log of its own.
 
     Args:
-        path: the task file; its steps are not run.
+        path: the task file.
         live: how it is served.
         log: path of the log; default `runs/<task>@live.mcap`, which is replaced. The next ones end with -2, -3, ...
         force: replace `log` if it exists.
         embed_meshes: see `run_task`.
-        progress: receives warnings.
+        progress: receives warnings and steps.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        announce: called with the URL when clients can connect.
+        announce: called with the URL when clients can connect and the scene has settled.
         ended: called with what is returned when a reset has ended a session.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the last log by the expectations of the task that need no step; and why the simulation failed, or
-        "".
+        The verdict on the last log, without steps by the expectations of the task that need none; and why the
+        simulation failed, or "". The verdict on a task that cannot be planned has no log.
 
     Raises:
         InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
         RecordingFailed: writing the log failed.
     """
     task, loading = timed(_load, path, progress, options, None)
-    task = replace(task, part=LIVE)
-    plan = plan_task(task)
+    task = replace(task, part=LIVE_RUN if live.run else LIVE)
+    stage = _plan if live.run else _held
+    (plan, warnings), planning = timed(stage, task, progress, None)
+    if isinstance(plan, Verdict):
+        return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings), ""
     where = log if log is not None else default_log(task)
 
     def late(text: str) -> None:
@@ -304,12 +309,13 @@ def serve_task(
             verdict, timing = _record(
                 task, plan, where, overwrite=overwrite, embed_meshes=embed_meshes, progress=progress, live=outside
             )
-            timing, loading = replace(timing, load=loading), 0.0
-            report = RunReport(verdict, timing, log=str(where), warnings=task.warnings, meshes=mesh_files(task))
+            timing, loading = replace(timing, load=loading, plan=planning + timing.plan), 0.0
+            report = RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
             if not outside.again():
                 return report, outside.failure
             ended(report, outside.failure)
             where, number = next_log(first, number, overwrite=overwrite)
+            plan = plan_task(task)  # a planner that has re-planned would not plan the same again
 
 
 def verify_log(
@@ -375,6 +381,11 @@ def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Pl
     return plan, (*task.warnings, *findings)
 
 
+def _held(task: Task, progress: Progress, prepared: None) -> tuple[Plan, tuple[Diagnostic, ...]]:
+    """As `_plan`, of a session without the steps of its task."""
+    return plan_task(task), task.warnings
+
+
 def _record(
     task: Task,
     plan: Plan,
@@ -385,13 +396,13 @@ def _record(
     progress: Progress,
     live: Outside | None = None,
 ) -> tuple[Verdict, Timing]:
-    """Simulates into a log, which is judged before it gets its name; `live`: a session instead of steps."""
+    """Simulates into a log, which is judged before it gets its name; `live`: a session that clients can command."""
     manager = build_manager(task, plan.planner.kinematics)
     with open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder:
         if live is None:
             end, simulating = timed(simulate, task, plan, manager, recorder, progress)
         else:
-            end, simulating = timed(simulate_live, task, plan, manager, recorder, live)
+            end, simulating = timed(simulate_live, task, plan, manager, recorder, live, progress)
         recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
         verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))

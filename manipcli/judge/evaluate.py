@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
+
+import numpy as np
 
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import Seams, leaves
 from manipcli.conditions.robustness import NotEvaluated
-from manipcli.conditions.state_window import StateWindow
+from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
 from manipcli.judge.self_contacts import SelfContact, SelfContacts
@@ -39,8 +42,9 @@ def examine(
     seam: Seams,
     physics: bool,
     steps: tuple[StepOutcome, ...],
+    until: float = inf,
 ) -> Examined:
-    """The outcomes of `expect`.
+    """The outcomes of `expect` before the time `until` [s].
 
     Every span is read, even without expectations, so damage anywhere in the file is detected. Only the last half second
     is kept in memory.
@@ -50,7 +54,7 @@ def examine(
     asked: list[Expected] = []
     stateless = [all(seam[leaf.name].stateless for leaf in leaves(expectation.condition)) for expectation in expect]
     last: StateWindow | None = None
-    end = 0.0
+    end = judged = 0.0
     self_contacts = SelfContacts()
     for span in recording.spans:
         self_contacts.add(span.contacts)
@@ -73,6 +77,10 @@ def examine(
             )
             asked = [Expected(expectation, world, steps, seam) for expectation in expect]
         window = successive.next(span)
+        if window.times[0] >= until - ROUNDING:
+            continue
+        window = window.part(0, int(np.searchsorted(window.times, until - ROUNDING)))
+        judged = float(window.times[-1])
         last = every = at_every_tick(window, last, recording.period)
         for expected, uses_no_state in zip(asked, stateless, strict=True):
             expected.look(every if uses_no_state else window)
@@ -80,7 +88,7 @@ def examine(
     if successive is None:
         missing = order if isinstance(order, NotEvaluated) else NotEvaluated("no tick was recorded")
         return Examined(tuple(outcome(name, missing) for name in names), end, self_contacts.found())
-    found = (outcome(name, expected.found(end)) for name, expected in zip(names, asked, strict=True))
+    found = (outcome(name, expected.found(judged)) for name, expected in zip(names, asked, strict=True))
     return Examined(tuple(found), end, self_contacts.found())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.state_window import ROUNDING
@@ -14,7 +15,7 @@ from manipcli.judge.evaluate import examine
 from manipcli.judge.outside import not_asked, of_part, unless_outside
 from manipcli.judge.part import PART, RunPart
 from manipcli.judge.saturations import Saturations
-from manipcli.judge.steps import ENDED, RunStatus, block_outcomes, left_out, step_outcomes
+from manipcli.judge.steps import ENDED, STEPS_ENDED, RunStatus, block_outcomes, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import Recording
@@ -62,11 +63,12 @@ def judge(
         scene=scene,
         seam=CONDITIONS,
         physics=run.get("physics", "") == "full",
-        steps=steps,
+        steps=tuple(step for step in steps if not step.excused or step.started is None),  # without those of clients
+        until=next((event.time for event in recording.events if event.kind == STEPS_ENDED), inf),
     )
     outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes[: len(expect)])
     unwritten = tuple(each for each in examined.outcomes[len(expect) :] if each.outcome != "not_evaluated")
-    if part is not None:
+    if part is not None and part.partial:
         outcomes = tuple(
             unless_outside(outcome, spec, part, steps, CONDITIONS)
             for outcome, spec in zip(outcomes, expect, strict=True)
@@ -165,13 +167,16 @@ def _verdict(found: Verdict, cause: str) -> tuple[VerdictWord, str]:
         if first not in ("", undone.text):
             why += f" (first attempt: {first})"
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ').replace('timeout', 'timed out')}{why}"
-    if not steps and not (found.part is not None and found.part.live):
+    held = found.part is not None and found.part.live and found.part.partial
+    if not steps and not held:
         return "failed", "the recording has no steps"
     asked = [expectation for expectation in (*expectations, *found.implied) if not expectation.excused]
     unmet = next((expectation for expectation in asked if expectation.missed), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
+    if held:
+        return "passed", _met(expectations) if expectations else "nothing to judge: the task has no expectations"
     return "passed", f"{_done(steps)}{', ' if expectations else '; '}{_met(expectations)}"
 
 

@@ -7,6 +7,8 @@
 - What must hold at the end of the task is not evaluated if the run was asked to stop before.
 - `eventually` that does not hold in the part is not evaluated: it may hold in the rest.
 - All others are judged on the part, and fail as usual.
+
+Steps of clients of a live session are not steps of the task either, and do not count.
 """
 
 from __future__ import annotations
@@ -23,14 +25,14 @@ from manipcli.spec.condition import END, ExpectationSpec
 
 def not_asked(steps: tuple[StepOutcome, ...], part: RunPart | None) -> tuple[StepOutcome, ...]:
     """The outcomes, with the steps outside the part excused."""
-    if part is None:
+    if part is None or not part.partial:
         return steps
     ids = [step.id for step in steps]
     first = ids.index(part.first) if part.first in ids else 0
     last = ids.index(part.last) if part.last in ids else len(ids) - 1
     found = []
     for k, step in enumerate(steps):
-        if first <= k <= last and not part.live:
+        if step.excused or (first <= k <= last and not part.live):
             found.append(step)
         else:
             why = _why(part, before=k < first)

@@ -18,7 +18,8 @@ class RunPart:
         first, last: ids of its first and its last step; "" for those of the task.
         log, sha256, time: name and checksum of the log of the start state, and its time [s] there; "" and 0 for the
             start of the task.
-        live: whether it was a live session, which runs no step.
+        live: whether it was a live session.
+        runs: whether a live session ran the steps, and not only held.
     """
 
     first: str = ""
@@ -27,11 +28,17 @@ class RunPart:
     sha256: str = ""
     time: float = 0.0
     live: bool = False
+    runs: bool = False
+
+    @property
+    def partial(self) -> bool:
+        """Whether steps of the task were left out."""
+        return not self.runs
 
     def __str__(self) -> str:
         """`part of the task: from 'place_1', in the state of pick.mcap at 5.20 s; not the uninterrupted run`."""
         if self.live:
-            return "live session, without the steps of the task"
+            return f"live session, {'with' if self.runs else 'without'} the steps of the task"
         words = []
         if self.first:
             words.append(
@@ -49,6 +56,7 @@ class RunPart:
             **({"from": self.first, **origin} if self.first else {}),
             **({"until": self.last} if self.last else {}),
             **({"live": "true"} if self.live else {}),
+            **({"runs": "true"} if self.runs else {}),
             "text": str(self),
         }
 
@@ -61,5 +69,5 @@ class RunPart:
             time = 0.0
         return RunPart(
             values.get("from", ""), values.get("until", ""), values.get("origin", ""), values.get("origin_sha256", ""),
-            time, "live" in values,
+            time, "live" in values, "runs" in values,
         )  # fmt: skip

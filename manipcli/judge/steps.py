@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
 from typing import get_args
@@ -23,6 +24,8 @@ class RunStatus(StrEnum):
     INTERRUPTED = "interrupted"
 
 
+STEPS_ENDED = "steps_ended"
+"""Kind of the event at the end of the steps of a task in a live session; what clients do later is not judged."""
 ENDED = (RunStatus.COMPLETE, RunStatus.FAILED)
 """The statuses of a run that was not interrupted."""
 
@@ -30,19 +33,21 @@ ENDED = (RunStatus.COMPLETE, RunStatus.FAILED)
 def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutcome, ...]:
     """The outcome of each step, in the order of the plan; without a plan in the log, in the order of their starts.
 
+    Steps that are not in the plan are those that clients of a live session asked for; they are excused.
+
     A step without an end is `interrupted` if the run was, else `failed`; a step without a start is `not_run`, or
     `skipped` if its branch was not taken. The last attempt counts.
     """
     plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
     planned = [(step.id, step.verb, step.planned_duration) for step in plan.steps]
     known = {step_id for step_id, _, _ in planned}
+    own = frozenset(known)
     for event in recording.events:
         if event.kind == "step_started" and event.step not in known:
             known.add(event.step)
             planned.append((event.step, event.verb, 0.0))
-    return tuple(
-        _outcome(step_id, verb, duration, recording.events, interrupted) for step_id, verb, duration in planned
-    )
+    outcomes = (_outcome(step_id, verb, duration, recording.events, interrupted) for step_id, verb, duration in planned)
+    return tuple(replace(each, excused=True) if own and each.id not in own else each for each in outcomes)
 
 
 def block_outcomes(recording: Recording, *, interrupted: bool) -> tuple[BlockOutcome, ...]:
@@ -89,7 +94,7 @@ def left_out(recording: Recording) -> str:
     if EVENTS in recording.silent:
         return recording.unknown(EVENTS)
     outcomes = step_outcomes(recording, interrupted=True)
-    begun = next((step for step in outcomes if step.outcome == "interrupted"), None)
+    begun = next((step for step in outcomes if step.outcome == "interrupted" and step.ended is None), None)
     return "" if begun is None else f"the end of step '{begun.id}' is missing, though the run finished"
 
 

@@ -77,7 +77,7 @@ class StepOutcome:
     @property
     def went_wrong(self) -> bool:
         """Whether it ran and was not done, and the task does not tolerate that."""
-        return self.outcome not in ("done", "not_run", "skipped") and not self.tolerated
+        return self.outcome not in ("done", "not_run", "skipped") and not self.tolerated and not self.excused
 
 
 @dataclass(frozen=True, slots=True)

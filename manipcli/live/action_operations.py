@@ -15,7 +15,7 @@ from manipcli.live import command as words
 from manipcli.live.command import Answer
 from manipcli.live.connection import Connection
 from manipcli.live.fields import MAX_NAME, Refused, arguments, check_type, near, rooted, text_of
-from manipcli.live.interface import goal_type
+from manipcli.live.offer import goal_type
 from manipcli.record.json_message import definition
 
 MAX_GOALS: Final = 100

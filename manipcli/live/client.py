@@ -11,6 +11,7 @@ from manipcli.live.action_operations import ActionOperations
 from manipcli.live.budget import RATE, Budget
 from manipcli.live.command import Answer
 from manipcli.live.connection import LEVELS, Connection, Services
+from manipcli.live.drops import report_drops
 from manipcli.live.fields import Refused, text_of
 from manipcli.live.frames import BadFrame, read_frame
 from manipcli.live.service_operations import ServiceOperations
@@ -81,6 +82,10 @@ class Client:
             self._actions.result(frame, Answer(False, {}, text=text))
         else:
             self.status("error", text, frame.get("id"))
+
+    def report_drops(self) -> list[str]:
+        """See `drops.report_drops`."""
+        return report_drops(self._connection)
 
     def _within_rate(self) -> bool:
         now = time.monotonic()

@@ -9,7 +9,7 @@ from typing import Final
 
 from manipcli.live.command import Answer, Command
 from manipcli.live.fields import Refused
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.live.outbox import Outbox
 from manipcli.live.rosapi import Rosapi
 
@@ -48,13 +48,13 @@ class Connection:
 
     Attributes:
         outbox: what waits to be sent.
-        level: of the status messages that it wants.
+        level: of the status messages that it wants; at first that of the protocol.
     """
 
     def __init__(self, number: int, *, commands: bool, services: Services) -> None:
         self.number, self.services = number, services
         self.outbox = Outbox()
-        self.level = "warning"
+        self.level = "error"
         self._commands = commands
 
     @property

@@ -1,9 +1,8 @@
-"""What a live session offers: topics, actions and services with their types, from the controllers of the robot."""
+"""The endpoints of a live session, and what it offers with them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from manipcli.control.controller import Controller
@@ -17,12 +16,13 @@ from manipcli.live.interfaces import (
     parameters,
     path,
     simulation,
+    task,
 )
+from manipcli.live.offer import CLOCK, Offer
 from manipcli.record import schemas
 from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
 from manipcli.task.task import Task
 
-CLOCK: Final = "/clock"
 INTERFACES: Final = (
     controllers.endpoints,
     path.endpoints,
@@ -32,6 +32,7 @@ INTERFACES: Final = (
     parameters.endpoints,
     simulation.endpoints,
     entities.endpoints,
+    task.endpoints,
 )
 """Groups of endpoints: (task, controllers) -> its endpoints."""
 
@@ -39,32 +40,6 @@ INTERFACES: Final = (
 def endpoints_of(task: Task, loaded: Sequence[Controller]) -> tuple[Endpoint, ...]:
     """All endpoints of a robot with these controllers."""
     return tuple(endpoint for interface in INTERFACES for endpoint in interface(task, loaded))
-
-
-@dataclass(frozen=True, slots=True)
-class Offer:
-    """Names and types; plain data, read by all threads.
-
-    Attributes:
-        published: topics that clients can subscribe, and their types.
-        latched: those whose last message a new subscriber gets at once.
-        received: topics that clients can publish.
-        actions: action servers.
-        services: services that the control loop answers.
-        readers: those of them that change nothing.
-    """
-
-    published: Mapping[str, str]
-    latched: frozenset[str]
-    received: Mapping[str, str]
-    actions: Mapping[str, str]
-    services: Mapping[str, str]
-    readers: frozenset[str]
-
-    @property
-    def topics(self) -> dict[str, str]:
-        """All topics, out and in."""
-        return {**self.published, **self.received}
 
 
 def offer_of(endpoints: Iterable[Endpoint], recorded: Sequence[Recorded]) -> Offer:
@@ -81,13 +56,3 @@ def offer_of(endpoints: Iterable[Endpoint], recorded: Sequence[Recorded]) -> Off
         services=names["service"],
         readers=frozenset(endpoint.name for endpoint in endpoints if endpoint.reads),
     )
-
-
-def goal_type(action_type: str) -> str:
-    """`control_msgs/FollowJointTrajectory_Goal` of `control_msgs/action/FollowJointTrajectory`."""
-    return f"{action_type.replace('/action/', '/')}_Goal"
-
-
-def request_type(service_type: str) -> str:
-    """`controller_manager_msgs/SwitchController_Request` of `controller_manager_msgs/srv/SwitchController`."""
-    return f"{service_type.replace('/srv/', '/')}_Request"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from manipcli.control.manager import ControllerManager
 from manipcli.live.command import Goal
+from manipcli.live.live_steps import LiveSteps
 from manipcli.live.pace import Pace
 from manipcli.live.play_state import PlayState
 from manipcli.record.write.recorder import Recorder
@@ -25,6 +26,7 @@ class LiveRobot:
         recorder: of the session.
         observer: records goals.
         pace: of the control loop.
+        steps: does steps of the task and of clients.
         goals: the active goals of clients.
         play: whether it plays, is paused or ends.
     """
@@ -35,6 +37,7 @@ class LiveRobot:
     recorder: Recorder
     observer: Observer
     pace: Pace
+    steps: LiveSteps
     goals: list[Goal] = field(default_factory=list)
     play: PlayState = field(default_factory=PlayState)
 

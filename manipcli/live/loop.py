@@ -18,6 +18,7 @@ from manipcli.live.feed import Feed
 from manipcli.live.interface import endpoints_of
 from manipcli.live.live_robot import LiveRobot
 from manipcli.live.live_session import LiveSession, SessionOver
+from manipcli.live.live_steps import LiveSteps
 from manipcli.live.obey import Obedience
 from manipcli.live.pace import Pace
 from manipcli.live.play_state import Reset
@@ -25,7 +26,8 @@ from manipcli.live.source import Source
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.execute import SimulationEnd, live_world, open_session, record_saturations
 from manipcli.run.live_conditions import Live
-from manipcli.run.observer import SILENT, Observer
+from manipcli.run.observer import SILENT, Observer, Progress
+from manipcli.simulate.quiet import original_stdout
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
@@ -47,7 +49,7 @@ class Outside:
         feed: takes what clients see.
         pace: of the loop.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        ready: called before the scene is opened; commands wait until it has settled.
+        ready: called when the scene of the first session has settled; before, clients can connect, and commands wait.
         begun: called when the scene is open and has settled.
         failure: why the simulation failed; "" if it did not.
         reset: the session that comes next, if it ended by a reset.
@@ -116,35 +118,50 @@ class _Turn:
 
 
 def simulate_live(
-    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, outside: Outside
+    task: Task,
+    plan: Plan,
+    manager: ControllerManager,
+    recorder: Recorder,
+    outside: Outside,
+    progress: Progress = SILENT,
 ) -> SimulationEnd:
-    """Open the scene and hold, obeying commands, until the session ends or the simulation fails.
+    """Open the scene, do the steps if the session runs them, and hold, until it ends or the simulation fails.
 
-    A session that ends as asked, also by a signal, is complete.
+    Commands are obeyed all the time. A session that ends as asked, also by a signal, is complete.
     """
-    outside.ready()  # before the scene is open: from there on stdout is stderr, for the engine
+    replanning = 0.0
     try:
         with open_session(task, plan, manager, LiveSession) as session:
             live = Live(live_world(task, plan, session), manager.controllers, session.period)
-            observer = Observer(recorder, live, SILENT, session.period)
+            runs = task.part.last is None
+            observer = Observer(recorder, live, progress if runs else SILENT, session.period)
             outside.feed.observer = observer
             session.restart_clock(outside.feed)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
-            robot = LiveRobot(task, plan, session, recorder, observer, outside.pace)
+            steps = LiveSteps(task, plan, session, recorder, live, observer, progress, outside.pace)
+            robot = LiveRobot(task, plan, session, recorder, observer, outside.pace, steps)
             obedience = Obedience(robot, endpoints_of(task, manager.controllers))
             session.begin(_Turn(robot, obedience, outside))
+            with original_stdout():
+                outside.ready()
             outside.begun()
             outside.pace.start()
             try:
+                if runs:
+                    steps.run()
                 while True:
-                    session.tick()
+                    steps.rest()
             except SessionOver:
                 outside.reset = robot.play.reset
-                obedience.abort("the session ended" if outside.reset is None else "the simulation was reset")
+                why = "the session ended" if outside.reset is None else "the simulation was reset"
+                steps.abandon(why)
+                obedience.after_tick()
+                obedience.abort(why)
             finally:
+                replanning = steps.planning.seconds
                 record_saturations(session, recorder)
     except SimulationFailed as failure:
         outside.failure = str(failure)
-        return SimulationEnd(RunStatus.FAILED, outside.failure, 0.0)
-    return SimulationEnd(RunStatus.COMPLETE, "", 0.0)
+        return SimulationEnd(RunStatus.FAILED, outside.failure, replanning)
+    return SimulationEnd(RunStatus.COMPLETE, "", replanning)

@@ -12,7 +12,9 @@ from manipcli.live import command as words
 from manipcli.live.command import Answer, Command, Values
 from manipcli.live.endpoint import KINDS, Endpoint, Kind
 from manipcli.live.interfaces.controllers import ABORTED
+from manipcli.live.interfaces.simulation import FAILED as OPERATION_FAILED
 from manipcli.live.live_robot import LiveRobot
+from manipcli.record.json_message import definition, from_json
 from manipcli.run.observer import FEEDBACK_PERIOD
 
 
@@ -65,16 +67,17 @@ class Obedience:
     def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
         if logged:
             self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
-        command.answer(self._failed(command, text, code))
-
-    def _failed(self, command: Command, text: str, code: ErrorCode) -> Answer:
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}
-        return Answer(False, values, text=text, status=ABORTED)
+        command.answer(Answer(False, values, text=text, status=ABORTED))
 
     def abort(self, why: str) -> None:
         """End all goals of clients as aborted, and all services that wait."""
         for goal in self._robot.goals:
-            goal.command.answer(self._failed(goal.command, why, ErrorCode.INVALID_GOAL))
+            endpoint = self._endpoints.get(("action", goal.command.name))
+            if endpoint is None:
+                goal.command.answer(Answer(False, {}, text=why))
+            else:
+                goal.command.answer(Answer(True, _aborted(endpoint.type, why), status=ABORTED))
         self._robot.goals.clear()
 
     def after_tick(self) -> None:
@@ -90,3 +93,12 @@ class Obedience:
             if answer.status is not None:
                 goals.remove(goal)
             goal.command.answer(answer)
+
+
+def _aborted(action: str, why: str) -> Values:
+    """The result of a goal of an action that ends with the session: everything 0, and the reason where it has room."""
+    empty = from_json(definition(f"{action}_Result"), {})
+    known: Values = {"error_code": int(ErrorCode.INVALID_GOAL), "error_string": why}
+    if "result" in empty:
+        known["result"] = {"result": OPERATION_FAILED, "error_message": why}
+    return {name: known.get(name, value) for name, value in empty.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
@@ -22,6 +23,7 @@ class Subscription:
         throttle: [s] least wall time between two messages.
         waiting: texts, at most as many as the client asked for.
         dropped: texts that were replaced by later ones.
+        names: of the topic as the client wrote them, with or without a slash: roslibjs waits for its own word.
     """
 
     topic: str
@@ -29,6 +31,14 @@ class Subscription:
     waiting: deque[str]
     dropped: int = 0
     next: float = 0.0
+    names: frozenset[str] = frozenset()
+
+    def addressed(self, text: str) -> list[str]:
+        """A text of this topic, under each of the names."""
+        if self.names <= {self.topic}:
+            return [text]
+        own = f'"topic":{json.dumps(self.topic)}'
+        return [text.replace(own, f'"topic":{json.dumps(name)}', 1) for name in sorted(self.names)]
 
     def offer(self, text: str, now: float) -> bool:
         """Queue a text unless it comes too early after the last one; `now`: wall time [s]."""
@@ -76,7 +86,7 @@ class Outbox:
         self._answers.clear()
         for subscription in [*self.subscriptions.values()]:
             if subscription.waiting:
-                found.append(subscription.waiting.popleft())
+                found += subscription.addressed(subscription.waiting.popleft())
                 if subscription.waiting:
                     self.ready.set()
         return found

@@ -1,16 +1,15 @@
-"""Messages for subscribers, made in the thread of the network by the encoders of the log."""
+"""Messages for clients, made in the process of the network by the encoders of the log."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
-from manipcli.live.feed import Sample
-from manipcli.live.interface import CLOCK, Offer
+from manipcli.core.geometry import Array
+from manipcli.live.offer import CLOCK, Offer
+from manipcli.live.sample import Sample
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
@@ -26,82 +25,83 @@ from manipcli.scene.scene import Scene
 
 
 class Publisher:
-    """Makes the text of `publish` operations.
+    """Makes messages in CDR, and their text in `publish` operations.
 
     Args:
         offer: the topics.
         robot, scene: of the session.
         recorded: channels of its controllers.
         period: [s] of its control loop.
+
+    Attributes:
+        state: of the last sample.
+        outputs: of the controllers in the last sample.
+        latched: the last message of each latched topic, in CDR.
     """
 
     def __init__(
         self, offer: Offer, robot: RobotModel, scene: Scene, recorded: Sequence[Recorded], period: float
     ) -> None:
         self.offer = offer
-        self._robot, self._scene, self._recorded, self._period = robot, scene, recorded, period
+        self.robot, self.scene, self.recorded, self.period = robot, scene, recorded, period
+        self.state = WorldState.room(len(robot.moving_joints), len(scene.movable))
+        self.outputs: Sequence[tuple[Array, Array] | None] = ()
+        self.latched = dict(begin_messages(robot, scene, recorded))
         self._table = {channel.topic: channel for channel in channel_table(recorded)}
+        self._names = {channel.id: topic for topic, channel in self._table.items()}
+        self._kinds = {
+            topic: read_definition(kind, self._table[topic].definition)
+            if topic in self._table and self._table[topic].definition
+            else definition(kind)
+            for topic, kind in offer.published.items()
+        }
         self._topics: frozenset[str] = frozenset()
         self._block: Block | None = None
-        self._state = WorldState.room(len(robot.moving_joints), len(scene.movable))
-        self._last: dict[str, str] = {}
-        for topic, data in begin_messages(robot, scene, recorded):
-            self.event(topic, data)
 
-    def event(self, topic: str, data: bytes) -> str:
-        """The text of a message in CDR; kept for later subscribers if its topic is latched."""
-        text = self._text(topic, data)
-        if topic in self.offer.latched:
-            self._last[topic] = text
-        return text
-
-    def latched(self, topic: str) -> str | None:
-        """The last text of a latched topic; None before its first message."""
-        return self._last.get(topic)
+    def ns(self, tick: int) -> int:
+        """The simulated time [ns] of a tick."""
+        return round(tick * self.period * 1e9)
 
     def clock(self, tick: int) -> dict[str, int]:
         """The simulated time of a tick, builtin_interfaces/Time."""
-        sec, nanosec = divmod(round(tick * self._period * 1e9), NS_PER_S)
+        sec, nanosec = divmod(self.ns(tick), NS_PER_S)
         return {"sec": sec, "nanosec": nanosec}
 
-    def sample(self, sample: Sample, wanted: Iterable[str]) -> dict[str, str]:
-        """The texts of the wanted topics that have a message at this tick."""
-        found: dict[str, str] = {}
-        wanted = frozenset(wanted)
+    def sample(self, sample: Sample, wanted: Collection[str]) -> dict[str, bytes]:
+        """The messages in CDR of the wanted topics that have one at this tick; sets `state`."""
+        found: dict[str, bytes] = {}
+        self.state.numbers[...] = sample.numbers
+        self.state.time[...] = sample.tick * self.period
+        self.outputs = sample.outputs
         if CLOCK in wanted:
-            message = {"clock": self.clock(sample.tick)}
-            found[CLOCK] = json.dumps({"op": "publish", "topic": CLOCK, "msg": message}, separators=(",", ":"))
-        own = wanted & self._table.keys()
+            found[CLOCK] = _clock(self.ns(sample.tick))
+        own = self._table.keys() & wanted
         if not own:
             return found
-        content = self._encoder(own, sample)
-        names = {channel.id: topic for topic, channel in self._table.items()}
+        content = self._encoded(own, sample)
         offset = 0
         while offset < len(content):
             _, length, channel, *_ = MESSAGE_HEAD.unpack_from(content, offset)
             end = offset + 9 + length
-            topic = names[channel]
-            found[topic] = self._text(topic, content[offset + PAYLOAD : end])
+            found[self._names[channel]] = content[offset + PAYLOAD : end]
             offset = end
         return found
 
-    def _encoder(self, wanted: frozenset[str], sample: Sample) -> bytes:
+    def _encoded(self, wanted: set[str], sample: Sample) -> bytes:
         """The message records of one tick, by the encoder of the log."""
         if self._block is None or wanted != self._topics:
-            self._topics = wanted
+            self._topics = frozenset(wanted)
             table = [self._table[topic] for topic in sorted(wanted)]
             every = Selection({word(topic): 1 for topic in wanted})
-            self._block = Block(self._robot, self._scene, self._recorded, table, every, self._period, 1)
-        np.copyto(self._state.numbers, sample.numbers)
+            self._block = Block(self.robot, self.scene, self.recorded, table, every, self.period, 1)
         outputs: Any = [None if own is None else SimpleNamespace(rows=own[0], speed=own[1]) for own in sample.outputs]
-        self._block.add(sample.tick, self._state, outputs)
+        self._block.add(sample.tick, self.state, outputs)
         content = self._block.encode([])
         return b"" if content is None else content.data
 
-    def _text(self, topic: str, data: bytes) -> str:
-        channel = self._table[topic]
-        kind = definition(channel.type) if not channel.definition else read_definition(channel.type, channel.definition)
-        message = to_json(kind, data)
+    def text(self, topic: str, data: bytes) -> str:
+        """The `publish` operation of a message in CDR."""
+        message = to_json(self._kinds[topic], data)
         return json.dumps({"op": "publish", "topic": topic, "msg": message}, separators=(",", ":"), allow_nan=False)
 
 
@@ -121,3 +121,10 @@ def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]
 def is_sampled(topic: str, offer: Offer) -> bool:
     """Whether a topic can have messages at ticks, not only once."""
     return topic in offer.published and topic not in offer.latched
+
+
+def _clock(ns: int) -> bytes:
+    """A rosgraph_msgs/Clock."""
+    writer = CdrWriter()
+    writer.time(ns)
+    return writer.data

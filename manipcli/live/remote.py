@@ -71,6 +71,7 @@ class Remote:
             self._socket = connect(url, open_timeout=PATIENCE, max_size=MAX_MESSAGE)
         except self._errors as error:
             raise self._no_connection(error) from error
+        self.send(op="set_level", id="set_level", level="warning")
 
     def _no_connection(self, error: Exception) -> RemoteFailed:
         status = getattr(getattr(error, "response", None), "status_code", None)
@@ -174,6 +175,8 @@ class Remote:
             yield found
 
     def _status(self, message: Mapping[str, Any]) -> None:
+        if message.get("id") == "set_level":  # a server that does not know it
+            return
         if message.get("level") == "error":
             raise RemoteFailed("LIVE191", _text(message.get("msg")), about=message.get("id", ""))
         if message.get("level") == "warning":

@@ -20,10 +20,14 @@ def get(remote: Remote, name: str) -> object:
     Raises:
         RemoteFailed: LIVE192 no such parameter; LIVE191 the server refuses.
     """
-    _require(remote, name)
-    values = remote.call("/rosapi/get_param", {"name": name})
-    _require_success(name, values)
+    try:
+        values = _done(remote, "/rosapi/get_param", {"name": name})
+    except RemoteFailed as failure:
+        _require(remote, name)
+        raise failure from None
     text = values.get("value")
+    if text in (None, "", "null"):  # what servers of ROS answer for an unknown name
+        _require(remote, name)
     try:
         return json.loads(text) if isinstance(text, str) else text
     except ValueError:
@@ -32,8 +36,19 @@ def get(remote: Remote, name: str) -> object:
 
 def set_to(remote: Remote, name: str, value: str) -> None:
     """Set a parameter to a JSON value; see `get`."""
-    _require(remote, name)
-    _require_success(name, remote.call("/rosapi/set_param", {"name": name, "value": value}))
+    try:
+        _done(remote, "/rosapi/set_param", {"name": name, "value": value})
+    except RemoteFailed as failure:
+        _require(remote, name)
+        raise failure from None
+
+
+def _done(remote: Remote, service: str, request: dict[str, str]) -> dict[str, object]:
+    """The response; newer versions of rosapi answer whether it worked, and why not."""
+    values = remote.call(service, request)
+    if values.get("successful") is False:
+        raise RemoteFailed("LIVE191", f"{request['name']}: {values.get('reason') or 'refused'}")
+    return values
 
 
 def _require(remote: Remote, name: str) -> None:
@@ -41,9 +56,3 @@ def _require(remote: Remote, name: str) -> None:
     if name not in known:
         hint = did_you_mean(name, known, kind="parameters") or "the server has no parameters"
         raise RemoteFailed("LIVE192", f"no parameter '{name}'", hint=hint)
-
-
-def _require_success(name: str, values: dict[str, object]) -> None:
-    """Newer versions of rosapi answer whether it worked, and why not."""
-    if values.get("successful") is False:
-        raise RemoteFailed("LIVE191", f"{name}: {values.get('reason') or 'refused'}")

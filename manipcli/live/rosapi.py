@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from manipcli.live.command import Values
 from manipcli.live.fields import arguments, rooted
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.live.typedefs import typedefs
 from manipcli.record.json_message import BadMessage, definition
 from manipcli.record.schemas import schema_text
@@ -96,9 +96,14 @@ class Rosapi:
         kind, answer = self._table[name]
         return answer(arguments(definition(f"{kind}_Request"), request))
 
+    @property
+    def now(self) -> dict[str, int]:
+        """The simulated time, builtin_interfaces/Time."""
+        return self._clock()
+
     def _time(self) -> dict[str, int]:
         """The fields of ROS 2 and those of ROS 1, which roslibpy reads."""
-        now = self._clock()
+        now = self.now
         return {**now, "secs": now["sec"], "nsecs": now["nanosec"]}
 
     def _raw_types(self, asked: Mapping[str, Any]) -> Values:

@@ -9,7 +9,7 @@ from manipcli.live import command as words
 from manipcli.live.command import Answer
 from manipcli.live.connection import Connection
 from manipcli.live.fields import Refused, arguments, near, rooted, text_of
-from manipcli.live.interface import request_type
+from manipcli.live.offer import request_type
 from manipcli.record.json_message import definition
 
 MAX_CALLS: Final = 100

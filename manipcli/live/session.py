@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
 from manipcli.live.access import Access
-from manipcli.live.feed import Feed
+from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
+from manipcli.live.network_process import NetworkProcess
 from manipcli.live.pace import Pace
-from manipcli.live.publisher import Publisher, begin_messages
-from manipcli.live.source import Inbox, recorded_commands
+from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
 from manipcli.run.run_log import recorded
 from manipcli.task.task import Task
 
+if TYPE_CHECKING:
+    from manipcli.live.outlet import OutletOptions
+
 DEFAULT_PORT: Final = 9090
 """rosbridge's."""
+WATCHED: Final = 500
+"""Ticks between two looks at the process of the network."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +39,16 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
-        page: whether there is a page for browsers.
-        page_port: see `LocalServer`.
+        outlets: what shows the session besides the WebSocket server.
+        run: also do the steps of the task.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
-    page: bool = False
-    page_port: int | None = None
+    outlets: Sequence[OutletOptions] = ()
+    run: bool = False
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -67,38 +72,47 @@ def served(
         task, manager: of the session.
         options: see there.
         between: called before each tick; raises KeyboardInterrupt to end the session.
-        announce: called with each URL when clients can connect.
-        late: called once with a text if the simulation is slower than asked.
+        announce: called with the URL when clients can connect.
+        late: called with texts for the user: notices of outlets, and once if the simulation is slower than asked.
 
     Raises:
         InvalidInput: the port cannot be used, or a library is missing.
+        NetworkFailed: LIVE200 the process of the network did not start.
     """
-    from manipcli.live.server import LiveServer  # asyncio, which nothing else needs
+    from manipcli.live.network import Setup  # asyncio, which nothing else needs
+    from manipcli.live.publisher import begin_messages
 
     period = task.spec.simulation.control_period
+    robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    feed = Feed(period, begin_messages(task.robot, task.true.scene, channels))
-    inbox = Inbox()
-    publisher = Publisher(offer, task.robot, task.true.scene, channels, period)
+    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
-    with ExitStack() as opened:
-        server = opened.enter_context(LiveServer(publisher, feed, inbox.put, access=options.access, port=options.port))
-        addresses = [options.url(server.port)]
-        if options.page:
-            from manipcli.live.page.page import LivePage
-
-            page = LivePage(
-                task.robot, task.true.scene, manager.controllers, offer, feed, inbox.put,
-                access=options.access, port=options.page_port,
-            )  # fmt: skip
-            addresses.append(opened.enter_context(page).address)
+    with NetworkProcess(setup) as network:
+        least = FAST_PERIOD if options.speed is None else 0.0
+        latched = begin_messages(robot, scene, channels)
+        feed = Feed(period, network.link, topics=offer.published, latched=latched, least=least)
+        left = 0
 
         def ready() -> None:
-            for address in addresses:
-                announce(address)
+            for notice in network.notices:
+                late(notice)
+            announce(options.url(network.port))
 
-        yield Outside(inbox, feed, pace, between, ready)
+        outside = Outside(network.link, feed, pace, ready=ready)
+
+        def check() -> None:
+            nonlocal left
+            between()
+            left -= 1
+            if left < 0 or network.link.lost:
+                left = WATCHED
+                if network.lost:
+                    outside.failure = network.lost
+                    raise KeyboardInterrupt
+
+        outside.between = check
+        yield outside
 
 
 def next_log(first: Path, number: int, *, overwrite: bool) -> tuple[Path, int]:

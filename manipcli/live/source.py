@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import threading
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Protocol
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.command import END, Command
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import JOINT_STATES, LIVE_COMMANDS
 from manipcli.record.foreign.topics import open_topics
-
-WAITING: Final = 1000
-"""Most commands that wait for the next tick."""
 
 
 class Source(Protocol):
@@ -32,38 +27,6 @@ class Source(Protocol):
     def give_back(self, commands: Sequence[Command]) -> None:
         """Take these again, before all others: they came after the command that ended the session."""
         ...
-
-
-class Inbox:
-    """Commands from the threads of the network; never blocks."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[Command] = deque()
-        self._came = threading.Event()
-
-    def put(self, command: Command) -> bool:
-        """Add a command; False if too many wait already."""
-        if len(self._waiting) >= WAITING:
-            return False
-        self._waiting.append(command)
-        self._came.set()
-        return True
-
-    def take(self, tick: int) -> Sequence[Command]:
-        """All commands that wait."""
-        waiting = self._waiting
-        if not waiting:
-            return ()
-        return [waiting.popleft() for _ in range(len(waiting))]
-
-    def wait(self, seconds: float) -> bool:
-        self._came.clear()
-        if not self._waiting:
-            self._came.wait(seconds)
-        return True
-
-    def give_back(self, commands: Sequence[Command]) -> None:
-        self._waiting.extendleft(reversed(commands))
 
 
 class Schedule:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from manipcli.live import command as words
 from manipcli.live.command import Answer
 from manipcli.live.connection import Connection
-from manipcli.live.fields import MAX_NAME, Refused, check_type, near, number_of, topic_of
+from manipcli.live.fields import MAX_NAME, Refused, check_type, near, number_of, text_of, topic_of
 from manipcli.live.outbox import MAX_QUEUE, Subscription
 from manipcli.record.json_message import definition, from_json
 
@@ -22,10 +22,11 @@ QUEUE: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What one `subscribe` asked for: least time between two messages [s], and messages that wait."""
+    """What one `subscribe` asked for: least time between two messages [s], messages that wait, name of the topic."""
 
     throttle: float
     length: int
+    name: str
 
 
 class TopicOperations:
@@ -75,7 +76,8 @@ class TopicOperations:
         if id_ not in asked and sum(map(len, self._asked.values())) >= MAX_SUBSCRIPTIONS:
             raise Refused(f"more than {MAX_SUBSCRIPTIONS} subscriptions")
         throttle = number_of(frame, "throttle_rate", 0.0) / 1000.0
-        asked[id_] = _Asked(throttle, int(min(number_of(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE)
+        length = int(min(number_of(frame, "queue_length", 0.0), MAX_QUEUE)) or QUEUE
+        asked[id_] = _Asked(throttle, length, text_of(frame, "topic"))
         self._warn_of_ignored(frame)
         self._apply(topic)
         last = self._connection.services.latched(topic)
@@ -104,7 +106,8 @@ class TopicOperations:
             length = max(each.length for each in asked)
             before = subscriptions.get(topic)
             waiting = deque(before.waiting if before is not None else (), maxlen=length)
-            subscriptions[topic] = Subscription(topic, min(each.throttle for each in asked), waiting)
+            throttle, names = min(each.throttle for each in asked), frozenset(each.name for each in asked)
+            subscriptions[topic] = Subscription(topic, throttle, waiting, names=names)
         self._connection.services.subscribed()
 
     def _warn_of_ignored(self, frame: Mapping[str, Any]) -> None:

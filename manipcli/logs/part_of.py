@@ -25,7 +25,7 @@ from manipcli.record.recording import Recording, Span
 from manipcli.record.start_state import START_STATE, StartState
 from manipcli.scene.scene import Scene
 from manipcli.spec.task import TaskSpec
-from manipcli.task.part import LIVE, WHOLE, Part
+from manipcli.task.part import LIVE, LIVE_RUN, WHOLE, Part
 from manipcli.task.task import Task
 
 ROUNDING = 1e-9
@@ -63,7 +63,7 @@ def recorded_part(recording: Recording, path: Path, spec: TaskSpec, robot: Robot
         return WHOLE
     part = RunPart.from_metadata(recording.metadata[PART])
     if part.live:
-        return LIVE
+        return LIVE_RUN if part.runs else LIVE
     ids = [step.id for step in spec.steps]
     state = _recorded_state(recording, path)
     unknown = [name for name in (part.first, part.last) if name and name not in ids]

@@ -176,6 +176,28 @@ DEFINITIONS: dict[str, str] = {
         "# The message, the goal or the request as JSON.\n"
         "string json\n"
     ),
+    "manipcli_msgs/RunStep_Goal": "# A step as in a task file, in YAML or JSON: `{pick: {object: cup}}`\nstring step\n",
+    "manipcli_msgs/RunStep_Result": (
+        "# Of the step in the log, such as `pick@1`; empty if it is refused.\n"
+        "string id\n"
+        "# done, failed, timeout, canceled, not_plannable, invalid, or rejected: the robot is busy.\n"
+        "string outcome\n"
+        "# Why it is not done.\n"
+        "string text\n"
+        "# By how much it is done, negative if it is not: of its `until`; else of the place of an object that was set\n"
+        "# down [m], or of the friction over the weight of an object that was grasped [N]; NaN without one.\n"
+        "float64 margin\nstring unit\n"
+    ),
+    "manipcli_msgs/RunStep_Feedback": (
+        "# A phase begins: plan, then the motions of the step by their names.\nstring id\nstring phase\n"
+    ),
+    "manipcli_msgs/CheckStep_Request": "# As of RunStep.\nstring step\n",
+    "manipcli_msgs/CheckStep_Response": (
+        "# Whether it is valid, and can be planned from where the robot is; text: why not.\n"
+        "bool valid\nbool plannable\nstring text\n"
+        "# Its motions, and their planned duration [s]; NaN without a plan.\n"
+        "string[] phases\nfloat64 duration\n"
+    ),
     "rosgraph_msgs/Clock": "builtin_interfaces/Time clock\n",
     "std_msgs/MultiArrayDimension": "string label\nuint32 size\nuint32 stride\n",
     "std_msgs/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n",

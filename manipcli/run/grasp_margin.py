@@ -32,6 +32,15 @@ class GraspMargin:
         """Store the contacts at the end of a grasp of a body."""
         self._pressed[body] = pressing(contacts, body)
 
+    def spare(self, name: str) -> float | None:
+        """[N] By how much friction at the grasp carries more than the weight; None for a body that was not grasped."""
+        taken = self._pressed.get(name)
+        if taken is None:
+            return None
+        body = self._scene.body(name)
+        carried = friction_load(friction_coefficient(self._robot, body), (force for force, _ in taken))
+        return carried - body.mass * float(np.linalg.norm(self._scene.gravity))
+
     def summary(self, name: str) -> str:
         """The grip force N at the grasp, its friction limit mu N, the weight m g, and the acceleration mu N / m - g.
 

@@ -74,6 +74,15 @@ class Probe:
         by = f" by {readable(found.margin, found.unit)}" if found.unit and found.margin > EDGE else ""
         return f"it holds{by}: {self._word}{found.text}"
 
+    @property
+    def margin(self) -> tuple[float, str] | None:
+        """The margin at the last tick and its unit; None where it is not asked."""
+        self._catch_up()
+        if self._last is None or not self._last.applies[-1]:
+            return None
+        found = self._last.found(len(self._last.margins) - 1)
+        return found.margin, found.unit
+
     def look(self, window: StateWindow, start: int) -> None:
         """Evaluate a window whose first tick has the number `start`, without ticks before the opening."""
         skipped = max(self._first - start, 0)
@@ -134,7 +143,7 @@ class Live:
 
     def step_started(self, step: str) -> None:
         """The next tick is the first of a step, or of another attempt at it with the steps around it."""
-        before = self._steps[step]
+        before = self._steps.get(step, StepTime(step, None, None, ""))  # a client of a live session adds steps
         if before.started is None or before.ended is not None:
             began = self._time(self._next) if before.started is None else before.started
             self._steps[step] = StepTime(step, began, None, "")

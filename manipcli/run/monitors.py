@@ -61,6 +61,12 @@ class Monitors:
             if watch.steps and self._ended.issuperset(watch.steps) and k in self._probes:
                 self._live.close(self._probes.pop(k))
 
+    def close(self) -> None:
+        """Evaluate no watch any more."""
+        for probe in self._probes.values():
+            self._live.close(probe)
+        self._probes.clear()
+
     def _open(self, k: int, watch: WatchSpec, name: str) -> None:
         def callback(window: StateWindow, robustness: Robustness) -> None:
             if self.broken is None:

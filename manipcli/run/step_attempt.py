@@ -22,7 +22,7 @@ from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import not_placed, not_poured, not_squeezed
+from manipcli.run.step_results import PLACED, from_place, not_placed, not_poured, not_squeezed
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -41,6 +41,11 @@ SQUEEZED: Final = 0.3
 
 class StepAttempt:
     """One attempt at a step: re-planned where needed, its motions, and whether it had its effect.
+
+    Attributes:
+        failed: whether the next step is re-planned, because one failed before it.
+        margin: of the last step that ended, and its unit; None where it has none.
+        on_phase: called with the name of each motion that begins.
 
     Args:
         task, plan: to run.
@@ -82,21 +87,29 @@ class StepAttempt:
         self._believed = plan.start
         self._replanning = replanning
         self.failed = False
+        self.margin: tuple[float, str] | None = None
+        self.on_phase: Callable[[str], None] = lambda _: None
+        self._stopped = ""
+        self._open: list[PlannedStep] = []
         self._over = False
         self._at: PlannedStep | None = None
         self._attaching = Attaching(session, self._event)
 
     def _look(self, state: WorldState) -> str:
         """At every tick: update the grasp and return the alarm."""
+        self._follow(state)
+        return self._stopped or (self._alarm(state) if self._task.spec.watch else "")
+
+    def _follow(self, state: WorldState) -> None:
+        """Update the grasp."""
         if self._physics and self._session.ticks % SLOW == 0:
             self._measured.grasp.look(state, self._session.touching)
         self._attaching.look(self._at)
-        return self._alarm(state) if self._task.spec.watch else ""
 
     @property
     def may_go_on(self) -> bool:
-        """Whether a retry or `on_fail: continue` is possible: no broken watch and no controller fault."""
-        return not self._over and not self._session.manager.faults
+        """Whether a retry or `on_fail: continue` is possible: not canceled, no broken watch and no controller fault."""
+        return not self._over and not self._stopped and not self._session.manager.faults
 
     def _alarm(self, _: WorldState) -> str:
         """The first broken watch, recorded as an event; "" without one."""
@@ -234,6 +247,7 @@ class StepAttempt:
         try:
             yield probe
         finally:
+            self.margin = probe.margin
             self._live.close(probe)
 
     def _take(self, carried: Carried) -> None:
@@ -305,7 +319,26 @@ class StepAttempt:
     def _report(self, text: str, *, detail: bool) -> None:
         self._progress.message(text, detail=detail)
 
+    def _margin_of(self, planned: PlannedStep) -> tuple[float, str] | None:
+        """By how much a step that is done was done: to the limit of its place, or the load that its grasp can hold."""
+        plan = planned.plan
+        if not self._physics:
+            return None
+        if plan.placed:
+            now = self._measured.situation(replace(plan.end, carried=None))
+            return PLACED - from_place(self._plan.planner, plan, now)[0], "m"
+        if plan.end.carried is None or planned.start.carried is not None:
+            return None
+        spare = self._grasp_margin.spare(plan.end.carried.body)
+        return None if spare is None else (spare, "N")
+
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
+        if kind == "phase_started":
+            self.on_phase(text)
+        elif kind == "step_started":
+            self._open.append(step)
+        elif kind == "step_ended":
+            self._open = [each for each in self._open if each.index != step.index]
         self._recorder.event(
             self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
         )

@@ -12,6 +12,7 @@ from manipcli.judge.verdict import StepOutcome, StepWord
 from manipcli.plan.block_tree import Unit
 from manipcli.plan.motion import PlanningState
 from manipcli.run.effort_shortage import effort_shortage
+from manipcli.run.monitors import Monitors
 from manipcli.run.restore import RESUMED
 from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, OFF_PLAN, StepAttempt, missing
 from manipcli.simulate.executor import DONE, Alarmed, Lane, MotionEnd
@@ -19,6 +20,8 @@ from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.retry import retried
 from manipcli.spec.step import StepSpec
 from manipcli.task.plan_steps import PlannedStep, plan_units
+from manipcli.task.plan_task import Plan
+from manipcli.task.task import Task
 
 ASKED: Final = 0.2
 """[s] The robot holds still for this time before a choice; its condition counts at the end of it."""
@@ -37,6 +40,30 @@ class StepLoop(StepAttempt):
         with suppress(Alarmed):
             self._executor.hold(RESUMED)
 
+    def turn_to(self, task: Task, plan: Plan) -> None:
+        """Do the steps of another task with the same robot and scene from now on; the world and the grasp stay."""
+        self.stop_watching()
+        self._monitors = Monitors(task.spec.watch, task.spec.expect, self._live)
+        self._task, self._plan, self._replans = task, plan, task.spec.replan is not False
+        self._over, self._stopped = False, ""
+
+    def stop_watching(self) -> None:
+        """End the watches of the task."""
+        self._monitors.close()
+
+    def rest(self) -> None:
+        """One tick between steps."""
+        self._follow(self._session.tick())
+
+    def cancel(self, why: str) -> None:
+        """End the running step after this tick, and stop the robot."""
+        self._stopped = why
+
+    def abandon(self, why: str) -> None:
+        """The simulation ends now: record that the running steps are interrupted."""
+        for planned in [*self._open]:
+            self._event("step_ended", planned, "interrupted", why)
+
     def step(self, planned: PlannedStep, limit: float | None = None) -> StepOutcome:
         """All attempts at a step. A broken watch ends the step at once; the stopping motion follows the step.
 
@@ -52,6 +79,7 @@ class StepLoop(StepAttempt):
         retry = step.retry
         attempts = 1 if retry is None else 1 + retry.retry
         end = DONE
+        self.margin = None
         self._begin(planned)
         for attempt in range(1, attempts + 1):
             if attempt > 1:
@@ -76,6 +104,8 @@ class StepLoop(StepAttempt):
                 self._executor.stop()
             if last:
                 break
+        if self.margin is None and end.outcome == "done":
+            self.margin = self._margin_of(planned)
         return self._outcome(step, planned, began, ended, end)
 
     def pair(self, both: Sequence[PlannedStep], limit: float | None = None) -> tuple[StepOutcome, ...]:
@@ -253,7 +283,7 @@ class StepLoop(StepAttempt):
         return end
 
     def _outcome(self, step: StepSpec, planned: PlannedStep, began: float, ended: float, end: MotionEnd) -> StepOutcome:
-        if self._over:
+        if self._over or self._stopped:
             self._executor.stop()
         tolerated = end.outcome != "done" and step.may_fail and self.may_go_on
         if tolerated:

@@ -32,13 +32,21 @@ def not_placed(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
         return ""
     name = plan.placed
     X_WG, X_WO = planner.body_pose(plan.end, name), planner.body_pose(now, name)
-    away, rotation = between(X_WG, X_WO, round_as=planner.scene.body(name).kind)
+    away, rotation = from_place(planner, plan, now)
     if away <= PLACED and rotation <= RIGHTED:
         return ""
     drop = float(X_WG.p[2] - X_WO.p[2])
     lower = f", {mm(drop)} lower" if drop > PLACED else f", {mm(-drop)} higher" if drop < -PLACED else ""
     limits = f"limits {mm(PLACED)} and {deg(RIGHTED)}"
     return f"'{name}' is {mm(away)} and {deg(rotation)} from its place{lower}; {limits}"
+
+
+def from_place(planner: Planner, plan: StepPlan, now: PlanningState) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of the object that a step sets down from its planned pose; see `not_placed`."""
+    name = plan.placed
+    return between(
+        planner.body_pose(plan.end, name), planner.body_pose(now, name), round_as=planner.scene.body(name).kind
+    )
 
 
 def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:

@@ -153,7 +153,11 @@ class Executor:
             if not switched.ok:
                 return MotionEnd("failed", switch_text)
         start = session.state.position.copy()
-        handles = self._handles = self._send(motion)
+        try:
+            handles = self._send(motion)
+        except InvalidArgument as refused:  # no active controller, after a switch
+            self._cancel()
+            return MotionEnd("failed", refused.findings[0].message)
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
         while True:
@@ -250,30 +254,28 @@ class Executor:
         return state
 
     def _send(self, motion: Motion) -> tuple[GoalHandle, ...]:
-        handles = []
         manager = self._session.manager
-        self._serving = ()
+        self._handles, self._serving = (), ()
         if motion.trajectory is not None:
             follower = manager.serving(motion.trajectory.names)
             if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
             whole = self._completed(motion.trajectory, follower)
             own = motion.tolerances
-            handle = follower.send_goal(whole if own is None else _goal(whole, own))
-            handles.append(self._announced(follower.name, handle))
+            self._accept(follower.name, follower.send_goal(whole if own is None else _goal(whole, own)))
             self._serving += (follower,)
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not is_hand(gripper):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is not a gripper")
-            handles.append(self._announced(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip))))
+            self._accept(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip)))
             self._serving += (gripper,)
-        return tuple(handles)
+        return self._handles
 
-    def _announced(self, controller: str, handle: GoalHandle) -> GoalHandle:
+    def _accept(self, controller: str, handle: GoalHandle) -> None:
+        self._handles = (*self._handles, handle)
         if self._on_goal is not None:
             self._on_goal(controller, handle)
-        return handle
 
     def _completed(self, trajectory: JointTrajectory, follower: Follower) -> JointTrajectory:
         """The trajectory with the other joints of its controller, which keep their present references."""

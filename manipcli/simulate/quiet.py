@@ -9,19 +9,31 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 
 STDOUT, STDERR = 1, 2
+_redirected: list[int] = []
+"""Copies of stdout before it was redirected to stderr, the innermost last."""
 
 
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
     """Redirect stdout to stderr in this block; drop the output if stderr is closed."""
-    if not _is_open(STDERR):
-        with silence():
-            yield
+    with ExitStack() as until:
+        if _is_open(STDOUT):
+            _redirected.append(os.dup(STDOUT))
+            until.callback(lambda: os.close(_redirected.pop()))
+        until.enter_context(_sent(STDOUT, STDERR) if _is_open(STDERR) else silence())
+        yield
+
+
+@contextmanager
+def original_stdout() -> Iterator[None]:
+    """Print to the stdout before `stdout_to_stderr` in this block, for a result inside of it."""
+    if not _redirected:
+        yield
         return
-    with _sent(STDOUT, STDERR):
+    with _sent(STDOUT, _redirected[-1]):
         yield
 
 

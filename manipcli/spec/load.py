@@ -27,7 +27,7 @@ from manipcli.spec.partial.partial_task import salvage
 from manipcli.spec.robot import Arguments, RobotSpec
 from manipcli.spec.ros import rewrite
 from manipcli.spec.ros.substitutions import open_substitutions, substituted
-from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.source.yaml import MAX_BYTES, parse
 from manipcli.spec.structure.draft import FlatStep
 from manipcli.spec.structure.expand import Expansion
@@ -142,6 +142,21 @@ def load_task_text(
     return validate(source, model, findings=findings)
 
 
+def load_step_text(text: str, name: str, *, model: type[TaskSpec]) -> Located[TaskSpec]:
+    """A step, as it is written in a task file, alone in a task that is empty otherwise; places call the text `name`.
+
+    Raises:
+        InvalidInput: every finding of the text.
+    """
+    in_text: list[Diagnostic] = []
+    step, place = parse(text, name, reported=in_text), Place(name, 1, 1)
+    entries = {key: Entry(place, ScalarNode("step", place)) for key in ("task", "robot", "controllers")}
+    entries["steps"] = Entry(place, SequenceNode(() if step is None else (step,), place))
+    written = Source(name, MappingNode(entries, place), "TASK")
+    source, findings = _flat_source(written, in_text, model, (), None, no_files)
+    return validate(source, model, findings=findings)
+
+
 def task_source(path: Path, *, model: type[TaskSpec], find: Find) -> tuple[Source, list[Diagnostic]]:
     """The tree of a task file with flat steps, before it is validated, and its findings so far; see `load_task`.
 
@@ -171,8 +186,21 @@ def _task_source(
     text: str | bytes, name: str, model: type[TaskSpec], overrides: Sequence[str], seed: int | None, find: Find
 ) -> tuple[Source, list[Diagnostic]]:
     """The tree of a task after overrides and parameters, and their diagnostics."""
-    wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
     written, in_text = _source(text, name, "TASK", "task")
+    return _flat_source(written, in_text, model, overrides, seed, find)
+
+
+def _flat_source(
+    written: Source,
+    in_text: Sequence[Diagnostic],
+    model: type[TaskSpec],
+    overrides: Sequence[str],
+    seed: int | None,
+    find: Find,
+) -> tuple[Source, list[Diagnostic]]:
+    """The tree of a task with flat steps, from its tree as written and the diagnostics of its text."""
+    name = written.name
+    wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
     of_files, others, late = of_structure(wanted)
     source, findings = _changed(written, of_files, model)
     reports, task = Reports(), TaskFile(Path(name), name)

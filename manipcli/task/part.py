@@ -18,7 +18,7 @@ class Part:
         last: index behind the last step; None: of all.
         until: id of the step after which the run was asked to stop; "": none.
         state: at the start; None: the start of the task.
-        live: a live session, which runs no step.
+        live: a live session.
     """
 
     first: int = 0
@@ -32,7 +32,7 @@ class Part:
         """For log and verdict; None for a whole run."""
         state = self.state
         if self.live:
-            return RunPart(live=True)
+            return RunPart(live=True, runs=self.last is None)
         if state is None:
             return RunPart(last=self.until) if self.until else None
         return RunPart(state.step, self.until, state.log, state.sha256, state.time)
@@ -41,4 +41,6 @@ class Part:
 WHOLE: Final = Part()
 """All steps, from the start of the task."""
 LIVE: Final = Part(last=0, live=True)
-"""No step, for a live session."""
+"""No step, for a live session that holds."""
+LIVE_RUN: Final = Part(live=True)
+"""All steps, in a live session."""

@@ -24,7 +24,7 @@ from manipcli.live.source import Schedule
 from manipcli.logs.judge_log import judge_log
 from manipcli.run.execute import build_manager
 from manipcli.run.run_log import open_log, run_metadata, verdict_metadata
-from manipcli.task.part import LIVE
+from manipcli.task.part import LIVE, Part
 
 ROOT = Path(__file__).parents[2]
 SMALL = f"""\
@@ -45,9 +45,9 @@ def trajectory(joints: Sequence[str], positions: Sequence[float], seconds: float
     return {"joint_names": [*joints], "points": [{"positions": [*positions], "time_from_start": time}]}
 
 
-def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path) -> None:
+def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path, part: Part = LIVE) -> None:
     """A session with these commands by tick, as fast as possible, into a log."""
-    task = replace(pipeline.load_task(path), part=LIVE)
+    task = replace(pipeline.load_task(path), part=part)
     plan = pipeline.plan_task(task)
     manager = build_manager(task, plan.planner.kinematics)
     period = task.spec.simulation.control_period

@@ -111,14 +111,6 @@ def names_and_types(ros: roslibpy.Ros) -> None:
     assert f"{ARM}/follow_joint_trajectory" in servers
 
 
-def every_service_that_is_listed_has_a_type_and_details(ros: roslibpy.Ros) -> None:
-    for name in ros.get_services():
-        kind = ros.get_service_type(name)
-        assert kind.count("/srv/") == 1, name
-        assert ros.get_service_request_details(kind)["typedefs"], name
-        assert ros.get_service_response_details(kind)["typedefs"], name
-
-
 def states_at_a_throttled_rate(ros: roslibpy.Ros) -> None:
     start = time.monotonic()
     states = Messages(ros, "/joint_states", "sensor_msgs/JointState", throttle_rate=20)
@@ -152,6 +144,20 @@ def switching(ros: roslibpy.Ros) -> None:
         service.call(roslibpy.ServiceRequest({"activate": []}), timeout=PATIENCE)
 
 
+def parameters(ros: roslibpy.Ros) -> None:
+    names = ros.get_params()
+    (name, *_) = (each for each in names if each.startswith("/arm_controller:gains.") and each.endswith(".p"))
+    bound = name.removesuffix(".p") + ".u_clamp_max"
+    before = ros.get_param(name)
+    ros.set_param(name, before * 1.01)
+    assert ros.get_param(name) == before * 1.01
+    ros.set_param(bound, 1e6)
+    ros.delete_param(bound)
+    assert ros.get_param(bound) is None
+    with pytest.raises(roslibpy.core.ServiceException, match="parameter"):
+        ros.get_param("/arm_controller:gain")
+
+
 def drive(url: str) -> dict[str, float]:
     """All laws; the arm begins and ends at home: returns its joints there."""
     ros = roslibpy.Ros(url)
@@ -162,8 +168,8 @@ def drive(url: str) -> dict[str, float]:
         joints, home = state["joint_names"], state["reference"]["positions"]
         near = [value + 0.1 for value in home]
         names_and_types(ros)
-        every_service_that_is_listed_has_a_type_and_details(ros)
         states_at_a_throttled_rate(ros)
+        parameters(ros)
 
         done = Goal(ros, joints, near, 0.5)
         assert done.wait() is roslibpy.GoalStatus.SUCCEEDED

@@ -9,7 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.remote_options import LOCAL, Url, connected, rooted, value_of
-from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+from manipcli.core.errors import ExitCode
 
 Node = Annotated[str, typer.Argument(metavar="NODE", help="Name of the node, or NODE:NAME.", show_default=False)]
 
@@ -45,7 +45,8 @@ def get(
         from manipcli.live import remote_params
         from manipcli.spec.source.yaml_text import to_yaml
 
-        console.result(to_yaml(remote_params.get(remote, whole)))
+        value = remote_params.get(remote, whole)
+        console.result(value if isinstance(value, str) else to_yaml(value))
     return ExitCode.PASSED
 
 
@@ -70,14 +71,5 @@ def set_(
 
 
 def _joined(node: str, name: str | None) -> str:
-    """`/node:name`, as rosapi names a parameter.
-
-    Raises:
-        InvalidInput: USE164 no name.
-    """
-    if name is not None:
-        return f"{rooted(node)}:{name}"
-    if ":" not in node:
-        hint = "write NODE NAME, such as /arm_controller gains.joint_1.p; `manipcli param list` shows them"
-        raise InvalidInput([Diagnostic("USE164", f"no name of a parameter of '{node}'", hint=hint)])
-    return rooted(node)
+    """`/node:name`, as rosapi names a parameter; without a name what was given."""
+    return rooted(node) if name is None else f"{rooted(node)}:{name}"

@@ -1,23 +1,31 @@
-"""`manipcli serve TASK`: a running robot that clients of rosbridge, and a page for browsers, can command."""
+"""`manipcli serve`: a running robot that clients of rosbridge, and a page for browsers, can command."""
 
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Sample, Seed, TaskFile, seconds
+from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Sample, Seed, seconds
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 LOCAL = "127.0.0.1"
 
 
 def serve(
-    task: TaskFile,
+    task: Annotated[Path | None, typer.Argument(metavar="[TASK]", help="Task file.", show_default=False)] = None,
     *,
+    robot: Annotated[
+        Path | None,
+        typer.Option("--robot", metavar="FILE", help="Robot file: serve it alone on the floor, without a task."),
+    ] = None,
+    controllers: Annotated[
+        Path | None, typer.Option("--controllers", metavar="FILE", help="Controllers file of --robot.")
+    ] = None,
     port: Annotated[
         int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port of the server; 0 is any free port.")
     ] = 9090,
@@ -49,6 +57,7 @@ def serve(
     open_: Annotated[
         bool, typer.Option("--open", help="Let all programs of this machine command, without a token.")
     ] = False,
+    run: Annotated[bool, typer.Option("--run", help="Also do the steps of the task, then hold.")] = False,
     log: Annotated[
         Path | None,
         typer.Option("--log", metavar="PATH", help="Write the log to PATH [default: runs/<task>@live.mcap]."),
@@ -61,40 +70,43 @@ def serve(
     allow_outside: AllowOutside = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the result.")] = False,
 ) -> ExitCode:
-    """Simulate a task's scene live, and let clients of rosbridge and browsers command its robot.
+    """Simulate a task's scene, or a robot alone, live, and let clients and browsers command it.
 
-    The controllers hold; the steps are not run. The session is recorded. Press Ctrl-C to end it.
+    The controllers hold; with --run the steps are done first, and the exit code is that of `manipcli run`. The session
+    is recorded. Press Ctrl-C to end it.
     """
     from manipcli.cli.interrupts import Interrupts
 
     factor, wall = _speed(speed), None if lasting is None else seconds(lasting)
     token = _token(token_file, host=host, open_=open_)
+    served = _served(task, robot, controllers, run=run)
     with Interrupts() as interrupts:
         from manipcli import pipeline
         from manipcli.cli.progress import StepProgress
         from manipcli.live.access import Access
+        from manipcli.live.page.options import PageOptions
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
-        from manipcli.report.run_report import RunReport
+        from manipcli.report.run_report import RunReport, exit_code
 
-        live = LiveOptions(Access(token, host), port, factor, wall, page=not no_page, page_port=page_port)
-
-        urls: list[str] = []
+        outlets = () if no_page else (PageOptions(token, page_port),)
+        live = LiveOptions(Access(token, host), port, factor, wall, outlets, run)
 
         def announce(url: str) -> None:
-            if not urls:
-                if token is None:
-                    console.talk("--open: every program of this machine can command the robot.")
-                console.talk("Press Ctrl-C to end the session.")
-            urls.append(url)
             console.result(url)
+            if token is None:
+                console.talk("--open: every program of this machine can command the robot.")
+            console.talk("Press Ctrl-C to end the session.")
+
+        def shown(report: RunReport, failure: str) -> str:
+            return text.render_run(report) if run else text.render_session(report, failure)
 
         def ended(report: RunReport, failure: str) -> None:
-            console.result(text.render_session(report, failure))
+            console.result(shown(report, failure))
 
-        with StepProgress(verbose=False, quiet=quiet, interrupts=interrupts) as progress:
+        with served as path, StepProgress(verbose=False, quiet=quiet) as progress:
             report, failure = pipeline.serve_task(
-                task,
+                path,
                 live,
                 log=log,
                 force=force,
@@ -108,8 +120,35 @@ def serve(
                 package_path=tuple(package_path or ()),
                 allow_outside=allow_outside,
             )
-        console.result(text.render_session(report, failure))
-        return ExitCode.FAILED if failure else ExitCode.PASSED
+        console.result(shown(report, failure))
+        return exit_code(report.verdict) if run else ExitCode.FAILED if failure else ExitCode.PASSED
+
+
+def _served(
+    task: Path | None, robot: Path | None, controllers: Path | None, *, run: bool
+) -> AbstractContextManager[Path]:
+    """The task file: the task, or one for the robot alone.
+
+    Raises:
+        InvalidInput: not either a task, or a robot with controllers; or no task to run.
+    """
+    if task is not None:
+        option = "--robot" if robot is not None else "--controllers" if controllers is not None else ""
+        if option:
+            message = f"task '{task}' and {option} exclude each other: a task names its robot and controllers"
+            raise InvalidInput([Diagnostic("USE141", message, hint=f"remove {option}, or the task")])
+        return nullcontext(task)
+    if robot is None:
+        hint = "manipcli serve TASK, or manipcli serve --robot FILE --controllers FILE"
+        raise InvalidInput([Diagnostic("USE140", "serve needs a task, or a robot", hint=hint)])
+    if controllers is None:
+        hint = "`manipcli init --robot DESCRIPTION` writes a robot file with controllers"
+        raise InvalidInput([Diagnostic("USE142", "--robot needs --controllers FILE", hint=hint)])
+    if run:
+        raise InvalidInput([Diagnostic("USE143", "--run needs a task: a robot alone has no steps")])
+    from manipcli import pipeline
+
+    return pipeline.bare_task(robot, controllers)
 
 
 def _speed(word: str) -> float | None:

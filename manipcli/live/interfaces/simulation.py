@@ -118,7 +118,7 @@ def _step(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values
     if why or not steps:
         code = FAILED if why else OK
         status = None if command.op != SEND_GOAL else ABORTED if why else STATUS["succeeded"]
-        command.answer(Answer(not why or status is None, result(code, why), why, status))
+        command.answer(Answer(True, result(code, why), status=status))
         return None
     play.state, play.steps = PAUSED, steps
     robot.goals.append(Steps(robot, command, steps))
@@ -150,6 +150,4 @@ class Steps:
         return Answer(True, {"completed_steps": self.done, "remaining_steps": self.steps - self.done})
 
     def _ended(self, status: str, why: str) -> Answer:
-        text = f"{why} after {self.done} of {self.steps} steps"
-        ok = self.command.op != SEND_GOAL
-        return Answer(ok, result(FAILED, text), text, STATUS[status])
+        return Answer(True, result(FAILED, f"{why} after {self.done} of {self.steps} steps"), status=STATUS[status])

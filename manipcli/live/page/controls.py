@@ -12,7 +12,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.live.command import Answer, Command
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.live.page.drive import Drive
 from manipcli.live.page.snapshot import Snapshot
 from manipcli.model.robot import RobotModel

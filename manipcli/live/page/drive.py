@@ -8,15 +8,14 @@ from typing import Final, Self
 
 import numpy as np
 
-from manipcli.control.controller import Controller
-from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.geometry import Array
 from manipcli.live import command as words
 from manipcli.live.command import Command
-from manipcli.live.interface import Offer, goal_type
+from manipcli.live.offer import Offer, goal_type
 from manipcli.live.page.service_calls import compact
 from manipcli.model.configuration import position_limits
 from manipcli.model.robot import RobotModel
+from manipcli.record.channels import ControllerChannel, Recorded
 from manipcli.record.json_message import definition, from_json
 
 SHARE: Final = 0.5
@@ -53,14 +52,14 @@ class Drive:
     speed: Array
 
     @classmethod
-    def of(cls, robot: RobotModel, controller: Controller, index: int) -> Self:
-        """The drive of a follower or hand."""
+    def of(cls, robot: RobotModel, controller: ControllerChannel, index: int) -> Self:
+        """The drive of a controller with an action."""
         joints = [robot.joint(name) for name in controller.joints]
         lower, upper = position_limits(joints)
         speed = SHARE * np.array([joint.limits.velocity or UNLIMITED for joint in joints])
-        columns = tuple(robot.indices(tuple(controller.joints)))
-        hand = is_hand(controller)
-        return cls(controller.name, index, tuple(controller.joints), hand, columns, lower, upper, speed)
+        columns = tuple(robot.indices(controller.joints))
+        hand = controller.action == "gripper_cmd"
+        return cls(controller.name, index, controller.joints, hand, columns, lower, upper, speed)
 
     @property
     def name(self) -> str:
@@ -100,11 +99,11 @@ class Drive:
         return Command(words.PUBLISH, self.name, json=compact(message))
 
 
-def drives_of(robot: RobotModel, controllers: Sequence[Controller], offer: Offer) -> tuple[Drive, ...]:
-    """The controllers that the page can command, in their order; of those with the same joints, all."""
+def drives_of(robot: RobotModel, recorded: Sequence[Recorded], offer: Offer) -> tuple[Drive, ...]:
+    """Those of the controllers with an action that the offer has; `recorded`: channels of all controllers."""
     found = (
-        Drive.of(robot, controller, k)
-        for k, controller in enumerate(controllers)
-        if is_follower(controller) or is_hand(controller)
+        Drive.of(robot, channel, k)
+        for k, channel in enumerate(recorded)
+        if isinstance(channel, ControllerChannel) and channel.action
     )
     return tuple(drive for drive in found if drive.name in offer.received or drive.name in offer.actions)

@@ -1,7 +1,7 @@
 """The page of a live session in the browser: what the robot does, and for visitors with the token, its controls.
 
-A thread of its own copies the newest state to the browsers, at most 20 times per second of wall time and in at most a
-tenth of it; while no browser is connected it samples nothing. Commands go the way of all others, through the inbox.
+An outlet of the process of the network. A thread of its own copies the newest state to the browsers, at most 20 times
+per second of wall time and in at most a tenth of it; while no browser is connected it wants no states.
 """
 
 from __future__ import annotations
@@ -9,18 +9,15 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
-from types import TracebackType
 from typing import TYPE_CHECKING, Final
 
-from manipcli.control.controller import Controller
 from manipcli.live.access import Access
-from manipcli.live.command import Answer, Command
-from manipcli.live.feed import Feed, Sample
-from manipcli.live.interface import Offer
+from manipcli.live.command import Answer
+from manipcli.live.outlet import Network
 from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.door import MAY_COMMAND, door
@@ -28,14 +25,13 @@ from manipcli.live.page.drive import drives_of
 from manipcli.live.page.panel import Panel
 from manipcli.live.page.reader import Reader
 from manipcli.live.page.snapshot import Snapshot
-from manipcli.live.page.story import Story
+from manipcli.live.page.story import TOPICS, Story
 from manipcli.model.configuration import configuration
-from manipcli.model.robot import RobotModel
+from manipcli.model.state import WorldState
 from manipcli.replay.drawing import draw, floors_of
 from manipcli.replay.placing import Placing
 from manipcli.replay.view.viser_scene import ViserScene
 from manipcli.replay.view.viser_server import LocalServer
-from manipcli.scene.scene import Scene
 
 if TYPE_CHECKING:
     import viser
@@ -51,46 +47,36 @@ IDLE: Final = 0.2
 
 
 class LivePage(LocalServer):
-    """A served page. A context manager that stops it.
+    """A served page: an outlet.
 
     Args:
-        robot, scene: of the session.
-        controllers: of the session.
-        offer: of the session; what it does not have gets no control.
-        feed: of the session.
-        put: hands a command to the control loop; False if too many wait.
-        access: whose token commands need; the page is on 127.0.0.1 whatever its host.
-        port: see `LocalServer`.
+        network: of the session; what its offer does not have gets no control.
+        token: that commands need; None: they need none.
+        port: of 127.0.0.1, see `LocalServer`.
+
+    Attributes:
+        notice: see `Outlet`.
 
     Raises:
-        InvalidInput: the port cannot be used.
+        InvalidInput: VIEW001 the port cannot be used.
     """
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        scene: Scene,
-        controllers: Sequence[Controller],
-        offer: Offer,
-        feed: Feed,
-        put: Callable[[Command], bool],
-        *,
-        access: Access,
-        port: int | None,
-    ) -> None:
-        self._access = Access(access.token)
-        super().__init__(robot.name, port=port, option="--page-port", check=door(self._access))
-        self._robot, self._offer, self._feed, self._put = robot, offer, feed, put
-        self._sizes = len(robot.moving_joints), len(scene.movable)
-        self._drives = drives_of(robot, controllers, offer)
+    def __init__(self, network: Network, *, token: str | None, port: int | None) -> None:
+        robot, scene = network.publisher.robot, network.publisher.scene
+        super().__init__(robot.name, port=port, option="--page-port", check=door(Access(token)))
+        self.notice = f"page: {self.url}" if token is None else f"page: {self.url}/?token={token}"
+        self._network, self._offer, self._robot = network, network.publisher.offer, robot
+        self._drives = drives_of(robot, network.publisher.recorded, self._offer)
         self._placing = Placing(robot, scene)
         self._story = Story()
         self._visitors: dict[int, Panel | Reader] = {}
         self._answers: SimpleQueue[tuple[int | None, str, Answer]] = SimpleQueue()
         self._controllers: dict[str, str] = {}
         self._simulation: int | None = None
-        self._clock: deque[tuple[float, int]] = deque(maxlen=5)
-        self._sample: Sample | None = None
+        self._newest: Snapshot | None = None
+        self._asks = self._watched = False
+        self._clock: deque[tuple[float, float]] = deque(maxlen=5)
+        self._shown: Snapshot | None = None
         self._asked = 0.0
         self._over = threading.Event()
         drawing = draw(robot, scene)
@@ -109,30 +95,44 @@ class LivePage(LocalServer):
         self._controllers_folder = gui.add_folder("Controllers", order=6)
         with gui.add_folder("Messages", order=7):
             self._messages = gui.add_html("")
-        feed.on_message = self._story.hear
         self.viser.on_client_connect(self._came)
         self.viser.on_client_disconnect(self._left)
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()
 
-    @property
-    def address(self) -> str:
-        """URL to open in a browser, with the token."""
-        return self.url if self._access.token is None else f"{self.url}/?token={self._access.token}"
+    def wanted(self) -> Collection[str]:
+        return TOPICS
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def message(self, topic: str, ns: int, data: bytes) -> None:
+        self._story.hear(topic, data)
+
+    def watches(self) -> bool:
+        return self._watched
+
+    def state(self, tick: int, state: WorldState) -> None:
+        if self._asks:
+            publisher = self._network.publisher
+            self._newest, self._asks = Snapshot.of(tick * publisher.period, state, publisher.outputs), False
+
+    def close(self) -> None:
         self._over.set()
-        self._thread.join(timeout=5.0)
-        super().__exit__(kind, error, at)
+        self._thread.join(timeout=2.0)
+        self.stop()
 
     async def _came(self, client: viser.ClientHandle) -> None:
         if not MAY_COMMAND.get():
             self._visitors[client.client_id] = Reader(client, self._controllers_folder)
             return
         answered = partial(self._answered, client.client_id)
-        controls = Controls(self._robot, self._drives, self._offer, self._put, answered)
+        controls = Controls(self._robot, self._drives, self._offer, self._network.put, answered)
         self._visitors[client.client_id] = Panel(
-            client, self._controllers_folder, self._robot, self._scene, self._offer, controls, self._feed.period
+            client,
+            self._controllers_folder,
+            self._robot,
+            self._scene,
+            self._offer,
+            controls,
+            self._network.publisher.period,
         )
 
     async def _left(self, client: viser.ClientHandle) -> None:
@@ -146,8 +146,11 @@ class LivePage(LocalServer):
         while not self._over.wait(pause):
             began = time.monotonic()
             news = self._story.read()
-            if not self.viser.get_clients():
-                self._sample = None
+            watched = bool(self.viser.get_clients())
+            if watched != self._watched:
+                self._watched = watched
+                self._network.changed()
+            if not watched:
                 pause = IDLE
                 continue
             self._update(began, news)
@@ -156,20 +159,17 @@ class LivePage(LocalServer):
     def _update(self, now: float, news: bool) -> None:
         """Show what is new, and send what visitors ask."""
         self._take_answers()
-        sample = self._feed.newest
-        self._feed.ask()
-        if sample is None:
+        newest = self._newest
+        self._asks = True
+        if newest is None:
             return
         snapshot = replace(
-            Snapshot.of(sample, self._feed.period, *self._sizes),
-            controllers=self._controllers,
-            simulation=self._simulation,
-            stopped=self._story.stopped,
+            newest, controllers=self._controllers, simulation=self._simulation, stopped=self._story.stopped
         )
-        if sample is not self._sample:
-            state = snapshot.state
+        if newest is not self._shown:
+            self._shown = newest
+            state = newest.state
             self._scene.place(self._placing.at(state.position, state.body_position, state.body_quat_xyzw))
-            self._sample = sample
         for visitor in list(self._visitors.values()):
             visitor.update(snapshot, now)
         if news or not self._messages.content:
@@ -180,17 +180,17 @@ class LivePage(LocalServer):
 
     def _ask(self, now: float, snapshot: Snapshot) -> None:
         """Show the time, and ask for the states of controllers and simulation."""
-        self._clock.append((now, self._feed.tick_now))
+        self._clock.append((now, snapshot.time))
         self._status.content = texts.status(snapshot, self._factor(), self._notes)
         for kind in (service_calls.LIST, service_calls.GET_STATE):
             service = service_calls.service_of(self._offer, kind)
             if service is not None and service in self._offer.readers:
-                self._put(service_calls.call(self._offer, service, answer=partial(self._answered, None, kind)))
+                self._network.put(service_calls.call(self._offer, service, answer=partial(self._answered, None, kind)))
 
     def _factor(self) -> float | None:
         """Simulated seconds per second of wall time, over the last two seconds."""
         (before, first), (now, last) = self._clock[0], self._clock[-1]
-        return (last - first) * self._feed.period / (now - before) if now > before and last >= first else None
+        return (last - first) / (now - before) if now > before and last >= first else None
 
     def _tell(self) -> None:
         story = self._story

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from manipcli.live.interface import Offer
+from manipcli.live.offer import Offer
 from manipcli.live.page import service_calls
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.drive import Drive

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from manipcli.live import command as words
 from manipcli.live.command import Answer, Command, nobody
-from manipcli.live.interface import Offer, request_type
+from manipcli.live.offer import Offer, request_type
 from manipcli.record.json_message import definition, from_json
 
 EMERGENCY_STOP: Final = "/emergency_stop"

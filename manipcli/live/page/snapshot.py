@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.live.feed import Sample
 from manipcli.live.page.drive import Drive
 from manipcli.model.state import WorldState
 
@@ -36,12 +36,12 @@ class Snapshot:
     stopped: bool = False
 
     @classmethod
-    def of(cls, sample: Sample, period: float, joints: int, bodies: int) -> Snapshot:
-        """From a sample of a session with this control period [s] and numbers of joints and movable bodies."""
-        state = WorldState.room(joints, bodies)
-        np.copyto(state.numbers, sample.numbers)
-        rows = tuple(None if output is None else output[0] for output in sample.outputs)
-        return cls(sample.tick * period, state, rows)
+    def of(cls, time: float, state: WorldState, outputs: Sequence[tuple[Array, Array] | None]) -> Self:
+        """With copies of a state, and the rows and speeds of the outputs of controllers at this time [s]."""
+        joints, bodies = state.position.shape[-1], state.body_position.shape[-2]
+        copy = WorldState.room(joints, bodies)
+        np.copyto(copy.numbers, state.numbers)
+        return cls(time, copy, tuple(None if output is None else output[0] for output in outputs))
 
     def is_active(self, controller: str) -> bool:
         """Whether a controller is active, or not yet known."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import deque
 from typing import Any, Final
 
-from manipcli.live.feed import Event
 from manipcli.record import schemas
 from manipcli.record.channels import EVENTS, ROSOUT
 from manipcli.record.json_message import definition, to_json
 
+TOPICS: Final = (EVENTS, ROSOUT)
+"""Topics that it reads."""
 SHOWN: Final = 12
 """Messages."""
 MOST_STEPS: Final = 200
@@ -34,23 +35,23 @@ class Story:
         self.stopped = False
         self.steps: dict[str, tuple[str, str]] = {}
         self.messages: deque[tuple[float, int, str]] = deque(maxlen=SHOWN)
-        self._waiting: deque[Event] = deque(maxlen=WAITING)
+        self._waiting: deque[tuple[str, bytes]] = deque(maxlen=WAITING)
 
-    def hear(self, event: Event) -> None:
-        """Keep an event for `read`; never blocks."""
-        if event.topic in (EVENTS, ROSOUT):
-            self._waiting.append(event)
+    def hear(self, topic: str, data: bytes) -> None:
+        """Keep a message in CDR for `read`; never blocks."""
+        if topic in TOPICS:
+            self._waiting.append((topic, data))
 
     def read(self) -> bool:
         """Read what waits; whether there was something."""
         found = False
         while self._waiting:
-            event = self._waiting.popleft()
+            topic, data = self._waiting.popleft()
             found = True
-            if event.topic == ROSOUT:
-                self._log(to_json(definition(schemas.LOG), event.data))
+            if topic == ROSOUT:
+                self._log(to_json(definition(schemas.LOG), data))
             else:
-                self._step(to_json(definition(schemas.TASK_EVENT), event.data))
+                self._step(to_json(definition(schemas.TASK_EVENT), data))
         return found
 
     def _log(self, message: dict[str, Any]) -> None:

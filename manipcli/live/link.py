@@ -1,0 +1,170 @@
+"""The connection between the control loop and the process of the network: a socket and a few shared numbers.
+
+The loop waits for nothing: a shared number shows whether commands have arrived, and what the socket does not take at
+once waits in queues that drop their oldest message. Each message is its length and a body: of the loop a pickled tuple,
+of the network, which reads what strangers send, JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import pickle
+import select
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from manipcli.live.command import SEND_GOAL, Answer, Command, nobody
+
+HEAD: Final = struct.Struct("<I")
+TICK, TAKEN, SENT, WANTED = range(4)
+"""Shared numbers: the last tick and the commands taken, of the loop; the commands sent, and whether somebody wants
+samples, of the network."""
+WAITING: Final = 1000
+"""Most commands that wait for the next tick."""
+KEPT_SAMPLES: Final = 50
+KEPT_MESSAGES: Final = 1000
+"""Samples, and messages of events, that wait for the socket; the oldest are dropped."""
+SAMPLE, EVENT, ANSWER, CLOSE = "sample", "event", "answer", "close"
+
+
+def shared_numbers(descriptor: int) -> memoryview:
+    """The shared numbers in the file of a descriptor of at least one page."""
+    return memoryview(mmap.mmap(descriptor, mmap.PAGESIZE)).cast("q")
+
+
+def framed(body: bytes) -> bytes:
+    """A message."""
+    return HEAD.pack(len(body)) + body
+
+
+def complete(received: bytearray) -> Iterator[bytes]:
+    """The bodies of the complete messages, which are removed."""
+    start = 0
+    while len(received) - start >= HEAD.size:
+        end = start + HEAD.size + HEAD.unpack_from(received, start)[0]
+        if len(received) < end:
+            break
+        yield bytes(received[start + HEAD.size : end])
+        start = end
+    del received[:start]
+
+
+class Link:
+    """The end of the control loop, which is also its source of commands.
+
+    Args:
+        end: of the socket.
+        numbers: see `shared_numbers`.
+
+    Attributes:
+        lost: whether the process of the network has ended.
+        dropped: samples and messages that the network did not take in time.
+    """
+
+    def __init__(self, end: socket.socket, numbers: memoryview) -> None:
+        end.setblocking(False)
+        self.numbers = numbers
+        self.lost = False
+        self.dropped = 0
+        self._end = end
+        self._answers: deque[bytes] = deque()
+        self._events: deque[bytes] = deque()
+        self._samples: deque[bytes] = deque()
+        self._rest = memoryview(b"")
+        self._waits = False
+        self._received = bytearray()
+        self._taken = 0
+        self._given_back: list[Command] = []
+
+    def sample(self, tick: int, numbers: object, outputs: Sequence[object]) -> None:
+        """Send the state of a tick: see `Sample`."""
+        self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, outputs))
+
+    def event(self, topic: str, ns: int, data: bytes) -> None:
+        """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR."""
+        self._put(self._events, KEPT_MESSAGES, (EVENT, topic, ns, data))
+
+    def close(self) -> None:
+        """Let the process of the network end; what waits is sent before, for one second."""
+        self._put(self._events, KEPT_MESSAGES, (CLOSE,))
+        until = time.monotonic() + 1.0
+        while self._waits and not self.lost and time.monotonic() < until:
+            time.sleep(0.01)
+            self._flush()
+
+    def take(self, tick: int) -> Sequence[Command]:
+        """The commands that have arrived."""
+        if self._waits:
+            self._flush()
+        found, self._given_back = self._given_back, []
+        if self.numbers[SENT] != self._taken and not self.lost:
+            self._receive()
+            new = [self._command(body) for body in complete(self._received)]
+            self._taken += len(new)
+            self.numbers[TAKEN] = self._taken
+            found += new
+        return found
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for commands, at most this wall time."""
+        if not self._given_back:
+            if self._waits:
+                self._flush()
+            select.select([self._end], [self._end] if self._waits else [], [], seconds)
+        return True
+
+    def give_back(self, commands: Sequence[Command]) -> None:
+        """Take these again, before all others."""
+        self._given_back += commands
+
+    def _receive(self) -> None:
+        try:
+            while True:
+                data = self._end.recv(1 << 16)
+                if not data:
+                    self.lost = True
+                    return
+                self._received += data
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.lost = True
+
+    def _command(self, body: bytes) -> Command:
+        number, op, name, id_, text = json.loads(body)
+
+        def answer(found: Answer) -> None:
+            feedback = op == SEND_GOAL and found.status is None
+            if not feedback or len(self._answers) < KEPT_MESSAGES:
+                self._put(self._answers, None, (ANSWER, number, found))
+
+        return Command(op, name, id_, text, answer if number else nobody)
+
+    def _put(self, queue: deque[bytes], kept: int | None, message: tuple[object, ...]) -> None:
+        if len(queue) == kept:
+            queue.popleft()
+            self.dropped += 1
+        queue.append(framed(pickle.dumps(message, 5)))
+        self._flush()
+
+    def _flush(self) -> None:
+        """Send what the socket takes: answers, events, samples."""
+        self._waits = True
+        try:
+            while not self.lost:
+                if not self._rest:
+                    queue = self._answers or self._events or self._samples
+                    if not queue:
+                        self._waits = False
+                        return
+                    self._rest = memoryview(queue.popleft())
+                self._rest = self._rest[self._end.send(self._rest, socket.MSG_NOSIGNAL) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.lost = True

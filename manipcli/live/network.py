@@ -1,0 +1,199 @@
+"""The process of the network: takes samples and events from the control loop, and serves them to clients.
+
+It is a fresh interpreter that imports neither an engine nor a planner. It ends with the control loop: when that
+says so, or when its end of the socket is closed, however it ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import pickle
+import socket
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from typing import Any, Final
+
+from manipcli.core.errors import InvalidInput
+from manipcli.live.access import Access
+from manipcli.live.command import Command
+from manipcli.live.connection import Services
+from manipcli.live.link import ANSWER, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
+from manipcli.live.offer import Offer
+from manipcli.live.outlet import Network, Outlet, OutletOptions
+from manipcli.live.pending import Pending
+from manipcli.live.publisher import Publisher, is_sampled
+from manipcli.live.rosapi import Rosapi
+from manipcli.live.sample import Event, Sample
+from manipcli.live.server import LiveServer
+from manipcli.model.robot import RobotModel
+from manipcli.record.channels import Recorded
+from manipcli.scene.scene import Scene
+
+KEPT: Final = 20
+"""Samples that wait to be encoded; the oldest are dropped."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What the process needs to know of a session; plain data. See `Publisher`, `Access`, `LiveServer`, `Outlet`."""
+
+    offer: Offer
+    robot: RobotModel
+    scene: Scene
+    recorded: Sequence[Recorded]
+    period: float
+    access: Access
+    port: int
+    outlets: Sequence[OutletOptions] = ()
+
+
+class _Stream(asyncio.Protocol):
+    """Messages of the control loop, sorted; never read too late: the loop would drop new ones."""
+
+    def __init__(self) -> None:
+        self.events: deque[Event] = deque()
+        self.samples: deque[Sample] = deque(maxlen=KEPT)
+        self.something = asyncio.Event()
+        self.over = asyncio.Event()
+        self.answered: Callable[..., None] = lambda *_: None
+        self._received = bytearray()
+
+    def data_received(self, data: bytes) -> None:
+        self._received += data
+        for body in complete(self._received):
+            kind, *values = pickle.loads(body)  # of the process that started this one
+            if kind == SAMPLE:
+                self.samples.append(Sample(*values))
+            elif kind == EVENT:
+                self.events.append(Event(*values))
+            elif kind == ANSWER:
+                self.answered(*values)
+            else:
+                self.over.set()
+        self.something.set()
+
+    def connection_lost(self, error: Exception | None) -> None:
+        self.over.set()
+
+
+class Hub:
+    """Hands samples and events to the server and the outlets."""
+
+    def __init__(self, publisher: Publisher, stream: _Stream, numbers: memoryview) -> None:
+        self._publisher, self._stream, self._numbers = publisher, stream, numbers
+        self._texts = {topic: publisher.text(topic, data) for topic, data in publisher.latched.items()}
+        self.server: LiveServer | None = None
+        self.outlets: list[Outlet] = []
+        self._wanted: set[str] = set()
+
+    def latched(self, topic: str) -> str | None:
+        """The last text of a latched topic; None before its first message."""
+        return self._texts.get(topic)
+
+    def subscribed(self) -> None:
+        """Somebody subscribes to more or less than before."""
+        self._wanted = set() if self.server is None else self.server.wanted()
+        for outlet in self.outlets:
+            self._wanted.update(outlet.wanted())
+        watched = any(outlet.watches() for outlet in self.outlets)
+        self._numbers[WANTED] = watched or any(is_sampled(topic, self._publisher.offer) for topic in self._wanted)
+
+    async def run(self) -> None:
+        """Make each message once, for all who take it."""
+        stream = self._stream
+        while True:
+            await stream.something.wait()
+            stream.something.clear()
+            while stream.events:
+                self._event(stream.events.popleft())
+            while stream.samples:
+                self._sample(stream.samples.popleft())
+                await asyncio.sleep(0)
+
+    def _event(self, event: Event) -> None:
+        topic, latched = event.topic, event.topic in self._publisher.offer.latched
+        if latched:
+            self._publisher.latched[topic] = event.data
+        if self.server is not None and (latched or topic in self._wanted):
+            text = self._publisher.text(topic, event.data)
+            if latched:
+                self._texts[topic] = text
+            self.server.publish(topic, text)
+        for outlet in self.outlets:
+            if latched or topic in outlet.wanted():
+                outlet.message(topic, event.ns, event.data)
+
+    def _sample(self, sample: Sample) -> None:
+        found = self._publisher.sample(sample, self._wanted)
+        if self.server is not None:
+            due = self.server.due()
+            for topic in found.keys() & due:
+                self.server.publish(topic, self._publisher.text(topic, found[topic]))
+        ns = self._publisher.ns(sample.tick)
+        for outlet in self.outlets:
+            for topic in found.keys() & outlet.wanted():
+                outlet.message(topic, ns, found[topic])
+            if outlet.watches():
+                outlet.state(sample.tick, self._publisher.state)
+
+
+def main(socket_descriptor: int, numbers_descriptor: int) -> None:
+    """Serve until the control loop ends; the descriptors are inherited."""
+    end = socket.socket(fileno=socket_descriptor)
+    numbers = shared_numbers(numbers_descriptor)
+    with end.makefile("rb") as file:
+        (length,) = HEAD.unpack(file.read(HEAD.size))
+        setup = pickle.loads(file.read(length))
+    with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+        asyncio.run(_serve(setup, end, numbers))
+
+
+async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
+    loop = asyncio.get_running_loop()
+    publisher = Publisher(setup.offer, setup.robot, setup.scene, setup.recorded, setup.period)
+    stream = _Stream()
+    hub = Hub(publisher, stream, numbers)
+    transport, _ = await loop.create_unix_connection(lambda: stream, sock=end)
+    pending = Pending(numbers, transport.write)
+    stream.answered = pending.answer
+
+    def soon(call: Callable[[], object]) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop is closed
+            loop.call_soon_threadsafe(call)
+
+    def put(command: Command) -> bool:
+        if pending.full:
+            return False
+        soon(lambda: pending.put(command))
+        return True
+
+    rosapi = Rosapi(setup.offer, lambda: publisher.clock(numbers[TICK]))
+    services = Services(setup.offer, hub.latched, rosapi, pending.put, soon, hub.subscribed)
+    network = Network(publisher, put, lambda: soon(hub.subscribed))
+    server = LiveServer(services, setup.access)
+    async with AsyncExitStack() as stack:
+        try:
+            port = await stack.enter_async_context(server.listening(setup.port))
+            for options in setup.outlets:
+                hub.outlets.append(options.open(network))
+                stack.callback(hub.outlets[-1].close)
+        except InvalidInput as error:
+            _report(transport, {"findings": [[each.code, each.message, each.hint] for each in error.findings]})
+            return
+        hub.server = server
+        hub.subscribed()
+        _report(transport, {"port": port, "notices": [outlet.notice for outlet in hub.outlets if outlet.notice]})
+        running = asyncio.create_task(hub.run())
+        over = asyncio.create_task(stream.over.wait())
+        await asyncio.wait((running, over), return_when=asyncio.FIRST_COMPLETED)
+        if running.done():
+            running.result()
+        running.cancel()
+
+
+def _report(transport: asyncio.WriteTransport, found: dict[str, Any]) -> None:
+    transport.write(framed(json.dumps(found).encode()))

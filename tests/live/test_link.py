@@ -1,0 +1,111 @@
+"""Between the control loop and the process of the network: nothing is lost but what may be, and nobody waits."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.live import link as ends
+from manipcli.live.command import CALL_SERVICE, PUBLISH, SEND_GOAL, Answer, Command
+from manipcli.live.link import EVENT, SAMPLE, TAKEN, WAITING, Link, complete
+from manipcli.live.pending import Pending
+from tests.live.sessions import opened, serving
+
+
+@dataclass
+class Ends:
+    """Both ends in one process."""
+
+    link: Link
+    pending: Pending
+    far: socket.socket
+    received: bytearray = field(default_factory=bytearray)
+
+    def arrived(self) -> list[tuple[object, ...]]:
+        """What the network has received."""
+        try:
+            while data := self.far.recv(1 << 20):
+                self.received += data
+        except BlockingIOError:
+            pass
+        return [pickle.loads(body) for body in complete(self.received)]
+
+
+@pytest.fixture
+def both() -> Iterator[Ends]:
+    near, far = socket.socketpair()
+    far.setblocking(False)
+    numbers = memoryview(bytearray(64)).cast("q")
+    with near, far:
+        yield Ends(Link(near, numbers), Pending(numbers, far.sendall), far)
+
+
+def test_commands_arrive_in_order_after_those_given_back(both: Ends) -> None:
+    first, second, third = (Command(PUBLISH, name, json='{"a": "\\ud800"}') for name in "abc")
+    both.pending.put(third)
+    both.link.give_back([first, second])
+    assert both.link.wait(0.0)
+    assert [command.name for command in both.link.take(0)] == ["a", "b", "c"]
+    assert [*both.link.take(1)] == []
+
+
+def test_no_more_commands_wait_than_may() -> None:
+    numbers = memoryview(bytearray(64)).cast("q")
+    pending = Pending(numbers, lambda data: None)
+    assert [pending.put(Command(PUBLISH, "a")) for _ in range(WAITING + 5)] == [True] * WAITING + [False] * 5
+    numbers[TAKEN] = 1
+    assert [pending.put(Command(PUBLISH, "a")) for _ in range(2)] == [True, False]
+
+
+def test_answers_reach_who_asked_and_a_goal_is_answered_until_its_result(both: Ends) -> None:
+    got: list[tuple[str, Answer]] = []
+    for op in (PUBLISH, CALL_SERVICE, SEND_GOAL):
+        both.pending.put(Command(op, "a", answer=lambda found, op=op: got.append((op, found))))  # type: ignore[misc]
+    for command in both.link.take(0):
+        for found in (Answer(True, {"x": 1.0}), Answer(False, {}, "no", status=6), Answer(True, {})):
+            command.answer(found)
+    for _, number, found in both.arrived():
+        both.pending.answer(number, found)  # type: ignore[arg-type]
+    assert [op for op, _ in got] == [PUBLISH, CALL_SERVICE, SEND_GOAL, SEND_GOAL]
+    assert got[0][1] == Answer(True, {"x": 1.0})
+
+
+def test_a_network_that_takes_nothing_loses_the_oldest_samples_but_no_answer(both: Ends) -> None:
+    both.pending.put(Command(CALL_SERVICE, "a", answer=print))
+    (command,) = both.link.take(0)
+    for tick in range(2000):
+        both.link.sample(tick, np.zeros(200), [None])
+    command.answer(Answer(True, {}))
+    both.link.event("/a", 7, b"x" * (1 << 20))
+    found = []
+    for _ in range(100):
+        found += both.arrived()
+        both.link.take(1)  # sends what waits
+    ticks = [values[1] for values in found if values[0] == SAMPLE]
+    assert ticks == sorted(ticks)
+    assert ticks[-ends.KEPT_SAMPLES :] == [*range(2000 - ends.KEPT_SAMPLES, 2000)]
+    assert both.link.dropped == 2000 - len(ticks) > 0
+    assert [values[0] for values in found if values[0] != SAMPLE] == [ends.ANSWER, EVENT]
+
+
+def test_a_session_whose_network_is_killed_ends_and_its_log_is_complete(tmp_path: Path) -> None:
+    async def use(url: str) -> None:
+        client = await opened(url)
+        await client.send(op="subscribe", topic="/joint_states")
+        await client.until(op="publish", topic="/joint_states")
+        tasks = Path("/proc/self/task").iterdir()
+        (network,) = {word for task in tasks for word in (task / "children").read_text().split()}
+        os.kill(int(network), signal.SIGKILL)
+        await client.socket.wait_closed()
+
+    with pytest.raises(AssertionError, match="ended by signal 9"):
+        serving(tmp_path, use)
+    assert (tmp_path / "session.mcap").exists()
