@@ -125,14 +125,9 @@ class LivePage(LocalServer):
             return
         answered = partial(self._answered, client.client_id)
         controls = Controls(self._robot, self._drives, self._offer, self._network.put, answered)
+        period = self._network.publisher.period
         self._visitors[client.client_id] = Panel(
-            client,
-            self._controllers_folder,
-            self._robot,
-            self._scene,
-            self._offer,
-            controls,
-            self._network.publisher.period,
+            client, self._controllers_folder, self._robot, self._scene, self._offer, controls, period
         )
 
     async def _left(self, client: viser.ClientHandle) -> None:

@@ -13,7 +13,8 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Array
 from manipcli.live.command import Answer, Command
 from manipcli.live.goals import gripper_goal, topic_goal
-from manipcli.live.interface import Offer, endpoints_of, offer_of
+from manipcli.live.interface import endpoints_of, offer_of
+from manipcli.live.offer import Offer
 from manipcli.live.page.controls import PERIOD, Controls
 from manipcli.live.page.drive import RISE, Drive, drives_of
 from manipcli.live.page.service_calls import PAUSE, RESET, failure, press, switch
@@ -39,7 +40,7 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Task, ControllerMa
 @pytest.fixture
 def drives(loaded: tuple[Task, ControllerManager, Offer]) -> tuple[Drive, ...]:
     task, manager, offer = loaded
-    return drives_of(task.robot, manager.controllers, offer)
+    return drives_of(task.robot, [recorded(each) for each in manager.controllers], offer)
 
 
 def at(task: Task, time: float = 1.0, arm: tuple[float, ...] = HOME) -> Snapshot:

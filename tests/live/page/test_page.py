@@ -8,6 +8,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from queue import SimpleQueue
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -17,13 +18,12 @@ from websockets.typing import Origin
 
 from manipcli import pipeline
 from manipcli.core.errors import InvalidInput
-from manipcli.live.access import Access
 from manipcli.live.command import Answer, Command
-from manipcli.live.feed import Feed
 from manipcli.live.interface import endpoints_of, offer_of
+from manipcli.live.outlet import Network
+from manipcli.live.page.options import PageOptions
 from manipcli.live.page.page import LivePage
-from manipcli.live.source import Inbox
-from manipcli.model.state import WorldState
+from manipcli.live.publisher import Publisher
 from manipcli.record.channels import ROSOUT
 from manipcli.record.messages import log_message
 from manipcli.record.recording import TaskEvent
@@ -38,24 +38,23 @@ LISTED = {"controller": [{"name": "arm_controller", "state": "active"}, {"name":
 
 @dataclass
 class Served:
-    """A page whose session is this test: it gives samples, and takes commands."""
+    """A page whose session is this test: it gives states, and takes commands."""
 
     page: LivePage
-    feed: Feed
-    inbox: Inbox
-    state: WorldState
-    readers: frozenset[str]
+    publisher: Publisher
+    commands: SimpleQueue[Command]
     ticks: int = 0
 
     def tick(self) -> list[Command]:
         """One tick; what was commanded, without the questions of the page, which are answered."""
         self.ticks += 1
-        self.feed.tick(self.ticks, self.state, ())
-        found = self.inbox.take(self.ticks)
+        if self.page.watches():
+            self.page.state(self.ticks, self.publisher.state)
+        found = [self.commands.get() for _ in range(self.commands.qsize())]
         for command in found:
             if command.name.endswith("list_controllers"):
                 command.answer(Answer(True, dict(LISTED)))
-        return [command for command in found if command.name not in self.readers]
+        return [command for command in found if command.name not in self.publisher.offer.readers]
 
     def live(self, visitor: Visitor, condition: Callable[[], object]) -> list[Command]:
         """Tick until something is true for a visitor; all that was commanded."""
@@ -77,12 +76,15 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     manager = build_manager(task, pipeline.plan_task(task).planner.kinematics)
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    feed, inbox = Feed(0.001), Inbox()
-    scene = task.true.scene
-    with LivePage(task.robot, scene, manager.controllers, offer, feed, inbox.put, access=Access(TOKEN), port=0) as page:
-        yield Served(
-            page, feed, inbox, WorldState.room(len(task.robot.moving_joints), len(scene.movable)), offer.readers
-        )
+    publisher = Publisher(offer, task.robot, task.true.scene, channels, 0.001)
+    commands: SimpleQueue[Command] = SimpleQueue()
+    network = Network(publisher, lambda command: not commands.put(command), lambda: None)
+    page = PageOptions(TOKEN, 0).open(network)
+    assert isinstance(page, LivePage)
+    try:
+        yield Served(page, publisher, commands)
+    finally:
+        page.close()
 
 
 def test_a_slider_commands_and_follows_the_robot(served: Served) -> None:
@@ -95,7 +97,7 @@ def test_a_slider_commands_and_follows_the_robot(served: Served) -> None:
         assert [command.name for command in sent] == ["/arm_controller/joint_trajectory"]
         assert json.loads(sent[0].json)["points"][0]["positions"][1] == pytest.approx(0.5)
 
-        served.state.position[0] = -0.25  # another client moves the robot, after this motion
+        served.publisher.state.position[0] = -0.25  # another client moves the robot, after this motion
         served.ticks += 10_000
         first = visitor.labels("Slider")["joint_1"]
         served.live(visitor, lambda: visitor.inputs[first]["value"] == pytest.approx(-0.25))
@@ -129,7 +131,8 @@ def test_who_may_enter(served: Served) -> None:
     with pytest.raises(InvalidStatus, match="401"):
         connect(f"ws://127.0.0.1:{port}/?token=wrong")
     asking = http.client.HTTPConnection("127.0.0.1", port)
-    asking.request("GET", urlsplit(served.page.address).path + f"?token={TOKEN}")
+    assert served.page.notice == f"page: http://127.0.0.1:{port}/?token={TOKEN}"
+    asking.request("GET", f"/?token={TOKEN}")
     answer = asking.getresponse()
     answer.read()
     (address,) = parse_qs(urlsplit(answer.headers["Location"]).query)["websocket"]
@@ -146,26 +149,23 @@ def test_who_may_enter(served: Served) -> None:
 def test_messages_are_text_and_not_html(served: Served) -> None:
     event = TaskEvent(1.0, "refused", "", "", "error", "<script>alert(1)</script>", "")
     with Visitor(served.page.port) as reader:
-        served.feed.message(ROSOUT, 1, log_message(10**9, event))
+        served.page.message(ROSOUT, 1, log_message(10**9, event))
         served.live(reader, lambda: "alert(1)" in reader.text)
         assert "&lt;script&gt;" in reader.text
         assert "<script" not in reader.text
 
 
-def test_nothing_is_sampled_while_no_browser_is_connected(served: Served) -> None:
+def test_no_state_is_wanted_while_no_browser_is_connected(served: Served) -> None:
     with Visitor(served.page.port) as reader:
-        served.live(reader, lambda: served.feed.newest is not None)
+        served.live(reader, served.page.watches)
     end = time.monotonic() + 10.0
-    while served.page.viser.get_clients():
+    while served.page.watches():
         assert time.monotonic() < end
         time.sleep(0.01)
-    time.sleep(0.5)
-    served.tick()  # what was asked before
-    last = served.feed.newest
-    for _ in range(50):
+    while not served.commands.empty():
         served.tick()
-        time.sleep(0.005)
-    assert served.feed.newest is last
+    time.sleep(0.6)
+    assert served.commands.empty(), "no questions either"
 
 
 @pytest.mark.filterwarnings("ignore:.*does not match annotation")

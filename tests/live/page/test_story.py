@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from manipcli.live.feed import Event
 from manipcli.live.page.story import SHOWN, Story
 from manipcli.live.page.texts import steps
 from manipcli.record.channels import EVENTS, ROSOUT
@@ -12,9 +11,9 @@ from manipcli.record.recording import TaskEvent
 
 def hear(story: Story, kind: str, step: str = "", verb: str = "", outcome: str = "", text: str = "") -> None:
     event = TaskEvent(1.0, kind, step, verb, outcome, text, "task.yaml:3:1")
-    story.hear(Event(EVENTS, event_message(10**9, event)))
-    story.hear(Event(ROSOUT, log_message(10**9, event)))
-    story.hear(Event("/tf", b"no event"))
+    story.hear(EVENTS, event_message(10**9, event))
+    story.hear(ROSOUT, log_message(10**9, event))
+    story.hear("/tf", b"no event")
 
 
 def test_steps_have_their_last_state() -> None:
