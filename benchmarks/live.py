@@ -1,7 +1,7 @@
 """What serving costs the control loop: `python -m benchmarks.live [--rounds N] [--minutes M]`.
 
 The scene of the pour, held at rest. A plain `run` and sessions of `serve --speed max` with 0, 1 and 20 clients take
-turns: all of them are stopped but one, which goes on for a second of wall time, together with the processes of its
+turns: all of them are stopped but one, which goes on for 0.4 s of wall time, together with the processes of its
 network and its clients. So all see the same load of the machine; a ratio is that of two turns of the same round. The
 clients count what they receive. At real-time pace: the time from when a client sends a command to the tick that
 obeys it; and the memory of a session with 20 clients of which one never reads.
@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from mmap import PAGESIZE
 from pathlib import Path
 from typing import Final
@@ -31,8 +31,8 @@ CROWDS: Final = {0: 0.95, 1: 0.9, 20: 0.7}
 """Numbers of clients, and the least share of the ticks of `run` that is aimed at."""
 WARM: Final = 1000
 """Ticks before the first turn."""
-TURN: Final = 1.0
-AFTER: Final = 0.1
+TURN: Final = 0.4
+AFTER: Final = 0.05
 """[s] Length of a turn, and what of its beginning does not count."""
 COMMANDS: Final = 200
 MIB: Final = 1 << 20
@@ -55,6 +55,8 @@ class Worker:
         if clients:
             self.clients = started("watch", self.url, str(clients), str(deaf))
             assert line(self.clients) == "ready"
+        own = [self.process.pid, *children(self.process.pid)]
+        self._pids = own if self.clients is None else [*own, self.clients.pid]
 
     def counted(self) -> int:
         """Messages that each client has received at least of each topic since the last call."""
@@ -67,9 +69,9 @@ class Worker:
 
     def signal(self, number: int) -> None:
         """To all its processes."""
-        found = [self.process.pid, *children(self.process.pid), *([self.clients.pid] if self.clients else [])]
-        for pid in found:
-            os.kill(pid, number)
+        for pid in self._pids:
+            with suppress(ProcessLookupError):
+                os.kill(pid, number)
 
     def close(self) -> None:
         """End them."""
@@ -189,7 +191,7 @@ def resident(pid: int) -> float:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.live", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--rounds", type=int, default=15, help="turns of each (default 15)")
+    parser.add_argument("--rounds", type=int, default=40, help="turns of each (default 40)")
     parser.add_argument(
         "--minutes", type=float, default=10.0, help="of the measurement of memory; 0: without (default 10)"
     )

@@ -10,6 +10,7 @@ import asyncio
 import json
 import mmap
 import os
+import signal
 import sys
 import time
 from collections import Counter
@@ -45,9 +46,13 @@ def shared(file: Path) -> memoryview:
 
 
 def counting(numbers: memoryview) -> Callable[[], None]:
-    """To be called once a tick."""
+    """To be called once a tick; ends the session after SIGTERM."""
+    ended: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: ended.append(number))
 
     def count() -> None:
+        if ended:
+            raise KeyboardInterrupt
         numbers[0] += 1
         if numbers[0] % 50 == 0:
             numbers[1] = time.thread_time_ns()

@@ -30,6 +30,7 @@ from manipcli.cli.commands import (
     info,
     init,
     judge,
+    mcp,
     param,
     plan,
     plot,
@@ -121,6 +122,7 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "param list": param.list_,
     "param get": param.get,
     "param set": param.set_,
+    "mcp": mcp.mcp,
     "list": list_.list_,
     "schema": schema.schema,
 }

@@ -116,6 +116,8 @@ ON_TICK: Final = 1e-3
 """A time within this tolerance, in periods, of a sampled tick counts as that tick."""
 BLOCK: Final = 32
 """Number of ticks that are sampled at once if no samples exist."""
+CHANGING: Final = 8
+"""Likewise while the speed changes, which takes longer."""
 
 
 class Reference:
@@ -208,11 +210,15 @@ class Reference:
 
     def change_speed(self, speed: float, *, time: float, period: float) -> None:
         """From the tick at `time` on, change to this speed smoothly."""
-        if self.moving and self.scales and (speed, 0.0) != self.speed(time):
+        if not self.scales or (speed, 0.0) == self.speed(time):
+            return
+        if self.moving:
             path = self._active.sample
             self._clock.change(speed, time, period, lambda s: path(np.array([s]))[0], self._limits)
             self._drop()
             self.advance(time, period)
+        else:
+            self._clock.jump(speed, time)
 
     def scale_feed(self, scale: Array) -> None:
         """From the next tick on, `velocity_scale` is `scale` (n)."""
@@ -241,7 +247,8 @@ class Reference:
 
     def _look_ahead(self, time: float, period: float) -> None:
         """Samples the next ticks, for a time that is not sampled yet."""
-        clocks, speeds, rates = self._clock.ahead(time, period, BLOCK + 1)
+        count = BLOCK if self._clock.is_steady(time) else CHANGING
+        clocks, speeds, rates = self._clock.ahead(time, period, count + 1)
         np.maximum(clocks, 0.0, out=clocks)
         self._take(self._sample(clocks, speeds, rates), time, period)
         self._end_row = int(np.searchsorted(clocks, self.end - 1e-6 * period))

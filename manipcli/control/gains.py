@@ -67,9 +67,10 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
     )
 
 
-def tune_pid(pid: Pid, name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...]) -> None:
+def tune_pid(pid: Pid | None, name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...]) -> None:
     """Replace the gains (n) of a PID of `build_pid`, except its anti-windup; raises as that, and then changes none."""
-    pid.set_gains(**_numbers(name, joints, gains))
+    if pid is not None:
+        pid.set_gains(**_numbers(name, joints, gains))
 
 
 def _numbers(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...]) -> dict[str, list[float]]:

@@ -261,7 +261,6 @@ class GripperController:
         self._reference[wrong] = position[wrong]
 
     def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
-        assert self._pid is not None
         tune_pid(self._pid, self.name, self.joints, gains)
         if self._stops:
             self._freeze()

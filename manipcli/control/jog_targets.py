@@ -1,11 +1,17 @@
 """Targets of jogging: velocities of joints, and the velocity of the tool.
 
-The tool's velocity x = J(q) v is followed by damped least squares. Where joints reach their bounds, they are saturated
+The tool's velocity x = J(q) v is followed by the pseudo-inverse. Where joints reach their bounds, they are saturated
 one by one and the others make up for them, as long as they can; then the tool slows down along x, so that its direction
 is kept (Flacco, De Luca, Khatib: Motion control of redundant robots under joint constraints: Saturation in the Null
-Space, ICRA 2012). Near a singularity, where a singular value of J is below `SINGULAR`, the inverse is damped by up to
-`DAMPING` (Nakamura, Hanafusa: Inverse kinematic solutions with singularity robustness, 1986): the tool is then slower
-than asked, or leaves its direction.
+Space, ICRA 2012).
+
+Towards a singularity the tool slows down along x, too. The part of x that belongs to a small singular value s of J
+needs joint velocities of its size divided by s. They are kept below
+
+    min(sqrt(`BRAKE` s), `NEAR` s)
+
+so that the joints come to rest where s is 0, and leave from there. Only where this part of x is `NEGLIGIBLE`, it does
+not slow down the others. Damped least squares would let the tool slide off its line instead.
 """
 
 from __future__ import annotations
@@ -15,16 +21,22 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import with_joints
 from manipcli.model.kinematics import Kinematics
 
 SINGULAR: Final = 0.02
-"""Singular values of J below this are damped; m/s or rad/s of the tool per rad/s or m/s of the joints."""
-DAMPING: Final = 0.02
-"""Largest damping, at a singularity: joint velocities are at most |x| / (2 DAMPING)."""
+"""Joints are not saturated where the others would have a singular value below this."""
+BRAKE: Final = 20.0
+"""[rad/s2] per unit of s. Joints stop before a singularity if they can brake with BRAKE ds/dq / 2, where ds/dq is below
+0.5 for common arms."""
+NEAR: Final = 100.0
+"""[rad/s] per unit of s: very near, s decays without a step."""
+NEGLIGIBLE: Final = 1e-3
+"""Relative to x."""
+NEVER: Final = 1e-9
+"""A singular value below this is that of a direction in which these joints never move the tool; it is left out."""
 TASK: Final = 6
 
 
@@ -92,8 +104,15 @@ class TaskVelocity:
     """
 
     def __init__(self, J: Array, x: Array) -> None:
-        self._J, self._x = J, x
-        self.velocity: Array = damped_inverse(J)[0] @ x
+        U, values, Vt = np.linalg.svd(J, full_matrices=False)
+        parts = x @ U
+        most = np.minimum(np.sqrt(BRAKE * values), NEAR * values)
+        allowed = values * most + NEGLIGIBLE * np.sqrt(np.vdot(x, x))
+        sizes, possible = np.abs(parts), values > NEVER
+        scale = np.divide(allowed, sizes, out=np.ones_like(sizes), where=possible & (sizes > 0.0)).min(initial=1.0)
+        self._J, self._x = J, float(scale) * x
+        speeds = np.divide(scale * parts, values, out=np.zeros_like(values), where=possible)
+        self.velocity: Array = np.clip(speeds, -most, most) @ Vt
 
     def within(self, lower: Array, upper: Array) -> Array:
         """(n) with J v = s x and the largest s <= 1 that is found within the bounds; see the module."""
@@ -107,12 +126,13 @@ class TaskVelocity:
                 best, chosen = scale, scale * along + beside
             if scale >= 1.0 or free.sum() <= min(TASK, len(free)):
                 return chosen
+            bound = np.clip(along[worst] + beside[worst], lower[worst], upper[worst])
             beside = np.where(free, 0.0, beside)
-            beside[worst] = np.clip(along[worst] + beside[worst], lower[worst], upper[worst])
-            free[worst] = False
-            inverse, least = damped_inverse(J * free)
-            if least < SINGULAR:
+            beside[worst], free[worst] = bound, False
+            U, values, Vt = np.linalg.svd(J * free, full_matrices=False)
+            if values[min(TASK, len(free)) - 1] < SINGULAR:
                 return chosen
+            inverse = (Vt.T / values) @ U.T
             along, beside = inverse @ x, beside - inverse @ (J @ beside)
 
 
@@ -130,16 +150,3 @@ def _scale(along: Array, beside: Array, lower: Array, upper: Array) -> tuple[flo
     scale = min(1.0, float(most[worst]))
     still = ~moves & ((beside > upper + 1e-12) | (beside < lower - 1e-12))
     return (0.0 if scale < least.max() or still.any() else scale), worst
-
-
-def damped_inverse(J: npt.NDArray[np.float64]) -> tuple[Array, float]:
-    """The pseudo-inverse (n, 6) of `J` (6, n), damped near singularities, and its least singular value.
-
-    Columns of zeros do not count for that value, as if the joint were absent.
-    """
-    U, values, Vt = np.linalg.svd(J, full_matrices=False)
-    rank = min(TASK, int(J.any(axis=0).sum()))
-    least = float(values[rank - 1]) if rank else 0.0
-    damping = DAMPING**2 * max(0.0, 1.0 - (least / SINGULAR) ** 2)
-    inverted = np.divide(values, values**2 + damping, out=np.zeros_like(values), where=values > 1e-12)
-    return (Vt.T * inverted) @ U.T, least

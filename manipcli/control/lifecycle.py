@@ -14,7 +14,7 @@ from manipcli.control.claims import Claimant, conflicts
 from manipcli.control.controller import Controller, JointState
 from manipcli.control.feed_forward import Index
 from manipcli.control.roles import takes_goals
-from manipcli.core.errors import InvalidArgument
+from manipcli.core.errors import InvalidArgument, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.plan.motion import Strictness, Switch
@@ -235,3 +235,10 @@ def ticks_between(update_rate: float, period: float) -> int:
         message = f"update rate {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
         raise InvalidArgument("CTRL163", message, hint=f"use {1.0 / (period * max(1, round(every))):g} Hz")
     return round(every)
+
+
+def cause_of(error: Exception) -> str:
+    """An error on one line."""
+    if isinstance(error, ManipcliError):
+        return "; ".join(finding.message for finding in error.findings)
+    return f"{type(error).__name__}: {error}"

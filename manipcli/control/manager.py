@@ -30,12 +30,13 @@ from manipcli.control.lifecycle import (
     ControllerInfo,
     Slot,
     SwitchResult,
+    cause_of,
     decided,
     names_of,
     strictness_of,
     ticks_between,
 )
-from manipcli.core.errors import Diagnostic, InvalidArgument, InvalidInput, ManipcliError
+from manipcli.core.errors import Diagnostic, InvalidArgument, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.plan.motion import Strictness, Switch
@@ -188,8 +189,7 @@ class ControllerManager:
         Raises:
             InvalidArgument: it is unknown or loaded.
         """
-        slot = self._slots.get(name)
-        if slot is None:
+        if (slot := self._slots.get(name)) is None:
             hint = did_you_mean(name, self._slots, kind="controllers")
             raise InvalidArgument("CTRL161", f"unknown controller '{name}'", hint=hint)
         if slot.loaded:
@@ -368,7 +368,7 @@ class ControllerManager:
                 try:
                     slot.controller.update(time, slot.period, slot.measured, contact_force=slot.contact_force)
                 except Exception as error:  # noqa: BLE001  (an error in a controller stops only that controller)
-                    self._fail(slot, _cause(error), time)
+                    self._fail(slot, cause_of(error), time)
         self._feed_forward.add(tick, state.position, state.velocity)
         self._copy()
         return self.command
@@ -398,10 +398,3 @@ class ControllerManager:
         """Abort all goals; the next update re-activates the controllers."""
         for slot in self._active:
             slot.controller.deactivate(time)
-
-
-def _cause(error: Exception) -> str:
-    """The error on one line."""
-    if isinstance(error, ManipcliError):
-        return "; ".join(finding.message for finding in error.findings)
-    return f"{type(error).__name__}: {error}"

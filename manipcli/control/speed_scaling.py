@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from manipcli.control.active_trajectory import Reference
+from manipcli.control.active_trajectory import VELOCITY, Reference
 
 
 class SpeedScaling:
@@ -47,6 +47,11 @@ class SpeedScaling:
         """The speed at `time` [s], and its rate [1/s]."""
         reference = self._reference
         return reference.speed(time) if reference.moving and reference.scales else (self.wanted, 0.0)
+
+    def begin(self, time: float) -> tuple[float, float]:
+        """As `pace`, for a new trajectory: in a pause, one that begins in motion stops on its path."""
+        speed = self.pace(time)
+        return (1.0, 0.0) if speed[0] == 0.0 and self._reference.row(time)[VELOCITY].any() else speed
 
     def set(self, factor: float, *, at_once: bool = False) -> bool:
         """Change to this factor from the next update on, within the acceleration limits: see `TrajectoryClock`.

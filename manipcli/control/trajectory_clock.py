@@ -58,11 +58,15 @@ class TrajectoryClock:
             return s + local * speed, speed, 0.0
         return s + local * (speed + 0.5 * rate * local), speed + rate * local, rate
 
+    def is_steady(self, time: float) -> bool:
+        """Whether it has the wanted speed at `time` [s]."""
+        return self.now(time)[1:] == (self._wanted, 0.0)
+
     def ahead(self, time: float, period: float, count: int) -> tuple[Array, Array, Array]:
         """As `now`, arrays (count) at `time` and the following multiples of `period` [s]."""
-        s, speed, rate = self.now(time)
         steps = np.arange(count, dtype=np.float64)
-        if rate == 0.0 and speed == self._wanted:
+        if self.is_steady(time):
+            s, speed, _ = self.now(time)
             return s + speed * period * steps, np.full(count, speed), np.zeros(count)
         rows = np.array([self.now(time + k * period) for k in steps.tolist()])
         return rows[:, 0], rows[:, 1], rows[:, 2]

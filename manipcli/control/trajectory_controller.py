@@ -165,7 +165,6 @@ class JointTrajectoryController:
         self._timeout = cmd_timeout if cmd_timeout > self._constraints.goal_time else np.inf
         if 0.0 < cmd_timeout <= self._constraints.goal_time:
             self.notes = (f"cmd_timeout {cmd_timeout:g} s has no effect: it is not above goal_time",)
-
         by_error = controlled_by_error(self.interfaces)
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
@@ -176,13 +175,12 @@ class JointTrajectoryController:
         self._reference = Reference(
             rows[:3], self.interfaces, velocity_scale=scale if by_error else None, acceleration=self._facts.acceleration
         )
-        self._desired, self._desired_velocity = rows[0], rows[1]
-        self._commands = rows[3:]
+        self._desired, self._desired_velocity, self._commands = rows[0], rows[1], rows[3:]
         self._tracking = TrackingError(rows[:2], self._facts)
         self._errors = self._tracking.errors
         self._error, self._error_rate = self._errors
-        feed = self._reference.feed_room[0]
-        self._control = None if self._pid is None else self._pid.loop(self._errors, rows[3], feed=feed)
+        pid, feed = self._pid, self._reference.feed_room[0]
+        self._control = None if pid is None else pid.loop(self._errors, rows[3], feed=feed)
         self.scaling = SpeedScaling(self._reference, speed_scaling, now=lambda: self._time, ask=self._ask)
         self._clear(time=0.0)
 
@@ -204,7 +202,6 @@ class JointTrajectoryController:
         return self._default_tolerances if goal is None else goal.tolerances
 
     def _tune(self, gains: tuple[GainsSpec, ...]) -> None:
-        assert self._pid is not None
         tune_pid(self._pid, self.name, self.joints, gains)
         self._reference.scale_feed(np.array([gain.ff_velocity_scale for gain in gains]))
 
@@ -361,8 +358,7 @@ class JointTrajectoryController:
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
         if goal.unchecked and not goal.reachable(self._transitions, reference, time, period, measured.position):
             return
-        speed = self.scaling.pace(time)
-        at = (measured.position, measured.velocity)
+        speed, at = self.scaling.begin(time), (measured.position, measured.velocity)
         active = self._transitions.to_goal(goal.trajectory, later, reference, time, speed, at)
         samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)

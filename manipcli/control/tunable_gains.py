@@ -40,11 +40,16 @@ class TunableGains:
         """By joint, those of the next update."""
         return self._now
 
-    def change(self, values: Mapping[tuple[str, str], object]) -> None:
+    def change(
+        self,
+        values: Mapping[tuple[str, str], object],
+        check: Callable[[Mapping[str, GainsSpec]], None] = lambda _: None,
+    ) -> None:
         """Change gains from the next update on, all or none.
 
         Args:
             values: by joint and name of the gain, which `now` has; None removes a bound.
+            check: called with the new gains by joint; raises InvalidArgument to refuse them.
 
         Raises:
             InvalidArgument: a value that the controllers file may not have either, or one of `FIXED`.
@@ -56,6 +61,7 @@ class TunableGains:
                 raise InvalidArgument("CTRL222", message, hint="set it in the controllers file")
             given = new[joint].model_dump(exclude_unset=True) | {gain: value}
             new[joint] = gains_of(self._name, joint, given, type(new[joint]))
+        check(new)
         self._apply(tuple(new[joint] for joint in self._joints))
         self._now = new
 

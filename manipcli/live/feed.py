@@ -27,7 +27,7 @@ class Feed:
         period: [s] of the control loop.
         link: to the network; None: there is none.
         topics: of the messages of events that the network publishes.
-        latched: topics and messages that are sent again when a session begins after a reset.
+        again: topics and messages that are sent again when a session begins after a reset.
         least: [s] least wall time between two samples.
 
     Attributes:
@@ -40,11 +40,11 @@ class Feed:
         link: Link | None = None,
         *,
         topics: Container[str] = (),
-        latched: Sequence[tuple[str, bytes]] = (),
+        again: Sequence[tuple[str, bytes]] = (),
         least: float = 0.0,
     ) -> None:
         self.observer: Observer | None = None
-        self._link, self._topics, self._latched = link, topics, latched
+        self._link, self._topics, self._again = link, topics, again
         self._numbers: memoryview | list[int] = [0] * 8 if link is None else link.numbers
         self._every = max(1, round(SAMPLE_PERIOD / period))
         self._least, self._next = least, 0.0
@@ -52,7 +52,7 @@ class Feed:
     def restart(self) -> None:
         """The next session begins, with tick 0."""
         self.observer, self._numbers[TICK] = None, 0
-        for topic, data in self._latched:
+        for topic, data in self._again:
             self.message(topic, 0, data)
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:

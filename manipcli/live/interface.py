@@ -15,6 +15,7 @@ from manipcli.live.interfaces import (
     jog,
     parameters,
     path,
+    rosapi_parameters,
     simulation,
     task,
 )
@@ -30,6 +31,7 @@ INTERFACES: Final = (
     emergency_stop.endpoints,
     controller_manager.endpoints,
     parameters.endpoints,
+    rosapi_parameters.endpoints,
     simulation.endpoints,
     entities.endpoints,
     task.endpoints,

@@ -101,6 +101,8 @@ class Link:
         """The commands that have arrived."""
         if self._waits:
             self._flush()
+        if not self._given_back and self.numbers[SENT] == self._taken:
+            return ()
         found, self._given_back = self._given_back, []
         if self.numbers[SENT] != self._taken and not self.lost:
             self._receive()
@@ -120,7 +122,7 @@ class Link:
 
     def give_back(self, commands: Sequence[Command]) -> None:
         """Take these again, before all others."""
-        self._given_back += commands
+        self._given_back[:0] = commands
 
     def _receive(self) -> None:
         try:

@@ -65,6 +65,7 @@ class Obedience:
             command.answer(Answer(True, values))
 
     def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
+        """Answer; an event tells it, unless the command is not in the log either."""
         if logged:
             self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}

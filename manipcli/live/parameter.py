@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Final, cast
 
 from annotated_types import Ge, Le
 
+from manipcli.control.controller import Controller
+from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.manager import ControllerManager
-from manipcli.control.tunable_gains import FIXED, TunableGains, gains_in
+from manipcli.control.tunable_gains import FIXED, gains_in
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean
+from manipcli.live.live_robot import LiveRobot
+from manipcli.spec.controllers import GainsSpec
 
 NOT_SET, BOOL, INTEGER, DOUBLE, STRING, STRING_ARRAY = 0, 1, 2, 3, 4, 9
 FIELDS: Final = {
@@ -51,65 +56,105 @@ class Parameter:
         return self.gain is None
 
 
-def parameters_of(manager: ControllerManager, name: str) -> dict[str, Parameter]:
-    """The parameters of a controller, by their names in ros2_controllers.
+def parameter_names(manager: ControllerManager, name: str) -> list[str]:
+    """The names of the parameters of a controller, those of ros2_controllers.
 
     Raises:
         InvalidArgument: it is not loaded.
     """
+    gains = gains_in(manager[name])
+    own = {} if gains is None else gains.now
+    return [*_FIXED, *(f"gains.{joint}.{gain}" for joint, each in own.items() for gain in _fields(type(each)))]
+
+
+def parameter_of(manager: ControllerManager, name: str, word: str) -> Parameter | None:
+    """A parameter of a controller; None: it has no such parameter. Raises as `parameter_names`."""
     controller = manager[name]
-    every = next(info.every for info in manager.list() if info.name == name)
-    found = {
-        "joints": Parameter(list(controller.joints), STRING_ARRAY, "The joints that it claims."),
-        "command_interfaces": Parameter(list(controller.interfaces), STRING_ARRAY, "What it commands of each joint."),
-        "update_rate": Parameter(round(1.0 / (manager.period * every)), INTEGER, "Updates per second [Hz]."),
-        "use_sim_time": Parameter(True, BOOL, "Its time is the simulated time."),
-    }
+    if word in _FIXED:
+        return _FIXED[word](manager, controller)
+    first, _, rest = word.partition(".")
+    joint, _, gain = rest.rpartition(".")
     gains = gains_in(controller)
-    return found if gains is None else found | dict(_gains(gains))
+    own = None if gains is None or first != "gains" else gains.now.get(joint)
+    if own is None or gain not in _fields(type(own)):
+        return None
+    value, field = cast("Value", getattr(own, gain)), _fields(type(own))[gain]
+    kind = NOT_SET if value is None and gain in FIXED else DOUBLE if value is None else _OF[type(value)]
+    return replace(field, value=value, type=kind, gain=None if gain in FIXED else (joint, gain))
 
 
-def _gains(gains: TunableGains) -> Iterator[tuple[str, Parameter]]:
-    for joint, own in gains.now.items():
-        for gain, field in type(own).model_fields.items():
-            value = cast("Value", getattr(own, gain))
-            kind = NOT_SET if value is None and gain in FIXED else DOUBLE if value is None else _OF[type(value)]
-            where = None if gain in FIXED else (joint, gain)
-            least = next((float(str(one.ge)) for one in field.metadata if isinstance(one, Ge)), None)
-            most = next((float(str(one.le)) for one in field.metadata if isinstance(one, Le)), None)
-            yield f"gains.{joint}.{gain}", Parameter(value, kind, field.description or "", where, least, most)
+def _update_rate(manager: ControllerManager, controller: Controller) -> Parameter:
+    every = next(info.every for info in manager.list() if info.name == controller.name)
+    return Parameter(round(1.0 / (manager.period * every)), INTEGER, "Updates per second [Hz].")
 
 
-def change(manager: ControllerManager, name: str, values: Mapping[str, Value]) -> None:
+_FIXED: Final[dict[str, Callable[[ControllerManager, Controller], Parameter]]] = {
+    "joints": lambda _, own: Parameter(list(own.joints), STRING_ARRAY, "The joints that it claims."),
+    "command_interfaces": lambda _, own: Parameter(list(own.interfaces), STRING_ARRAY, "What it commands."),
+    "update_rate": _update_rate,
+    "use_sim_time": lambda _, own: Parameter(True, BOOL, "Its time is the simulated time."),
+}
+"""What every controller has, and cannot change."""
+
+
+@cache
+def _fields(kind: type[GainsSpec]) -> dict[str, Parameter]:
+    """The gains of a joint without their values."""
+    found = {}
+    for gain, field in kind.model_fields.items():
+        least = next((float(str(one.ge)) for one in field.metadata if isinstance(one, Ge)), None)
+        most = next((float(str(one.le)) for one in field.metadata if isinstance(one, Le)), None)
+        found[gain] = Parameter(None, DOUBLE, field.description or "", None, least, most)
+    return found
+
+
+def change(robot: LiveRobot, name: str, values: Mapping[str, Value]) -> None:
     """Change parameters of a controller from the next tick on, all or none.
 
     Args:
-        manager, name: its manager and name.
+        robot, name: its robot and name.
         values: by name; None removes a bound.
 
     Raises:
         InvalidArgument: the controller is not loaded; a parameter that is unknown, cannot change, or is of another
             type; a value that is not finite, or that a controllers file may not have either.
     """
-    known = parameters_of(manager, name)
     wanted: dict[tuple[str, str], object] = {}
     for word, value in values.items():
-        parameter = known.get(word)
-        if parameter is None:
-            raise unknown(name, word, known)
+        parameter = known(robot.manager, name, word)
         if parameter.gain is None:
             message = f"parameter '{word}' of controller '{name}' is read-only"
             raise InvalidArgument("LIVE152", message, hint="set it in the controllers file")
         wanted[parameter.gain] = _typed(word, parameter, value)
-    gains = gains_in(manager[name])
+    gains = gains_in(robot.manager[name])
     if gains is not None and wanted:
-        gains.change(wanted)
+        gains.change(wanted, partial(_check, robot, name))
 
 
-def unknown(name: str, word: str, known: Mapping[str, Parameter]) -> InvalidArgument:
-    """The error for a parameter that a controller does not have."""
-    hint = did_you_mean(word[:80], known, kind="parameters")
-    return InvalidArgument("LIVE151", f"controller '{name}' has no parameter '{word[:80]}'", hint=hint)
+def _check(robot: LiveRobot, name: str, gains: Mapping[str, GainsSpec]) -> None:
+    """The checks of the controllers file, with these gains.
+
+    Raises:
+        InvalidArgument: an error.
+    """
+    spec = robot.task.true.controllers.spec.controllers[name].model_copy(update={"gains": dict(gains)})
+    for problem in CONTROLLERS[spec.type].check(spec, robot.task.robot):
+        if problem.severity == "error":
+            text = f"controller '{name}': {problem.message}"
+            raise InvalidArgument(problem.code or "CTRL100", text, hint=problem.hint)
+
+
+def known(manager: ControllerManager, name: str, word: str) -> Parameter:
+    """As `parameter_of`.
+
+    Raises:
+        InvalidArgument: the controller is not loaded, or has no such parameter.
+    """
+    found = parameter_of(manager, name, word)
+    if found is None:
+        hint = did_you_mean(word[:80], parameter_names(manager, name), kind="parameters")
+        raise InvalidArgument("LIVE151", f"controller '{name}' has no parameter '{word[:80]}'", hint=hint)
+    return found
 
 
 def _typed(word: str, parameter: Parameter, value: Value) -> Value:

@@ -74,7 +74,7 @@ class Publisher:
         self.state.time[...] = sample.tick * self.period
         self.outputs = sample.outputs
         if CLOCK in wanted:
-            found[CLOCK] = _clock(self.ns(sample.tick))
+            found[CLOCK] = clock_message(self.ns(sample.tick))
         own = self._table.keys() & wanted
         if not own:
             return found
@@ -123,7 +123,7 @@ def is_sampled(topic: str, offer: Offer) -> bool:
     return topic in offer.published and topic not in offer.latched
 
 
-def _clock(ns: int) -> bytes:
+def clock_message(ns: int) -> bytes:
     """A rosgraph_msgs/Clock."""
     writer = CdrWriter()
     writer.time(ns)

@@ -1,4 +1,7 @@
-"""Services of rosapi, which clients of rosbridge ask for names and types; `interfaces/parameters.py` has the others."""
+"""Services of rosapi, which clients of rosbridge ask for names and types; they only read.
+
+`interfaces/parameters.py` has those of parameters.
+"""
 
 from __future__ import annotations
 

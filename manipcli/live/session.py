@@ -15,6 +15,7 @@ from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
 from manipcli.live.network_process import NetworkProcess
+from manipcli.live.offer import CLOCK
 from manipcli.live.pace import Pace
 from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
@@ -39,16 +40,16 @@ class LiveOptions:
         port: 0: any free port.
         speed: simulated seconds per second; None: as fast as possible.
         lasting: [s] of wall time; None: until it is interrupted.
-        outlets: what shows the session besides the WebSocket server.
         run: also do the steps of the task.
+        outlets: what shows the session besides the WebSocket server.
     """
 
     access: Access
     port: int = DEFAULT_PORT
     speed: float | None = 1.0
     lasting: float | None = None
-    outlets: Sequence[OutletOptions] = ()
     run: bool = False
+    outlets: Sequence[OutletOptions] = ()
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
@@ -80,7 +81,7 @@ def served(
         NetworkFailed: LIVE200 the process of the network did not start.
     """
     from manipcli.live.network import Setup  # asyncio, which nothing else needs
-    from manipcli.live.publisher import begin_messages
+    from manipcli.live.publisher import begin_messages, clock_message
 
     period = task.spec.simulation.control_period
     robot, scene = task.robot, task.true.scene
@@ -90,8 +91,8 @@ def served(
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with NetworkProcess(setup) as network:
         least = FAST_PERIOD if options.speed is None else 0.0
-        latched = begin_messages(robot, scene, channels)
-        feed = Feed(period, network.link, topics=offer.published, latched=latched, least=least)
+        again = (*begin_messages(robot, scene, channels), (CLOCK, clock_message(0)))
+        feed = Feed(period, network.link, topics=offer.published, again=again, least=least)
         left = 0
 
         def ready() -> None:

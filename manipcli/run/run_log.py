@@ -31,7 +31,7 @@ from manipcli.record.write.recorder import Recorder
 from manipcli.run.embedding import embeddable
 from manipcli.run.engine_settings import engine_settings
 from manipcli.scene.scene_file import scene_to_json
-from manipcli.shapes.primitives import Mesh
+from manipcli.shapes import primitives
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.resolved import resolved
@@ -193,8 +193,7 @@ def mesh_files(task: Task) -> dict[str, Path]:
     """The mesh files of robot and scene by URI, sorted."""
     geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
     geometries += [g for body in task.scene.bodies for g in body.geometries]
-    meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
-    return {uri: meshes[uri] for uri in sorted(meshes)}
+    return primitives.mesh_files(geometries)
 
 
 def _portable_task(spec: TaskSpec) -> TaskSpec:

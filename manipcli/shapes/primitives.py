@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +70,12 @@ class Geometry:
     X_LS: Transform
     shape: Shape
     rgba: Rgba | None = None
+
+
+def mesh_files(geometries: Iterable[Geometry]) -> dict[str, Path]:
+    """The files of their meshes by URI, sorted."""
+    found = {each.shape.uri: each.shape.path for each in geometries if isinstance(each.shape, Mesh)}
+    return dict(sorted(found.items()))
 
 
 def drawn_once(geometries: tuple[Geometry, ...]) -> tuple[Geometry, ...]:

@@ -72,7 +72,7 @@ def test_no_limit_is_exceeded_by_1000_random_messages() -> None:
             axes = (None, "", ROBOT.root)[rng.integers(3)]
             target: ToolTarget | JointTarget | None = tool(rng.normal(size=6) * 10 ** rng.uniform(-2, 2), axes)
         else:
-            target = None if kind < 0.5 else JointTarget(rng.normal(size=len(ARM)) * 10 ** rng.uniform(-1, 2))
+            target = None if kind < 0.5 else JointTarget((rng.normal(size=len(ARM)) + 1) * 10 ** rng.uniform(-1, 2))
         for _ in range(rng.integers(1, 7)):
             after, speed = made.step(q, v, target, dt)
             np.testing.assert_allclose(after, q + 0.5 * dt * (v + speed), atol=1e-14, rtol=0.0)
@@ -151,6 +151,27 @@ def test_near_a_limit_the_tool_slows_down_on_its_line() -> None:
     assert reached == 5
 
 
+def test_at_the_end_of_its_reach_the_tool_stops_on_its_line_and_comes_back() -> None:
+    made, q, v = law(), BENT.copy(), np.zeros(len(ARM))
+    _, begin = pose(q)
+    out, home = tool([0.3, 0, 0, 0, 0, 0]), tool([-0.3, 0, 0, 0, 0, 0])
+    for target, ticks in ((out, 600), (home, 600)):
+        for tick in range(ticks):
+            before = v
+            q, v = made.step(q, v, target, 4 * PERIOD)
+            assert (np.abs(v) < 0.9 * FACTS.velocity).all()
+            if tick % 20 == 0:
+                assert np.abs(pose(q)[1] - begin)[1:].max() < 2e-3
+        if target is out:
+            full = HOME.copy()
+            full[COLUMNS] = q
+            assert np.linalg.svd(KINEMATICS.jacobian(full, *TOOL)[:, COLUMNS], compute_uv=False)[-1] < 0.01
+            reached = pose(q)[1][0]
+            assert np.abs(v - before).max() < 1e-3
+    assert reached - begin[0] > 0.1
+    assert pose(q)[1][0] < reached - 0.15
+
+
 def test_a_redundant_joint_at_its_limit_does_not_stop_the_tool() -> None:
     q = BENT.copy()
     free = KINEMATICS.jacobian(configuration(ROBOT), TOOL[0])[:, COLUMNS]
@@ -162,6 +183,15 @@ def test_a_redundant_joint_at_its_limit_does_not_stop_the_tool() -> None:
     within = wish.within(-tight, tight)
     np.testing.assert_allclose(free @ within, free @ wish.velocity, atol=1e-6)
     assert (np.abs(within) <= tight + 1e-12).all()
+
+
+def test_directions_in_which_the_joints_never_move_the_tool_are_left_out() -> None:
+    """Parallel axes and a joint beyond the tool: the nearest velocity, as by the pseudo-inverse."""
+    J = np.zeros((6, 5))
+    J[:2, :4] = np.random.default_rng(4).normal(size=(2, 4))
+    J[5, :4] = 1.0
+    x = np.array([0.1, 0.2, 0.3, 0.1, 0.0, 0.1])
+    np.testing.assert_allclose(TaskVelocity(J, x).velocity, np.linalg.pinv(J) @ x, atol=1e-12)
 
 
 def controller(**more: object) -> JointTrajectoryController:

@@ -114,6 +114,7 @@ def test_a_scaled_trajectory_is_on_the_same_path_within_the_same_limits(seed):
         assert abs(velocity[:, j]).max() <= limit.velocity * 1.001
         assert abs(acceleration[:, j]).max() <= limit.acceleration * 1.03  # differences lag by a tick
         assert abs(rows[:, 2, j]).max() <= limit.acceleration * (1 + 1e-9)  # the reference itself
+    np.testing.assert_allclose(rows[:-1, 3], rows[1:, 0], atol=1e-12)  # a command is the next reference
     np.testing.assert_allclose(rows[1:-1, 1], (velocity[1:] + velocity[:-1]) / 2, atol=1e-2)
 
 
@@ -191,3 +192,19 @@ def test_the_speed_changes_without_a_step_of_its_rate_and_arrives(seed):
     assert max(speeds) <= 1.0 + 1e-6
     s = [clock.now(k * PERIOD)[0] for k in range(tick, tick + 400)]
     assert (np.diff(s) >= 0.0).all()
+
+
+def test_a_goal_in_a_pause_that_begins_in_motion_stops_on_its_own_path():
+    """Without a step of its velocity: the motion is that of a stop which the pause came after."""
+    limits = most()
+    ride = Ride(limits)
+    ride.run(600).handle.cancel()
+    ride.run(20).controller.scaling.pause()
+    moving = ride.rows[-1][1].copy()
+    assert abs(moving).max() > 0.3
+    ride.controller.send_goal(JointTrajectory(NAMES, [TrajectoryPoint([1.4, 0.8], 2.0, [0.0, 0.0])]))
+    ride.run(800)
+    velocity = np.array(ride.rows)[600:, 1]
+    assert abs(np.diff(velocity, axis=0)).max() / PERIOD < 3.0 * max(limit.acceleration for limit in limits)
+    assert ride.factors[-1] == 0.0
+    assert not velocity[-1].any()

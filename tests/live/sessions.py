@@ -18,11 +18,13 @@ from manipcli.live.access import Access
 from manipcli.live.command import Command
 from manipcli.live.feed import Feed
 from manipcli.live.loop import Outside, simulate_live
+from manipcli.live.outlet import OutletOptions
 from manipcli.live.pace import Pace
 from manipcli.live.session import LiveOptions
 from manipcli.live.source import Schedule
 from manipcli.logs.judge_log import judge_log
 from manipcli.run.execute import build_manager
+from manipcli.run.observer import SILENT, Progress
 from manipcli.run.run_log import open_log, run_metadata, verdict_metadata
 from manipcli.task.part import LIVE, Part
 
@@ -63,13 +65,14 @@ def serving(
     use: Callable[[str], Awaitable[None]],
     *,
     token: str | None = TOKEN,
+    outlets: Sequence[OutletOptions] = (),
+    progress: Progress = SILENT,
     task: Path | str = SMALL,
     speed: float | None = None,
-    page: bool = False,
 ) -> Path:
     """Serve a task, a file or its text, while `use` runs with its URL; returns the log.
 
-    `speed`: simulated seconds per second; None: as fast as possible. `page`: use the page for browsers and its URL.
+    `speed`: simulated seconds per second; None: as fast as possible.
     """
     file, log = folder / "small.yaml", folder / "session.mcap"
     if isinstance(task, Path):
@@ -85,10 +88,16 @@ def serving(
             raise KeyboardInterrupt
 
     def serve() -> None:
-        options = LiveOptions(Access(token), port=0, speed=speed, page=page, page_port=0)
+        options = LiveOptions(Access(token), port=0, speed=speed, outlets=outlets)
         try:
             _, failure = pipeline.serve_task(
-                file, options, log=log, between=between, announce=announced.put, allow_outside=True
+                file,
+                options,
+                log=log,
+                progress=progress,
+                between=between,
+                announce=announced.put,
+                allow_outside=True,
             )
             failures.extend([failure] if failure else [])
         except BaseException as error:  # noqa: BLE001 (raised again by the test)
@@ -98,9 +107,8 @@ def serving(
     thread = threading.Thread(target=serve)
     thread.start()
     try:
-        for _ in range(1 + page):
-            url = announced.get(timeout=60)
-            assert url, failures
+        url = announced.get(timeout=60)
+        assert url, failures
         asyncio.run(_within(use, url))
     finally:
         over.set()

@@ -15,7 +15,8 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.live.command import CALL_SERVICE, END, PUBLISH, Answer, Command
-from manipcli.live.interface import endpoints_of, request_type
+from manipcli.live.interface import endpoints_of
+from manipcli.live.offer import request_type
 from manipcli.record.foreign.topics import open_topics
 from manipcli.record.json_message import definition, from_json, to_json
 from manipcli.run.execute import build_manager
@@ -41,8 +42,8 @@ def move(seconds: float) -> Command:
     return publish("/arm_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", message)
 
 
-def set_gain(joint: str, gain: str, value: object) -> Command:
-    name = f"/arm_controller:gains.{joint}.{gain}"
+def set_gain(joint: str, gain: str, value: object, controller: str = "arm_controller") -> Command:
+    name = f"/{controller}:gains.{joint}.{gain}"
     return call("/rosapi/set_param", "rosapi_msgs/srv/SetParam", name=name, value=json.dumps(value))
 
 
@@ -159,6 +160,7 @@ def test_commands_and_references_by_topic(tmp_path: Path) -> None:
         12: [publish("/arm_controller/commands", kind, {"data": there[:5]})],
         14: [publish("/wrist_controller/reference", reference, {"dof_names": ["joint_7"], "values": [0.02]})],
         16: [publish("/wrist_controller/reference", reference, {"dof_names": ["joint_1"], "values": [0.5]})],
+        18: [set_gain("joint_7", "ff_velocity_scale", 1.0, "wrist_controller")],
         40: [Command(END, "")],
     }
     simulated(file, commands, log)
@@ -168,7 +170,8 @@ def test_commands_and_references_by_topic(tmp_path: Path) -> None:
     wrist = messages(log, "/wrist_controller/controller_state")
     assert [state["reference"]["positions"][0] for _, state in wrist][14:] == [0.02] * 26
     refused = [event["text"] for _, event in messages(log, "/task/events") if event["kind"] == "refused"]
-    assert ["expected 6" in refused[0], "each joint of controller 'wrist_controller' once" in refused[1]] == [True] * 2
+    words = ("expected 6", "each joint of controller 'wrist_controller' once", "no effect in a `pid` controller")
+    assert [word in text for word, text in zip(words, refused, strict=True)] == [True] * 3
 
 
 def test_all_services_have_a_definition_of_their_request_and_response(tmp_path: Path) -> None:
@@ -231,6 +234,11 @@ def test_roslibpy_gets_and_sets_parameters(tmp_path: Path) -> None:
         assert "may only read" in refused["values"]
         read = await reader.call("/rosapi/get_param", name="/arm_controller:gains.joint_2.p")
         assert read["values"]["value"] == "700.0"
+        owner = await opened(url)
+        for name, value in (("x" * 10**5, "1"), ("/arm_controller:gains.joint_2.p", "[" * 10**5)):
+            hostile = await owner.call("/rosapi/set_param", name=name, value=value)
+            assert hostile["result"] is False
+            assert len(hostile["values"]) < 400
 
     log = serving(tmp_path, use)
     assert pipeline.verify_log(log).identical

@@ -115,7 +115,7 @@ def states_at_a_throttled_rate(ros: roslibpy.Ros) -> None:
     start = time.monotonic()
     states = Messages(ros, "/joint_states", "sensor_msgs/JointState", throttle_rate=20)
     count = len(states.until(lambda found: len(found) >= 20))
-    assert count <= (time.monotonic() - start) * 50.0 + 2
+    assert count <= (time.monotonic() - start) * 50.0 + 3  # two more can follow a gap at once
     second = Messages(ros, "/joint_states", "sensor_msgs/msg/JointState", compression="png")
     second.until(lambda found: len(found) >= 1)
     second.topic.unsubscribe()  # roslibpy removes the callbacks of both; the server goes on for the first

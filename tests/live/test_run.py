@@ -18,8 +18,7 @@ from tests.live.sessions import HOME, SMALL, simulated, trajectory
 
 MOVES = (
     SMALL.replace("steps: [wait: 0.1 s]", "steps: [move: {to: {joint_1: 20 deg}}, move: {to: home}]")
-    + "expect: [tracking: {group: arm, within: 0.1 rad}, duration: {below: 5 s}, "
-    "at_pose: {pose: home, within: 3 deg}]\n"
+    + "expect: [tracking: {group: arm, within: 5 deg}, duration: {below: 5 s}, at_pose: {pose: home, within: 3 deg}]\n"
 )
 
 

@@ -12,8 +12,13 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from benchmarks.malformed_frames import malformed
 from manipcli import pipeline
-from manipcli.live import server
+from manipcli.live.access import Access
+from manipcli.live.connection import Services
+from manipcli.live.offer import Offer
+from manipcli.live.rosapi import Rosapi
+from manipcli.live.server import LiveServer
 from manipcli.live.source import recorded_commands
 from manipcli.record.foreign.topics import open_topics
 from tests.live.sessions import HOME, opened, serving, trajectory
@@ -135,44 +140,6 @@ def test_without_the_token_a_client_only_reads(tmp_path: Path) -> None:
     assert recorded_ops(serving(tmp_path, use)) == ["end"]
 
 
-def malformed(draw: random.Random) -> str | bytes:
-    """A frame that is not a valid command."""
-    junk: list[Any] = [None, True, -1, 1e308, 2**70, "", "x" * 300, "\0", [], {}, [[]], {"a": [1]}, "NaN", "\ud800"]
-    some = lambda: draw.choice(junk)  # noqa: E731
-    bad_goal = trajectory(ARM, HOME, 1.0)
-    bad_goal["points"][0]["positions"][draw.randrange(7)] = draw.choice([None, True, "1", [], {}, 10**400])
-    topic = "/arm_controller/joint_trajectory"
-    choices: list[Any] = [
-        some(),
-        {"op": some()},
-        {"op": "publish", "topic": some(), "msg": some()},
-        {"op": "publish", "topic": topic, "msg": bad_goal},
-        {"op": "publish", "topic": topic, "msg": {"points": {"positions": [0]}, "joint_names": some()}},
-        {"op": "subscribe", "topic": some(), "throttle_rate": some(), "queue_length": some()},
-        {"op": "subscribe", "topic": "/tf", "throttle_rate": draw.choice([-1, "x", [], 1e308, None])},
-        {"op": "call_service", "service": some(), "args": some(), "id": some()},
-        {"op": "call_service", "service": "/rosapi/topic_type", "args": some()},
-        {"op": "call_service", "service": "/controller_manager/switch_controller", "args": {"strictness": "x"}},
-        {"op": "send_action_goal", "action": GOAL, "id": draw.choice([None, 1, "", [], "x" * 999]), "args": {}},
-        {"op": "send_action_goal", "action": GOAL, "id": "z", "args": {"trajectory": some() or 0}},
-        {"op": "cancel_action_goal", "action": some(), "id": some()},
-        {"op": "set_level", "level": some()},
-    ]
-    text = json.dumps(draw.choice(choices))
-    match draw.randrange(8):
-        case 0:
-            return text[: draw.randrange(len(text))] + "{"
-        case 1:
-            return draw.choice(["[", '{"op":']) * draw.choice([40, 3000, 100_000])
-        case 2:
-            return draw.randbytes(draw.randrange(1, 200))
-        case 3:
-            return '{"op":"publish","topic":"TOPIC","msg":{"points":[{"positions":[NaN]}]}}'.replace("TOPIC", topic)
-        case 4:
-            return '{"op":"subscribe","topic":"/tf","x":[' + "0," * 50_000 + "0]}"
-    return text
-
-
 def test_malformed_frames_disturb_no_other_client_and_are_no_commands(tmp_path: Path) -> None:
     async def attack(url: str, seed: int, frames: int) -> None:
         draw = random.Random(seed)
@@ -180,7 +147,7 @@ def test_malformed_frames_disturb_no_other_client_and_are_no_commands(tmp_path: 
         reading = asyncio.create_task(read(socket))
         for _ in range(frames):
             try:
-                await socket.send(malformed(draw))
+                await socket.send(malformed(draw, trajectory(ARM, HOME, 1.0)))
             except ConnectionClosed:
                 socket = await connect(url)
                 reading = asyncio.create_task(read(socket))
@@ -239,16 +206,22 @@ def test_the_hand_closes_by_its_action(tmp_path: Path) -> None:
     serving(tmp_path, use)
 
 
-def test_a_client_that_never_reads_is_disconnected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "UNREAD", 0.3)
+def test_a_client_that_never_reads_is_disconnected() -> None:
+    offer = Offer({"/large": "std_msgs/msg/String"}, frozenset({"/large"}), {}, {}, {}, frozenset())
+    text = json.dumps({"op": "publish", "topic": "/large", "msg": {"data": "x" * 100_000}})
+    services = Services(
+        offer, lambda topic: text, Rosapi(offer, dict), lambda command: False, lambda call: call(), lambda: None
+    )
 
-    async def use(url: str) -> None:
-        deaf = await connect(url, max_queue=1)
-        with pytest.raises(ConnectionClosed):
-            while True:  # each is answered with the whole description
-                await deaf.send(json.dumps({"op": "subscribe", "topic": "/robot_description"}))
-                await asyncio.sleep(0.002)
-        good = await opened(url)
-        assert (await good.call("/rosapi/nodes"))["result"] is True
+    async def use() -> None:
+        async with LiveServer(services, Access(None), unread=0.1).listening(0) as port:
+            deaf = await connect(f"ws://127.0.0.1:{port}", max_queue=1)
+            with pytest.raises(ConnectionClosed):
+                while True:  # each is answered with the whole text
+                    await deaf.send(json.dumps({"op": "subscribe", "topic": "/large"}))
+                    await asyncio.sleep(0.002)
+            good = await opened(f"ws://127.0.0.1:{port}")
+            assert (await good.call("/rosapi/nodes"))["result"] is True
+            await good.socket.close()
 
-    serving(tmp_path, use)
+    asyncio.run(asyncio.wait_for(use(), 60.0))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+from array import array
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -10,7 +12,8 @@ import numpy as np
 import pytest
 
 from manipcli import pipeline
-from manipcli.live.command import END, Command
+from manipcli.live.command import END, PUBLISH, Command
+from manipcli.live.link import Link
 from manipcli.live.name_pattern import BadPattern, name_pattern
 from manipcli.live.pace import Pace
 from manipcli.live.placing import misplaced
@@ -161,9 +164,14 @@ async def reset(client: Raw) -> None:
     client.others.clear()
     assert await state(client, STOPPED) == OK
     assert await ball(client) == (0.0, pytest.approx(there, abs=1e-3))
+    clocks = [each["msg"]["clock"] for each in client.others if each.get("topic") == "/clock"]
+    assert (clocks[-1]["sec"], clocks[-1]["nanosec"]) == (0, 0)
     assert await code(client, "/step_simulation", steps=3) == OK
     assert (await asked(client, "/get_simulation_state"))["state"]["state"] == PAUSED
     assert (await asked(client, "/rosapi/get_time"))["time"]["nanosec"] == 2_000_000
+    await client.send(op="call_service", id="r", service="/reset_simulation")
+    await client.send(op="call_service", id="s", service="/step_simulation")
+    assert (await client.until(op="service_response", id="s"))["values"]["result"]["result"] == OK  # it is paused still
     assert await state(client, QUITTING) == OK
 
 
@@ -175,11 +183,11 @@ def test_a_session_is_paused_stepped_and_reset_and_its_logs_simulate_the_same(tm
         await reset(client)
 
     log = serving(tmp_path, use, task=TASK)
-    logs = [log, *(log.with_name(f"session-{k}.mcap") for k in (2, 3))]
+    logs = [log, *(log.with_name(f"session-{k}.mcap") for k in (2, 3, 4))]
     assert sorted(tmp_path.glob("*.mcap")) == sorted(logs)
     for each in logs:
         assert pipeline.verify_log(each, package_path=[ROOT / "robots"]).identical
-    first, _, last = (read_recording(each) for each in logs)
+    first, _, last, _ = (read_recording(each) for each in logs)
     np.testing.assert_allclose(np.diff(first.states.time), PERIOD, atol=1e-9)  # no tick is left out
     assert len(last.states.time) == 3
     commands = recorded_commands(log, PERIOD, failed=True)
@@ -191,6 +199,17 @@ def test_a_recorded_session_that_waits_for_nobody_goes_on() -> None:
     schedule = Schedule({3: [Command(END, "")]})
     assert [len(schedule.take(tick)) for tick in (2, 3, 3)] == [0, 1, 0]
     assert not schedule.wait(10.0)
+
+
+def test_the_first_command_after_a_reset_is_before_those_that_came_after_it() -> None:
+    ends = socket.socketpair()
+    link = Link(ends[0], memoryview(array("q", [0] * 8)))
+    first, second, third = (Command(PUBLISH, name) for name in "abc")
+    link.give_back([second, third])
+    link.give_back([first])
+    assert [*link.take(0)] == [first, second, third]
+    for end in ends:
+        end.close()
 
 
 def test_a_pause_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Sample, Seed, seconds
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+
+if TYPE_CHECKING:
+    from manipcli.live.outlet import OutletOptions
 
 LOCAL = "127.0.0.1"
 
@@ -50,6 +53,17 @@ def serve(
     lasting: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="End after TIME of the wall clock (30s, 5min).")
     ] = None,
+    foxglove_port: Annotated[
+        int | None,
+        typer.Option(
+            "--foxglove-port",
+            metavar="N",
+            min=0,
+            max=65535,
+            help="Port for Foxglove, on 127.0.0.1, read-only; 0 is any free port [default: 8765].",
+        ),
+    ] = None,
+    no_foxglove: Annotated[bool, typer.Option("--no-foxglove", help="Do not serve Foxglove.")] = False,
     token_file: Annotated[
         Path | None,
         typer.Option("--token-file", metavar="FILE", help="Read the token from FILE [default: a random one, printed]."),
@@ -89,8 +103,8 @@ def serve(
         from manipcli.report import text
         from manipcli.report.run_report import RunReport, exit_code
 
-        outlets = () if no_page else (PageOptions(token, page_port),)
-        live = LiveOptions(Access(token, host), port, factor, wall, outlets, run)
+        outlets = (*_foxglove(foxglove_port, off=no_foxglove), *(() if no_page else [PageOptions(token, page_port)]))
+        live = LiveOptions(Access(token, host), port, factor, wall, run=run, outlets=outlets)
 
         def announce(url: str) -> None:
             console.result(url)
@@ -166,6 +180,22 @@ def _speed(word: str) -> float | None:
     if not 0.001 <= factor <= 1000.0:
         raise InvalidInput([Diagnostic("USE130", f"--speed is '{word}'; expected a number from 0.001 to 1000, or max")])
     return factor
+
+
+def _foxglove(port: int | None, *, off: bool) -> tuple[OutletOptions, ...]:
+    """The server for Foxglove; none with `--no-foxglove`.
+
+    Raises:
+        InvalidInput: options that exclude each other.
+    """
+    from manipcli.live.foxglove import FoxgloveOptions
+
+    if off and port is not None:
+        message = "--no-foxglove and --foxglove-port exclude each other"
+        raise InvalidInput([Diagnostic("USE150", message, hint="remove one of them")])
+    if off:
+        return ()
+    return (FoxgloveOptions(),) if port is None else (FoxgloveOptions(port, needed=True),)
 
 
 def _token(file: Path | None, *, host: str, open_: bool) -> str | None:

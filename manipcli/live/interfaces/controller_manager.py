@@ -12,6 +12,7 @@ from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.tunable_gains import gains_in
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
+from manipcli.live.fields import MAX_NAME
 from manipcli.live.live_robot import LiveRobot
 from manipcli.record.json_message import definition, from_json
 from manipcli.spec.controllers import ControllerSpec, Interface
@@ -124,27 +125,33 @@ def _interface(name: str, available: bool, *, claimed: bool = False) -> Values:
     return {"name": name, "data_type": "double", "is_available": available, "is_claimed": claimed}
 
 
+def _name(request: dict[str, Any]) -> str:
+    """The controller of a request, shortened: a longer name is none of ours."""
+    name: str = request["name"][:MAX_NAME]
+    return name
+
+
 def _load(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """Load a controller of the controllers file again, with the gains of the file; it is unconfigured."""
-    gains = gains_in(robot.manager.reload(request["name"]))
+    gains = gains_in(robot.manager.reload(_name(request)))
     if gains is not None:
         gains.reset()
     return {"ok": True}
 
 
 def _configure(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
-    robot.manager.configure(request["name"])
+    robot.manager.configure(_name(request))
     return {"ok": True}
 
 
 def _cleanup(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
-    robot.manager.cleanup(request["name"])
+    robot.manager.cleanup(_name(request))
     return {"ok": True}
 
 
 def _unload(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """Unload a controller; its channels in the log stay, without messages."""
-    robot.manager.unload(request["name"], keep=True)
+    robot.manager.unload(_name(request), keep=True)
     return {"ok": True}
 
 

@@ -1,9 +1,9 @@
 """Emergency stop: all controllers that command joints are deactivated at once, and their joints are held by brakes.
 
-Only hands stay active and keep their grip, as grippers with self-locking drives do: a brake in an engine holds the
-joint, not the force that it exerted, so that the object would fall. Goals end as aborted, and so does a step that runs.
+Only hands stay active and keep their grip, as grippers with self-locking drives do: a brake in PyBullet holds the
+joint, not the force that it exerted, so that the object would fall. Goals end as aborted, and a step that moves fails.
 Until the release no goal, trajectory or jog is accepted, and no controller can be activated. The release activates the
-same controllers again, which hold the measured position.
+same controllers, which hold the measured position.
 """
 
 from __future__ import annotations

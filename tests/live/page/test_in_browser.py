@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pytest
 
+from manipcli.live.page.options import PageOptions
 from manipcli.live.source import recorded_commands
 from manipcli.logs.replay import open_playback
-from tests.live.sessions import serving
+from manipcli.run.observer import SILENT
+from tests.live.sessions import TOKEN, serving
 
 ROOT = Path(__file__).parents[3]
 CLICK = """(label => {
@@ -37,6 +39,19 @@ class Page(Protocol):
     def wait_for(self, script: str, seconds: float = 120.0) -> None: ...
 
 
+class Told:
+    """A display that keeps the messages."""
+
+    def __init__(self) -> None:
+        self.messages: list[str] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(SILENT, name)
+
+    def message(self, text: str, *, detail: bool) -> None:
+        self.messages.append(text)
+
+
 def _drag(page: Page, slider: int, share: float) -> None:
     """Drag a slider to a share of its length, in five moves."""
     thumb, track = (
@@ -57,7 +72,10 @@ def _drag(page: Page, slider: int, share: float) -> None:
 
 @pytest.mark.slow
 def test_a_slider_moves_the_arm_and_the_emergency_stop_holds_it(browser: Page, tmp_path: Path) -> None:
-    async def use(url: str) -> None:
+    told = Told()
+
+    async def use(socket: str) -> None:
+        (url,) = [text.removeprefix("page: ") for text in told.messages if text.startswith("page: ")]
         browser.ask("Emulation.setDeviceMetricsOverride", width=1000, height=900, deviceScaleFactor=0.25, mobile=False)
         browser.open(url)
         port = url.split(":")[2].split("/")[0]
@@ -76,7 +94,7 @@ def test_a_slider_moves_the_arm_and_the_emergency_stop_holds_it(browser: Page, t
         assert [one for one in outside if not one.startswith(("data:", "blob:"))] == []
         assert browser.complaints == []
 
-    log = serving(tmp_path, use, speed=1.0, page=True)
+    log = serving(tmp_path, use, speed=1.0, outlets=[PageOptions(TOKEN, 0)], progress=told)
     schedule = recorded_commands(log, 0.001, failed=True)
     names = [command.name for tick in range(10**6) for command in schedule.take(tick)]
     assert set(names[:-2]) >= {"/arm_controller/joint_trajectory", "/hand_controller/gripper_cmd"}
