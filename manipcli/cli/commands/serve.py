@@ -98,12 +98,11 @@ def serve(
         from manipcli import pipeline
         from manipcli.cli.progress import StepProgress
         from manipcli.live.access import Access
-        from manipcli.live.page.options import PageOptions
         from manipcli.live.session import LiveOptions
         from manipcli.report import text
         from manipcli.report.run_report import RunReport, exit_code
 
-        outlets = (*_foxglove(foxglove_port, off=no_foxglove), *(() if no_page else [PageOptions(token, page_port)]))
+        outlets = (*_page(page_port, token, off=no_page), *_foxglove(foxglove_port, off=no_foxglove))
         live = LiveOptions(Access(token, host), port, factor, wall, run=run, outlets=outlets)
 
         def announce(url: str) -> None:
@@ -180,6 +179,21 @@ def _speed(word: str) -> float | None:
     if not 0.001 <= factor <= 1000.0:
         raise InvalidInput([Diagnostic("USE130", f"--speed is '{word}'; expected a number from 0.001 to 1000, or max")])
     return factor
+
+
+def _page(port: int | None, token: str | None, *, off: bool) -> tuple[OutletOptions, ...]:
+    """The page for browsers; none with `--no-page`.
+
+    Raises:
+        InvalidInput: options that exclude each other.
+    """
+    from manipcli.live.page.options import PageOptions
+
+    if off and port is not None:
+        raise InvalidInput(
+            [Diagnostic("USE153", "--no-page and --page-port exclude each other", hint="remove one of them")]
+        )
+    return () if off else (PageOptions(token, port),)
 
 
 def _foxglove(port: int | None, *, off: bool) -> tuple[OutletOptions, ...]:
