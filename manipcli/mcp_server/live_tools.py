@@ -62,7 +62,7 @@ class LiveTools:
             raise Failed("a session is running; end it with live_stop")
         folder = self._runner.folder
         file, log = inside(folder.file, task), inside(folder.log, f"{PurePath(task).stem}@live")
-        words = ["serve", f"--log={log}", "--force", "--port=0", "--no-foxglove", f"--speed={speed:g}"]
+        words = ["serve", f"--log={log}", "--force", "--port=0", "--no-foxglove", "--no-page", f"--speed={speed:g}"]
         words += [f"--for={LASTING}s", *options(overrides, seed=seed, sample=sample), *self._runner.package_options]
         session = _Session(await self._runner.start([*words, "--", file]))
         try:
