@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Unpack
@@ -267,9 +268,7 @@ def serve_task(
     ended: Callable[[RunReport, str], None] = lambda report, failure: None,
     **options: Unpack[LoadOptions],
 ) -> tuple[RunReport, str]:
-    """Opens the scene of a task, and lets clients command its controllers until the session ends.
-
-    A reset ends its log, and begins the next session with a log of its own.
+    """Opens the scene of a task, and lets clients command its controllers, also in further sessions after resets.
 
     Args:
         path: the task file.
@@ -278,14 +277,13 @@ def serve_task(
         force: replace `log` if it exists.
         embed_meshes: see `run_task`.
         progress: receives warnings and steps.
-        between: called before each tick; raises KeyboardInterrupt to end the session.
+        between: called before each tick; a KeyboardInterrupt ends the session.
         announce: called with the URL when clients can connect and the scene has settled.
         ended: called with what is returned when a reset has ended a session.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the last log, without steps by the expectations of the task that need none; and why the
-        simulation failed, or "". The verdict on a task that cannot be planned has no log.
+        The verdict on the last log, if there is a plan; and why the simulation failed, or "".
 
     Raises:
         InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
@@ -293,17 +291,13 @@ def serve_task(
     """
     task, loading = timed(_load, path, progress, options, None)
     task = replace(task, part=LIVE_RUN if live.run else LIVE)
-    stage = _plan if live.run else _held
-    (plan, warnings), planning = timed(stage, task, progress, None)
+    (plan, warnings), planning = timed(_plan, task, progress, None)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings), ""
     where = log if log is not None else default_log(task)
-
-    def late(text: str) -> None:
-        progress.message(text, detail=False)
-
     first, overwrite, number = where, force or log is None, 1
     manager = build_manager(task, plan.planner.kinematics)
+    late = partial(progress.message, detail=False)
     with served(task, manager, live, between=between, announce=announce, late=late) as outside:
         while True:
             verdict, timing = _record(
@@ -371,6 +365,8 @@ def _load(path: Path, progress: Progress, options: LoadOptions, prepared: Prepar
 
 def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task without a plan; and all warnings before the run."""
+    if task.part == LIVE:
+        return plan_task(task), task.warnings
     try:
         plan = prepared.take_plan(task) if prepared is not None else None
         plan = plan or plan_task(task, on_progress=progress.activity)
@@ -379,11 +375,6 @@ def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Pl
     findings = preflight_findings(task, plan)
     progress.warned(findings)
     return plan, (*task.warnings, *findings)
-
-
-def _held(task: Task, progress: Progress, prepared: None) -> tuple[Plan, tuple[Diagnostic, ...]]:
-    """As `_plan`, of a session without the steps of its task."""
-    return plan_task(task), task.warnings
 
 
 def _record(
