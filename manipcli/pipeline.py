@@ -277,14 +277,13 @@ def serve_task(
         force: replace `log` if it exists.
         embed_meshes: see `run_task`.
         progress: receives warnings and steps.
-        between: called before each tick; raises KeyboardInterrupt to end the session.
+        between: called before each tick; a KeyboardInterrupt ends the session.
         announce: called with the URL when clients can connect and the scene has settled.
         ended: called with what is returned when a reset has ended a session.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the last log, without steps by the expectations of the task that need none; and why the
-        simulation failed, or "". The verdict on a task that cannot be planned has no log.
+        The verdict on the last log, if there is a plan; and why the simulation failed, or "".
 
     Raises:
         InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
@@ -292,7 +291,7 @@ def serve_task(
     """
     task, loading = timed(_load, path, progress, options, None)
     task = replace(task, part=LIVE_RUN if live.run else LIVE)
-    (plan, warnings), planning = timed(_plan if live.run else _held, task, progress, None)
+    (plan, warnings), planning = timed(_plan, task, progress, None)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings), ""
     overwrite = force or log is None
@@ -361,6 +360,8 @@ def _load(path: Path, progress: Progress, options: LoadOptions, prepared: Prepar
 
 def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task without a plan; and all warnings before the run."""
+    if task.part == LIVE:
+        return plan_task(task), task.warnings
     try:
         plan = prepared.take_plan(task) if prepared is not None else None
         plan = plan or plan_task(task, on_progress=progress.activity)
@@ -369,11 +370,6 @@ def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Pl
     findings = preflight_findings(task, plan)
     progress.warned(findings)
     return plan, (*task.warnings, *findings)
-
-
-def _held(task: Task, progress: Progress, prepared: None) -> tuple[Plan, tuple[Diagnostic, ...]]:
-    """As `_plan`, of a session without the steps of its task."""
-    return plan_task(task), task.warnings
 
 
 def _record(
