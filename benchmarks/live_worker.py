@@ -35,6 +35,7 @@ TOPICS: Final = (
 )  # fmt: skip
 TRAJECTORY: Final = "/arm_controller/joint_trajectory"
 HOME: Final = (0.0, 0.1, 0.0, -1.6, 0.0, -0.1, 0.0)
+TOKEN: Final = "token-of-the-benchmark"
 THROTTLE: Final = 25
 """[ms] Least time between two messages of a topic that a client asks for: 40 Hz."""
 
@@ -94,7 +95,7 @@ def serve(folder: Path, speed: str) -> None:
     def announce(url: str) -> None:
         print(url, file=out, flush=True)
 
-    options = LiveOptions(Access(None), port=0, speed=None if speed == "max" else float(speed))
+    options = LiveOptions(Access(TOKEN), port=0, speed=None if speed == "max" else float(speed))
     with patch.object(Obedience, "obey", timed):
         pipeline.serve_task(
             task_file(folder), options, log=folder / "serve.mcap", force=True, between=count, announce=announce
