@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Unpack
@@ -19,7 +20,7 @@ from manipcli.judge.agreement import compare
 from manipcli.judge.measured_run import Variant
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.live.loop import Outside, simulate_live
-from manipcli.live.session import LiveOptions, next_log, recorded_session, served
+from manipcli.live.session import LiveOptions, recorded_session, served, session_logs
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
 from manipcli.logs.part_of import task_part
@@ -194,7 +195,7 @@ def run_task(
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings)
     where = log if log is not None else default_log(task)
     verdict, timing = _record(
-        task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
+        task, plan, where, progress, None, overwrite=force or log is None, embed_meshes=embed_meshes
     )
     timing = replace(timing, load=loading, plan=planning + timing.plan)
     return RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
@@ -267,9 +268,7 @@ def serve_task(
     ended: Callable[[RunReport, str], None] = lambda report, failure: None,
     **options: Unpack[LoadOptions],
 ) -> tuple[RunReport, str]:
-    """Opens the scene of a task, and lets clients command its controllers until the session ends.
-
-    A reset ends its log, and begins the next session with a log of its own.
+    """Opens the scene of a task, and lets clients command it until the session ends; a reset begins the next one.
 
     Args:
         path: the task file.
@@ -278,14 +277,13 @@ def serve_task(
         force: replace `log` if it exists.
         embed_meshes: see `run_task`.
         progress: receives warnings and steps.
-        between: called before each tick; raises KeyboardInterrupt to end the session.
+        between: called before each tick; a KeyboardInterrupt ends the session.
         announce: called with the URL when clients can connect and the scene has settled.
         ended: called with what is returned when a reset has ended a session.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the last log, without steps by the expectations of the task that need none; and why the
-        simulation failed, or "". The verdict on a task that cannot be planned has no log.
+        The verdict on the last log, if there is a plan; and why the simulation failed, or "".
 
     Raises:
         InvalidInput: a file, the port or the path of the log is invalid; nothing was simulated.
@@ -293,29 +291,25 @@ def serve_task(
     """
     task, loading = timed(_load, path, progress, options, None)
     task = replace(task, part=LIVE_RUN if live.run else LIVE)
-    stage = _plan if live.run else _held
-    (plan, warnings), planning = timed(stage, task, progress, None)
+    (plan, warnings), planning = timed(_plan, task, progress, None)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings), ""
-    where = log if log is not None else default_log(task)
-
-    def late(text: str) -> None:
-        progress.message(text, detail=False)
-
-    first, overwrite, number = where, force or log is None, 1
-    manager = build_manager(task, plan.planner.kinematics)
+    overwrite = force or log is None
+    logs = session_logs(log if log is not None else default_log(task), overwrite=overwrite)
+    manager, late = build_manager(task, plan.planner.kinematics), partial(progress.message, detail=False)
     with served(task, manager, live, between=between, announce=announce, late=late) as outside:
         while True:
+            where = next(logs)
             verdict, timing = _record(
-                task, plan, where, overwrite=overwrite, embed_meshes=embed_meshes, progress=progress, live=outside
+                task, plan, where, progress, outside, overwrite=overwrite, embed_meshes=embed_meshes
             )
-            timing, loading = replace(timing, load=loading, plan=planning + timing.plan), 0.0
+            timing = replace(timing, load=loading, plan=planning + timing.plan)
             report = RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
             if not outside.again():
                 return report, outside.failure
             ended(report, outside.failure)
-            where, number = next_log(first, number, overwrite=overwrite)
-            plan = plan_task(task)  # a planner that has re-planned would not plan the same again
+            again, planning = timed(plan_task, task)  # a planner that has re-planned would not plan the same again
+            plan, loading = again, 0.0
 
 
 def verify_log(
@@ -347,14 +341,9 @@ def verify_log(
     plan = plan_task(recorded.task)
     with TemporaryDirectory(prefix="manipcli-") as folder:
         repeated = Path(folder) / "repeated.mcap"
+        live = recorded_session(recording, log) if recorded.task.part.live else None
         verdict, _ = _record(
-            recorded.task,
-            plan,
-            repeated,
-            overwrite=False,
-            embed_meshes=recorded.embedded,
-            progress=progress,
-            live=recorded_session(recording, log) if recorded.task.part.live else None,
+            recorded.task, plan, repeated, progress, live, overwrite=False, embed_meshes=recorded.embedded
         )
         if any(finding.code == INTERRUPTED for finding in verdict.errors):
             raise KeyboardInterrupt
@@ -371,6 +360,8 @@ def _load(path: Path, progress: Progress, options: LoadOptions, prepared: Prepar
 
 def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task without a plan; and all warnings before the run."""
+    if task.part == LIVE:
+        return plan_task(task), task.warnings
     try:
         plan = prepared.take_plan(task) if prepared is not None else None
         plan = plan or plan_task(task, on_progress=progress.activity)
@@ -381,20 +372,8 @@ def _plan(task: Task, progress: Progress, prepared: Prepared | None) -> tuple[Pl
     return plan, (*task.warnings, *findings)
 
 
-def _held(task: Task, progress: Progress, prepared: None) -> tuple[Plan, tuple[Diagnostic, ...]]:
-    """As `_plan`, of a session without the steps of its task."""
-    return plan_task(task), task.warnings
-
-
 def _record(
-    task: Task,
-    plan: Plan,
-    path: Path,
-    *,
-    overwrite: bool,
-    embed_meshes: bool,
-    progress: Progress,
-    live: Outside | None = None,
+    task: Task, plan: Plan, path: Path, progress: Progress, live: Outside | None, *, overwrite: bool, embed_meshes: bool
 ) -> tuple[Verdict, Timing]:
     """Simulates into a log, which is judged before it gets its name; `live`: a session that clients can command."""
     manager = build_manager(task, plan.planner.kinematics)

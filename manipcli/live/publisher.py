@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+from manipcli.core.geometry import Array
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.live.sample import Sample
 from manipcli.model.robot import RobotModel
@@ -34,6 +35,7 @@ class Publisher:
 
     Attributes:
         state: of the last sample.
+        outputs: of the controllers in the last sample.
         latched: the last message of each latched topic, in CDR.
     """
 
@@ -43,6 +45,7 @@ class Publisher:
         self.offer = offer
         self.robot, self.scene, self.recorded, self.period = robot, scene, recorded, period
         self.state = WorldState.room(len(robot.moving_joints), len(scene.movable))
+        self.outputs: Sequence[tuple[Array, Array] | None] = ()
         self.latched = dict(begin_messages(robot, scene, recorded))
         self._table = {channel.topic: channel for channel in channel_table(recorded)}
         self._names = {channel.id: topic for topic, channel in self._table.items()}
@@ -69,6 +72,7 @@ class Publisher:
         found: dict[str, bytes] = {}
         self.state.numbers[...] = sample.numbers
         self.state.time[...] = sample.tick * self.period
+        self.outputs = sample.outputs
         if CLOCK in wanted:
             found[CLOCK] = clock_message(self.ns(sample.tick))
         own = self._table.keys() & wanted

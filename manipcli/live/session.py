@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -116,16 +117,16 @@ def served(
         yield outside
 
 
-def next_log(first: Path, number: int, *, overwrite: bool) -> tuple[Path, int]:
-    """The log of the session after number `number`, `runs/pour@live-2.mcap` after `runs/pour@live.mcap`; its number.
+def session_logs(first: Path, *, overwrite: bool) -> Iterator[Path]:
+    """The log of each session between resets: `runs/pour@live.mcap`, `runs/pour@live-2.mcap`, ...
 
-    Unless they may be replaced, numbers whose log exists are left out.
+    Unless they may be replaced, numbers whose log exists are left out; the first log is refused when it is opened.
     """
-    while True:
-        number += 1
+    yield first
+    for number in count(2):
         path = first.with_name(f"{first.stem}-{number}{first.suffix}")
         if overwrite or not path.exists():
-            return path, number
+            yield path
 
 
 def recorded_session(recording: Recording, log: Path) -> Outside:

@@ -16,7 +16,7 @@ from manipcli.mcp_server.folder import Folder
 
 MAX_OUTPUT: Final = 40_000
 """Most characters of an output; of a longer one, the beginning and the end."""
-GRACE: Final = 5.0
+GRACE: Final = 15.0
 """[s] Time to end after an interrupt; a run then has finished its log."""
 _TRACEBACK: Final = "Traceback (most recent call last)"
 

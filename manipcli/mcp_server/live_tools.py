@@ -170,7 +170,7 @@ class _Session:
             if self._output is None:
                 return ""
             send_signal(self._process, signal.SIGINT)
-            async with asyncio.timeout(4 * GRACE):  # the log is finished and judged
+            async with asyncio.timeout(2 * GRACE):  # the log is finished and judged
                 text = await asyncio.shield(self._output)
                 await self._process.wait()
             return text

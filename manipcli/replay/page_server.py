@@ -27,9 +27,9 @@ def is_meant_for(host: str | None, origin: str | None, port: int) -> bool:
     return host in names and (origin is None or origin in [f"http://{name}" for name in names])
 
 
-def unusable_port(port: int, reason: str = "already in use") -> InvalidInput:
-    """The error for a port that a server cannot listen on."""
-    hint = f"use another --port, or omit it to use the first free port from {DEFAULT_PORT} on"
+def unusable_port(port: int, reason: str = "already in use", *, option: str = "--port") -> InvalidInput:
+    """The error for a port that a server cannot listen on; `option` sets it."""
+    hint = f"use another {option}, or omit it to use the first free port from {DEFAULT_PORT} on"
     return InvalidInput([Diagnostic("VIEW001", f"port {port} is {reason}", hint=hint)])
 
 

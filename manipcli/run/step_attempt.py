@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from manipcli.control.action import GoalHandle
-from manipcli.core.errors import NotPlannable, SimulationFailed
+from manipcli.core.errors import InvalidArgument, NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
@@ -174,6 +174,8 @@ class StepAttempt:
             end = yield from motions
         except Alarmed as alarm:
             return MotionEnd("failed", f"stopped: {alarm}")
+        except InvalidArgument as refused:  # by a controller that a client of a live session has changed
+            return MotionEnd("failed", refused.findings[0].message)
         except SimulationFailed as failure:
             text = str(failure) + saturated_since(before, self._session)
             self._event("step_ended", planned, "failed", text)

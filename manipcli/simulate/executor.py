@@ -143,6 +143,9 @@ class Executor:
             deadline: simulated time [s] at which the step times out; None: `PATIENCE` after the planned end.
 
         On a failure or a timeout all goals are canceled: the controllers bring the joints to rest.
+
+        Raises:
+            InvalidArgument: no controller takes a goal of the motion.
         """
         session = self._session
         latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
@@ -155,9 +158,9 @@ class Executor:
         start = session.state.position.copy()
         try:
             handles = self._send(motion)
-        except InvalidArgument as refused:  # no active controller, after a switch
+        except InvalidArgument:  # no active controller, after a switch
             self._cancel()
-            return MotionEnd("failed", refused.findings[0].message)
+            raise
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
         while True:

@@ -53,6 +53,24 @@ def test_options_are_read_from_the_signature() -> None:
     assert {name for name, option in found.items() if option.flag} == {"force", "slow"}
 
 
+def test_a_sub_command_has_a_section_of_its_own(tmp_path: Path) -> None:
+    commands = {"go walk": walk, "go run": run, "run": run}
+
+    def told(text: str) -> tuple[object, ...]:
+        (tmp_path / "manipcli.toml").write_text(text)
+        found = defaults_of("go walk", commands, folder=tmp_path)
+        return dict(found.values), *found.told
+
+    place = tmp_path / "manipcli.toml"
+    assert told("[go.walk]\nsteps = 3\n[go.run]\n") == ({"steps": "3"}, f"--steps 3 ({place}:2)")
+    assert told("steps = 4\n[run]\n") == ({"steps": "4"}, f"--steps 4 ({place}:1)")
+    for wrong in ("[go]\nsteps = 3\n", "[go.walks]\nsteps = 3\n", "[go.walk]\nsteps = 3\n[go.rum]\n"):
+        with pytest.raises(InvalidInput, match="no option or command 'go'"):
+            told(wrong)
+    with pytest.raises(InvalidInput, match=r"3:1.*`manipcli go walk` has no option --stepps"):
+        told("\n[go.walk]\nstepps = 3\n")
+
+
 def test_a_section_counts_before_the_whole_file(tmp_path: Path) -> None:
     (tmp_path / "manipcli.toml").write_text('name = ["a"]\nsteps = 2\n[walk]\nsteps = 3\nn = 4\nslow = true\n')
     assert values(tmp_path) == {"names": ["a"], "steps": "3", "jobs": "4", "slow": True}

@@ -93,11 +93,19 @@ def test_the_tools_work_in_their_folder_and_nowhere_else(tmp_path: Path) -> None
         state = json.loads((await call("live_state"))[1])
         assert abs(state["joints"]["joint_4"] + 1.6) < 0.01
         assert (await call("live_start", task="small.yaml"))[0]
+        error, text = await call("live_check_step", step={"wait": "0.1 s"})
+        assert (error, json.loads(text)["plannable"]) == (False, True)
+        error, text = await call("live_run_step", step={"wait": "0.1 s"})
+        assert (error, json.loads(text)["outcome"]) == (False, "done")
+        error, text = await call("live_run_step", step={"waitt": "0.1 s"})
+        assert error
+        assert "did you mean 'wait'" in text
         error, text = await call("live_stop")
         assert "session ended" in text
 
         async def cancel(scope: anyio.CancelScope) -> None:
-            while not (folder / "runs" / "small.mcap.partial").exists():
+            partial = folder / "runs" / "small.mcap.partial"
+            while not partial.exists() or partial.stat().st_size < 1_000_000:  # it is simulated
                 await asyncio.sleep(0.05)
             scope.cancel()
 

@@ -1,4 +1,4 @@
-"""`manipcli serve`: a running robot that clients of rosbridge can command."""
+"""`manipcli serve`: a running robot that clients of rosbridge, and a page for browsers, can command."""
 
 from __future__ import annotations
 
@@ -32,6 +32,17 @@ def serve(
     port: Annotated[
         int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port of the server; 0 is any free port.")
     ] = 9090,
+    page_port: Annotated[
+        int | None,
+        typer.Option(
+            "--page-port",
+            metavar="N",
+            min=0,
+            max=65535,
+            help="Port of the page for browsers [default: first free port from 8080].",
+        ),
+    ] = None,
+    no_page: Annotated[bool, typer.Option("--no-page", help="Serve no page for browsers.")] = False,
     host: Annotated[
         str,
         typer.Option("--host", metavar="ADDRESS", help="Address to listen on; others than the default need a token."),
@@ -73,7 +84,7 @@ def serve(
     allow_outside: AllowOutside = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only the result.")] = False,
 ) -> ExitCode:
-    """Simulate a task's scene, or a robot alone, live, and let clients of rosbridge command its robot.
+    """Simulate a task's scene, or a robot alone, live, and let clients and browsers command it.
 
     The controllers hold; with --run the steps are done first, and the exit code is that of `manipcli run`. The session
     is recorded. Press Ctrl-C to end it.
@@ -91,7 +102,7 @@ def serve(
         from manipcli.report import text
         from manipcli.report.run_report import RunReport, exit_code
 
-        outlets = _foxglove(foxglove_port, off=no_foxglove)
+        outlets = (*_page(page_port, token, off=no_page), *_foxglove(foxglove_port, off=no_foxglove))
         live = LiveOptions(Access(token, host), port, factor, wall, run=run, outlets=outlets)
 
         def announce(url: str) -> None:
@@ -168,6 +179,21 @@ def _speed(word: str) -> float | None:
     if not 0.001 <= factor <= 1000.0:
         raise InvalidInput([Diagnostic("USE130", f"--speed is '{word}'; expected a number from 0.001 to 1000, or max")])
     return factor
+
+
+def _page(port: int | None, token: str | None, *, off: bool) -> tuple[OutletOptions, ...]:
+    """The page for browsers; none with `--no-page`.
+
+    Raises:
+        InvalidInput: options that exclude each other.
+    """
+    from manipcli.live.page.options import PageOptions
+
+    if off and port is not None:
+        raise InvalidInput(
+            [Diagnostic("USE153", "--no-page and --page-port exclude each other", hint="remove one of them")]
+        )
+    return () if off else (PageOptions(token, port),)
 
 
 def _foxglove(port: int | None, *, off: bool) -> tuple[OutletOptions, ...]:

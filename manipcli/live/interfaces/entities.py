@@ -14,7 +14,7 @@ from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.interfaces.simulation import FAILED, NOT_FOUND, OK, PACKAGE, UNSUPPORTED, result
 from manipcli.live.live_robot import LiveRobot
-from manipcli.live.name_pattern import BadPattern, name_pattern
+from manipcli.live.name_pattern import BadPattern, matches
 from manipcli.live.placing import misplaced
 from manipcli.record.cdr import NS_PER_S
 from manipcli.record.json_message import definition, from_json
@@ -104,7 +104,7 @@ def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> tuple[list[str], 
     if filters["bounds"]["type"] or filters["bounds"]["points"]:
         return [], UNSUPPORTED, "a filter by bounds is not supported"
     try:
-        pattern = name_pattern(filters["filter"])
+        named = {name for name in _names(robot) if matches(filters["filter"], name)}
     except BadPattern as error:
         return [], FAILED, str(error)
     categories = {each["category"] for each in filters["categories"]}
@@ -114,7 +114,7 @@ def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> tuple[list[str], 
         info: Any = _info_of(robot, name)
         own = set(info["tags"])
         tagged = not tags or (tags <= own if all_tags else bool(tags & own))
-        if pattern(name) and tagged and (not categories or info["category"]["category"] in categories):
+        if name in named and tagged and (not categories or info["category"]["category"] in categories):
             found.append(name)
     return found, OK, ""
 

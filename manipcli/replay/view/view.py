@@ -53,7 +53,8 @@ class View(LocalServer):
         self.missing = drawing.missing
         try:
             shown = ViserScene(self.viser, drawing, placing.start(position), floors=floors_of(scene))
-            _add_layers(self.viser, shown)
+            with self.viser.gui.add_folder("Show"):
+                add_layers(self.viser.gui, shown)
             self.joints = JointPanel(self.viser, robot, shown, placing, position)
         except BaseException:
             self.stop()
@@ -80,21 +81,27 @@ def pose_text(robot: RobotModel, q: Array) -> str:
     return "\n".join(parts)
 
 
-def _add_layers(server: viser.ViserServer, scene: ViserScene) -> None:
+def add_layers(gui: viser.GuiApi, scene: ViserScene) -> None:
     """Add a checkbox for each layer."""
 
     def add(label: str, layer: Shown, hint: str | None = None) -> None:
-        box = server.gui.add_checkbox(label, layer == "visual", hint=hint)
+        box = gui.add_checkbox(label, layer == "visual", hint=hint)
         box.on_update(lambda _: scene.show(layer, box.value))
 
-    with server.gui.add_folder("Show"):
-        add("visual meshes", "visual")
-        clear = server.gui.add_checkbox("transparent", False, hint="Show frames and centres of mass inside the links.")
-        clear.on_update(lambda _: scene.see_through(clear.value))
-        add("collision shapes", "collision", "Convex hulls of the meshes, as in planner and physics.")
-        add("inertia boxes", "inertia", "Uniform box with the mass and inertia of each link.")
-        add("frames", "frames", "x red, y green, z blue.")
-        add("names", "names")
+    add("visual meshes", "visual")
+    clear = gui.add_checkbox("transparent", False, hint="Show frames and centres of mass inside the links.")
+    clear.on_update(lambda _: scene.see_through(clear.value))
+    add("collision shapes", "collision", "Convex hulls of the meshes, as in planner and physics.")
+    add("inertia boxes", "inertia", "Uniform box with the mass and inertia of each link.")
+    add("frames", "frames", "x red, y green, z blue.")
+    add("names", "names")
+
+
+def joint_slider(gui: viser.GuiApi, joint: Joint, value: float) -> viser.GuiSliderHandle[float]:
+    """Add a slider of a joint over its range, at `value` or the nearest end [rad or m]."""
+    low, high = slider_range(joint)
+    step = 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / STEPS))
+    return gui.add_slider(joint.name, low, high, step, min(max(value, low), high), disabled=high <= low)
 
 
 class JointPanel:
@@ -135,10 +142,7 @@ class JointPanel:
         )
 
     def _slider(self, server: viser.ViserServer, joint: Joint, k: int) -> viser.GuiSliderHandle[float]:
-        low, high = slider_range(joint)
-        step = 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / STEPS))
-        value = min(max(float(self._q[k]), low), high)
-        slider = server.gui.add_slider(joint.name, low, high, step, value, disabled=high <= low)
+        slider = joint_slider(server.gui, joint, float(self._q[k]))
         slider.on_update(lambda _: self._slid(k, slider.value))
         return slider
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.core.geometry import Transform
 from manipcli.replay.camera import framing
@@ -22,6 +23,8 @@ CLEAR = 0.35
 """Opacity of transparent visual meshes."""
 GRID = 0.1
 """Cell size of the ground grid [m]."""
+STILL = 2e-5
+"""[m], and of quaternions: what moved less is not sent. A robot at rest sends nothing."""
 BRIGHTNESS = 0.7
 """Intensity of the environment light; 1 looks washed out."""
 
@@ -65,6 +68,7 @@ class ViserScene:
             for k, drawable in enumerate(drawing.drawables):
                 if drawable.frame not in floors:
                     self._mesh(f"{paths[drawable.frame]}/{drawable.layer}_{k}", drawable)
+        self._placed = _Placed(len(drawing.frames))
         self.place(poses)
         server.scene.add_grid(  # for the shadows
             "/ground",
@@ -117,11 +121,11 @@ class ViserScene:
             self._solid.append((mesh, clear))
 
     def place(self, poses: Poses) -> None:
-        """Move all frames to the poses of one state; the browser shows them in one update."""
+        """Move all frames to the poses of one state; the browser shows them in one update, of what moved visibly."""
         with self._server.atomic():
-            for k, node in enumerate(self._nodes):
-                node.position = poses.position[k]
-                node.wxyz = np.roll(poses.quat_xyzw[k], 1)
+            for k in np.flatnonzero(self._placed.moved(poses)).tolist():
+                self._nodes[k].position = poses.position[k]
+                self._nodes[k].wxyz = np.roll(poses.quat_xyzw[k], 1)
 
     def show(self, layer: Shown, shown: bool) -> None:
         """Show or hide a layer: surfaces, the axes of all frames and marks, or their names."""
@@ -132,6 +136,20 @@ class ViserScene:
         """Make the visual meshes transparent or opaque."""
         for mesh, opacity in self._solid:
             mesh.opacity = CLEAR * opacity if clear else (opacity if opacity < 1.0 else None)
+
+
+class _Placed:
+    """The poses of frames that browsers show."""
+
+    def __init__(self, frames: int) -> None:
+        self._position, self._quat = np.full((frames, 3), np.inf), np.full((frames, 4), np.inf)
+
+    def moved(self, poses: Poses) -> npt.NDArray[np.bool_]:
+        """(F,) whether each frame is visibly elsewhere than at its last move, which this call is."""
+        far: npt.NDArray[np.bool_] = np.abs(poses.position - self._position).max(axis=1) > STILL
+        far |= np.abs(poses.quat_xyzw - self._quat).max(axis=1) > STILL
+        self._position[far], self._quat[far] = poses.position[far], poses.quat_xyzw[far]
+        return far
 
 
 def _path(frame: str, k: int) -> str:
