@@ -95,7 +95,7 @@ async def fuzz(url: str, frames: int) -> str:
         while left > 0:
             async with connect(url, max_size=None) as socket:
                 reading = asyncio.create_task(read(socket))
-                with contextlib.suppress(ConnectionClosed):
+                with contextlib.suppress(ConnectionClosed, AttributeError):  # of a transport that is closed
                     while left > 0:
                         left -= 1
                         await socket.send(malformed(draw, TRAJECTORY_MESSAGE))
