@@ -59,7 +59,7 @@ class Client:
 
     def receive(self, text: str | bytes) -> None:
         """Carry out one frame; whatever is wrong with it is a status message, or the answer that the client expects."""
-        if not self._within_rate():
+        if not self._within_rate(len(text)):
             return
         frame: dict[str, Any] = {}
         try:
@@ -87,9 +87,9 @@ class Client:
         """See `drops.report_drops`."""
         return report_drops(self._connection)
 
-    def _within_rate(self) -> bool:
+    def _within_rate(self, size: int) -> bool:
         now = time.monotonic()
-        if self._budget.spend(now):
+        if self._budget.spend(now, size):
             return True
         if now - self._warned > 1.0:
             self._warned = now

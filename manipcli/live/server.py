@@ -101,6 +101,7 @@ class LiveServer:
         try:
             async for frame in connection:
                 client.receive(frame)
+                await asyncio.sleep(0)  # one frame of each client in turn
         except ConnectionClosed:
             pass
         finally:
