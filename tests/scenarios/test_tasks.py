@@ -35,8 +35,8 @@ def without_places(answer: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-LONG = ("pour", "sort_many")
-"""The pour has tests of its own; `sort_many` takes half a minute, and `.ci/run` runs it twice."""
+LONG = ("pour", "carry", "clutter", "pour_between", "sort", "sort_many", "stack")
+"""The pour has tests of its own; the searches of the others take long, and `.ci/run` runs every task twice."""
 
 
 @pytest.mark.parametrize("task", sorted(path.stem for path in TASKS.glob("*.yaml") if path.stem not in LONG))
