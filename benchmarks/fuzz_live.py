@@ -77,7 +77,9 @@ class Beside:
         speed = 0.001 * (self._own.numbers[0] - ticks) / seconds
         seen = await asyncio.to_thread(self.noticed)
         goals = f"{statistics.median(seen['goals']):.2f} s" if seen["goals"] else "-"
-        good = f"{seen['messages'] / seconds:.0f} Hz ({seen['messages'] / seconds / speed:.0f} per simulated second), longest gap {seen['gap']:.2f} s, goals {goals}"
+        rate = seen["messages"] / seconds
+        rates = f"{rate:.0f} Hz ({rate / speed:.0f} per simulated second)"
+        good = f"{rates}, longest gap {seen['gap']:.2f} s, goals {goals}"
         network = f"network {100 * (self.used() - used) / seconds:.0f} % of a core, {self.memory()} MiB"
         own = f"speed {speed:.2f}, attackers {100 * (time.process_time() - attacking) / seconds:.0f} %"
         print(f"{name}: {seconds:.1f} s, {good}; {network}; {own}; {found}", flush=True)
@@ -132,19 +134,23 @@ async def raw(url: str, frame: bytes, count: int = 100_000) -> str:
 
     async def one() -> str:
         sent = 0
-        async with connect(url, compression=None, ping_interval=None) as socket:
+        async with connect(url, compression=None, ping_interval=None, close_timeout=60.0) as socket:
+            answer = asyncio.create_task(socket.recv())
             with contextlib.suppress(ConnectionClosed):
-                for _ in range(count // 1000):
-                    socket.transport.write(frame * 1000)  # mask 0
+                while sent < count and not socket.transport.is_closing():
+                    socket.transport.write(frame * 1000)  # the mask is 0
                     sent += 1000
                     while socket.transport.get_write_buffer_size() and not socket.transport.is_closing():
                         await asyncio.sleep(0.001)
-                async with asyncio.timeout(30.0):
-                    await socket.send("")
-                    await socket.wait_closed()
-        return f"{sent} sent, closed {socket.close_code} {socket.close_reason}"
+                await socket.send("")
+            with contextlib.suppress(ConnectionClosed):
+                await answer
+                async for _ in socket:
+                    if sent >= count:
+                        break
+        return f"{sent} sent, closed {socket.close_code} {(socket.close_reason or '').partition(';')[0]}"
 
-    return str([*await asyncio.gather(*(one() for _ in range(4)), return_exceptions=True)])
+    return str(dict(Counter(await asyncio.gather(*(one() for _ in range(4))))))
 
 
 def tiny(url: str) -> Awaitable[str]:
@@ -169,13 +175,18 @@ async def half_open(port: int, count: int = 300) -> str:
 
 async def large(url: str) -> str:
     """Frames of 1 MiB, and one that is larger."""
-    async with connect(url, max_size=None, compression=None) as socket:
-        for _ in range(50):
-            await socket.send("[" + "1," * ((1 << 19) - 2) + "1]")
-            await asyncio.sleep(0)
-        await socket.send(" " * (2 << 20))
-        await socket.wait_closed()
-        return f"50 frames of 1 MiB; one of 2 MiB: close code {socket.close_code}"
+    sent, answers = 0, 0
+    async with connect(url, compression=None) as socket:
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await socket.send("[" + "1," * ((1 << 19) - 2) + "1]")
+                sent += 1
+                answers += "msg" in str(await socket.recv())
+    async with connect(url, compression=None) as other:
+        with contextlib.suppress(ConnectionClosed):
+            await other.send(" " * (2 << 20))
+            await other.wait_closed()
+    return f"{answers} frames of 1 MiB were refused, then: {socket.close_code}; one of 2 MiB: {other.close_code}"
 
 
 async def bomb(url: str) -> str:

@@ -108,7 +108,7 @@ class LiveServer:
         may: bool = connection.commands  # type: ignore[attr-defined]
         client = self._clients[number] = Client(number, commands=may, services=self._services)
         sending = asyncio.create_task(self._send(connection, client))
-        connection.transport.max_size = READ
+        connection.transport.max_size = READ  # type: ignore[attr-defined]  # of asyncio's transports of sockets
         try:
             async for frame in connection:
                 used = await self._receive(client, frame)

@@ -206,7 +206,7 @@ def test_malformed_frames_and_a_broken_outlet_disturb_no_other_client_and_are_no
         assert (await good.call("/rosapi/nodes"))["values"] == {"nodes": ["/manipcli"]}
         await good.socket.close()
 
-    assert recorded_ops(serving(tmp_path, use, outlets=[Broken()])) == ["end"]
+    assert recorded_ops(serving(tmp_path, use, outlets=[Broken()], speed=1.0)) == ["end"]
     assert [line for line in capfd.readouterr().err.splitlines() if line.startswith("manipcli:")] == [
         "manipcli: broken: nowhere is closed: KeyError: 'lost'",
         "manipcli: an outlet was not closed properly: OSError: cannot close",
