@@ -134,7 +134,7 @@ async def raw(url: str, frame: bytes, count: int = 100_000) -> str:
 
     async def one() -> str:
         sent = 0
-        async with connect(url, compression=None, ping_interval=None, close_timeout=60.0) as socket:
+        async with connect(url, compression=None, ping_interval=None, max_queue=None) as socket:
             answer = asyncio.create_task(socket.recv())
             with contextlib.suppress(ConnectionClosed):
                 while sent < count and not socket.transport.is_closing():
@@ -143,11 +143,10 @@ async def raw(url: str, frame: bytes, count: int = 100_000) -> str:
                     while socket.transport.get_write_buffer_size() and not socket.transport.is_closing():
                         await asyncio.sleep(0.001)
                 await socket.send("")
-            with contextlib.suppress(ConnectionClosed):
+            with contextlib.suppress(ConnectionClosed, TimeoutError):
                 await answer
-                async for _ in socket:
-                    if sent >= count:
-                        break
+                async with asyncio.timeout(5.0):
+                    await socket.wait_closed()
         return f"{sent} sent, closed {socket.close_code} {(socket.close_reason or '').partition(';')[0]}"
 
     return str(dict(Counter(await asyncio.gather(*(one() for _ in range(4))))))
