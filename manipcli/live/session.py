@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
-from manipcli.live.access import Access
+from manipcli.live.access import Access, query
 from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
@@ -54,8 +54,7 @@ class LiveOptions:
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
-        token = f"/?token={self.access.token}" if self.access.token is not None else ""
-        return f"ws://{self.access.host}:{port}{token}"
+        return f"ws://{self.access.address}:{port}{query(self.access.token)}"
 
 
 @contextmanager

@@ -112,7 +112,7 @@ def serve(
             console.talk("Press Ctrl-C to end the session.")
 
         def shown(report: RunReport, failure: str) -> str:
-            return text.render_run(report) if run else text.render_session(report, failure)
+            return text.render_session(report, failure, judged=run)
 
         def ended(report: RunReport, failure: str) -> None:
             console.result(shown(report, failure))
@@ -134,7 +134,8 @@ def serve(
                 allow_outside=allow_outside,
             )
         console.result(shown(report, failure))
-        return exit_code(report.verdict) if run else ExitCode.FAILED if failure else ExitCode.PASSED
+        code = exit_code(report.verdict) if run else ExitCode.PASSED
+        return ExitCode.FAILED if failure and code is ExitCode.PASSED else code
 
 
 def _served(
@@ -216,10 +217,13 @@ def _token(file: Path | None, *, host: str, open_: bool) -> str | None:
     """The token of the server; None for `--open`.
 
     Raises:
-        InvalidInput: options that exclude each other, or a token that is too short or not one line of text.
+        InvalidInput: no address, options that exclude each other, or a token that is too short or not one line of text.
     """
     from manipcli.live.access import MIN_TOKEN, random_token
 
+    if not host:
+        hint = "name an address of this machine; 0.0.0.0 is all of them"
+        raise InvalidInput([Diagnostic("USE131", "--host is empty; expected an address", hint=hint)])
     if open_:
         if host != LOCAL or file is not None:
             what = "--token-file" if file is not None else "--host"

@@ -15,7 +15,7 @@ from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Final
 
-from manipcli.live.access import Access
+from manipcli.live.access import Access, query
 from manipcli.live.command import Answer
 from manipcli.live.outlet import Network
 from manipcli.live.page import service_calls, texts
@@ -64,7 +64,7 @@ class LivePage(LocalServer):
     def __init__(self, network: Network, *, token: str | None, port: int | None) -> None:
         robot, scene = network.publisher.robot, network.publisher.scene
         super().__init__(robot.name, port=port, option="--page-port", check=door(Access(token)))
-        self.notice = f"page: {self.url}" if token is None else f"page: {self.url}/?token={token}"
+        self.notice = f"page: {self.url}{query(token)}"
         self._network, self._offer, self._robot = network, network.publisher.offer, robot
         self._drives = drives_of(robot, network.publisher.recorded, self._offer)
         self._placing = Placing(robot, scene)
