@@ -51,6 +51,7 @@ class Setup:
     access: Access
     port: int
     outlets: Sequence[OutletOptions] = ()
+    title: str = ""
 
 
 class _Stream(asyncio.Protocol):
@@ -208,7 +209,7 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
 
     rosapi = Rosapi(setup.offer, lambda: publisher.clock(numbers[TICK]))
     services = Services(setup.offer, hub.latched, rosapi, pending.put, soon, hub.subscribed)
-    network = Network(publisher, put, lambda: soon(hub.subscribed))
+    network = Network(publisher, put, lambda: soon(hub.subscribed), setup.title)
     server = LiveServer(services, setup.access)
     async with AsyncExitStack() as stack:
         try:

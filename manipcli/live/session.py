@@ -87,7 +87,8 @@ def served(
     robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets)
+    title = " · ".join(dict.fromkeys((task.spec.task, robot.name)))
+    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets, title)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with NetworkProcess(setup) as network:
         least = FAST_PERIOD if options.speed is None else 0.0
