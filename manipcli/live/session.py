@@ -117,15 +117,16 @@ def served(
         yield outside
 
 
-def session_logs(first: Path, *, overwrite: bool) -> Iterator[Path]:
+def session_logs(first: Path, *, overwrite: bool, named: bool) -> Iterator[Path]:
     """The log of each session between resets: `runs/pour@live.mcap`, `runs/pour@live-2.mcap`, ...
 
-    Unless they may be replaced, numbers whose log exists are left out; the first log is refused when it is opened.
+    A session cannot be repeated by hand: unless logs may be replaced, numbers whose log exists or is being written are
+    left out. If the first log is `named` by the user, it is refused when it is opened.
     """
-    yield first
-    for number in count(2):
-        path = first.with_name(f"{first.stem}-{number}{first.suffix}")
-        if overwrite or not path.exists():
+    for number in count(1):
+        path = first if number == 1 else first.with_name(f"{first.stem}-{number}{first.suffix}")
+        taken = path.exists() or path.with_name(f"{path.name}.partial").exists()
+        if overwrite or not taken or (named and number == 1):
             yield path
 
 

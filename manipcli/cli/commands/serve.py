@@ -74,9 +74,13 @@ def serve(
     run: Annotated[bool, typer.Option("--run", help="Also do the steps of the task, then hold.")] = False,
     log: Annotated[
         Path | None,
-        typer.Option("--log", metavar="PATH", help="Write the log to PATH [default: runs/<task>@live.mcap]."),
+        typer.Option(
+            "--log",
+            metavar="PATH",
+            help="Write the log to PATH [default: runs/<task>@live.mcap, or the next free number, -2, ...].",
+        ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the --log file if it exists.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace logs that exist.")] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -92,6 +96,8 @@ def serve(
     from manipcli.cli.interrupts import Interrupts
 
     factor, wall = _speed(speed), None if lasting is None else seconds(lasting)
+    if wall is not None and not wall > 0.0:
+        raise InvalidInput([Diagnostic("USE050", f"--for is '{lasting}'; expected a time above 0", hint="write 30s")])
     token = _token(token_file, host=host, open_=open_)
     served = _served(task, robot, controllers, run=run)
     with Interrupts() as interrupts:
