@@ -130,7 +130,9 @@ class LivePage(LocalServer):
         if not clients or self._thread.is_alive():
             return
         self._story.read()
-        self._story.phase = ENDED
+        if self._story.phase != ENDED:  # the simulation failed
+            self._story.phase = ENDED
+            self._story.changed = 0.0 if self._newest is None else self._newest.time
         self._update(time.monotonic(), news=True)
         self.viser.flush()
         for client in clients:
@@ -182,6 +184,7 @@ class LivePage(LocalServer):
         story = self._story
         snapshot = replace(
             newest,
+            time=story.changed if story.phase else newest.time,
             controllers=self._controllers,
             simulation=self._simulation,
             stopped=story.stopped,

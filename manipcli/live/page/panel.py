@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from manipcli.live.offer import Offer
 from manipcli.live.page import service_calls
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 ROW: Final = 24
 """Characters of the names in one row of buttons."""
-_Button: TypeAlias = "viser.GuiButtonHandle | viser.GuiButtonGroupHandle"
 _CLEAR: Final = 6.0
 """[s] That a notification is shown."""
 
@@ -65,18 +64,18 @@ class Panel:
         self._folder = folder
         self._period = period
         self._playing = False
-        self._buttons: list[_Button] = []
-        self._poses: list[_Button] = []
+        self._buttons: list[viser.GuiButtonHandle] = []
+        self._simulation: viser.GuiButtonGroupHandle | None = None
         gui = client.gui
         self._add_button("EMERGENCY STOP", EMERGENCY_STOP, color="red", order=0.0)
         self._release = self._add_button("Release emergency stop", RELEASE, color=None, order=0.5)
         self._add_simulation(gui)
-        with gui.add_folder("Move to", order=4, visible=bool(controls.poses)):
+        self._poses = gui.add_folder("Move to", order=4, visible=bool(controls.poses))
+        with self._poses:
             for label, names in controls.poses.items():
                 for k, row in enumerate(rows(names, ROW)):
                     group = gui.add_button_group(label if k == 0 else "", row)
                     group.on_click(self._posed(group))
-                    self._poses.append(group)
         for drive in controls.drives:
             with gui.add_folder(f"{drive.controller} [{units(robot, drive)}]", order=5):
                 self._sliders[drive] = [self._slider(gui, robot, drive, joint) for joint in drive.joints]
@@ -108,8 +107,7 @@ class Panel:
         if not names:
             return
         group = gui.add_button_group("simulation", names, order=2, hint=f"Step: {STEP_TIME:g} s, then pause")
-
-        self._buttons.append(group)
+        self._simulation = group
 
         @group.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
@@ -155,8 +153,10 @@ class Panel:
         with self._client.atomic():
             for button in self._buttons:
                 button.disabled = over
-            for group in self._poses:
-                group.disabled = over or stopped
+            # viser's groups of buttons cannot be disabled.
+            if self._simulation is not None:
+                self._simulation.visible = not over
+            self._poses.visible = bool(self._controls.poses) and not (over or stopped)
             for box in list(self._switches.values()):
                 box.disabled = over or (stopped and not box.value)
             for drive, sliders in self._sliders.items():

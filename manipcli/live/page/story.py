@@ -32,12 +32,13 @@ class Story:
         steps: verb or text, and state ("running" or the outcome), by step, in the order of their first start.
         stopped: whether the emergency stop is active.
         phase: see `Snapshot`.
+        changed: simulated time [s] at which it began.
         messages: time [s], level and text of the last ones of this session.
     """
 
     def __init__(self) -> None:
         self.stopped = False
-        self.phase = ""
+        self.phase, self.changed = "", 0.0
         self.steps: dict[str, tuple[str, str]] = {}
         self.messages: deque[tuple[float, int, str]] = deque(maxlen=SHOWN)
         self._waiting: deque[tuple[str, bytes]] = deque(maxlen=WAITING)
@@ -64,6 +65,8 @@ class Story:
         if message["function"] == STARTED:  # what was before a reset has times of another session
             self.messages.clear()
         time = stamp["sec"] + 1e-9 * stamp["nanosec"]
+        if message["function"] in PHASES:
+            self.changed = time
         self.messages.append((time, message["level"], without_repetition(message["msg"])))
 
     def _step(self, event: dict[str, Any]) -> None:

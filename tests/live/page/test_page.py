@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from queue import SimpleQueue
+from threading import Thread
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -24,8 +25,8 @@ from manipcli.live.outlet import Network
 from manipcli.live.page.options import PageOptions
 from manipcli.live.page.page import LivePage
 from manipcli.live.publisher import Publisher
-from manipcli.record.channels import ROSOUT
-from manipcli.record.messages import log_message
+from manipcli.record.channels import EVENTS, ROSOUT
+from manipcli.record.messages import event_message, log_message
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.view.viser_server import LocalServer
 from manipcli.run.execute import build_manager
@@ -33,6 +34,7 @@ from manipcli.run.run_log import recorded
 from tests.live.page.visitor import CAMERA, Visitor
 from tests.live.sessions import SMALL, TOKEN
 
+STOP = "EMERGENCY STOP"
 LISTED = {"controller": [{"name": "arm_controller", "state": "active"}, {"name": "hand_controller", "state": "active"}]}
 
 
@@ -186,3 +188,30 @@ def test_hostile_visitors_are_closed_and_nothing_is_printed(served: Served, capf
         good.inputs.clear()
         served.live(good, lambda: good.inputs or served.ticks % 2)
     assert capfd.readouterr().err == ""
+
+
+def test_what_is_refused_anyway_is_disabled_also_after_the_end(served: Served) -> None:
+    def happens(kind: str) -> None:
+        served.page.message(EVENTS, 1, event_message(10**9, TaskEvent(1.0, kind, "", "", "", "", "")))
+
+    with Visitor(served.page.port, TOKEN) as visitor:
+        served.live(visitor, lambda: "joint_1" in visitor.labels("Slider"))
+        slider, stop = (visitor.labels(kind)[name] for kind, name in (("Slider", "joint_1"), ("Button", STOP)))
+        for kind, disabled, text in (
+            ("emergency_stop", (True, False), "Release emergency stop"),
+            ("session_started", (False, False), "real-time factor"),
+            ("simulation_reset", (True, True), "resetting"),
+            ("session_started", (False, False), "real-time factor"),
+        ):
+            happens(kind)
+            served.live(
+                visitor,
+                lambda disabled=disabled, text=text: (
+                    tuple(visitor.inputs[one]["disabled"] for one in (slider, stop)) == disabled
+                    and text in visitor.text
+                ),
+            )
+        ending = Thread(target=served.page.close)
+        ending.start()
+        visitor.until(lambda: "session ended" in visitor.text and visitor.inputs[stop]["disabled"])
+        ending.join()

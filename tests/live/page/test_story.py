@@ -103,6 +103,7 @@ def test_a_session_ends_or_is_reset() -> None:
         hear(story, kind)
         story.read()
         assert story.phase == phase
+        assert story.changed == 1.0
         shown = status(replace(snapshot, phase=story.phase), 1.0)
         assert words in shown
         assert "t = 12.34 s" in shown
