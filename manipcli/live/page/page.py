@@ -140,16 +140,21 @@ class LivePage(LocalServer):
         pause = IDLE
         while not self._over.wait(pause):
             began = time.monotonic()
-            news = self._story.read()
-            watched = bool(self.viser.get_clients())
-            if watched != self._watched:
-                self._watched = watched
-                self._network.changed()
-            if not watched:
-                pause = IDLE
-                continue
-            self._update(began, news)
-            pause = max(PERIOD, SHARE * (time.monotonic() - began))
+            try:
+                self._look(began)
+            except Exception as error:  # noqa: BLE001 (shown; a thread that ends would freeze the page)
+                self._messages.content = texts.fault(error)
+            pause = max(PERIOD, SHARE * (time.monotonic() - began)) if self._watched else IDLE
+
+    def _look(self, now: float) -> None:
+        """Update the page, if a browser is connected."""
+        news = self._story.read()
+        watched = bool(self.viser.get_clients())
+        if watched != self._watched:
+            self._watched = watched
+            self._network.changed()
+        if watched:
+            self._update(now, news)
 
     def _update(self, now: float, news: bool) -> None:
         """Show what is new, and send what visitors ask."""
