@@ -18,7 +18,6 @@ from manipcli.live.offer import CLOCK, Offer
 from manipcli.live.outlet import Network, Outlet
 from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import NODE
-from manipcli.model.state import WorldState
 from manipcli.record import schemas
 from manipcli.record.channels import channel_table
 from manipcli.replay.page_server import HOST
@@ -55,29 +54,10 @@ class FoxgloveOptions:
         except InvalidInput as error:
             if self.needed:
                 raise
-            return _Missing("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
+            return Outlet("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
 
 
-class _Missing:
-    """An outlet that is not served, and why."""
-
-    def __init__(self, notice: str) -> None:
-        self.notice = notice
-
-    def wanted(self) -> Collection[str]:
-        return ()
-
-    def message(self, topic: str, ns: int, data: bytes) -> None: ...
-
-    def watches(self) -> bool:
-        return False
-
-    def state(self, tick: int, state: WorldState) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class FoxgloveServer(_Missing):
+class FoxgloveServer(Outlet):
     """Serves a session to Foxglove: an outlet.
 
     Args:

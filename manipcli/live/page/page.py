@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from manipcli.live.access import Access, query
 from manipcli.live.command import Answer
-from manipcli.live.outlet import Network
+from manipcli.live.outlet import Network, Outlet
 from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.door import MAY_COMMAND, door
@@ -46,7 +46,7 @@ IDLE: Final = 0.2
 """[s] Between two looks for visitors."""
 
 
-class LivePage(LocalServer):
+class LivePage(LocalServer, Outlet):
     """A served page: an outlet.
 
     Args:
