@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
-from manipcli.live.assets import AssetRefused, Assets
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.live.outlet import Network, Outlet
 from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import NODE
-from manipcli.model.state import WorldState
 from manipcli.record import schemas
 from manipcli.record.channels import channel_table
 from manipcli.replay.page_server import HOST
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 
 DEFAULT_PORT: Final = 8765
 """Foxglove's."""
+MAX_ASSET: Final = 64 << 20
+"""Largest file that is sent [byte]."""
 BACKLOG: Final = 256
 """Messages that wait for a client; then its oldest are dropped."""
 
@@ -55,29 +56,10 @@ class FoxgloveOptions:
         except InvalidInput as error:
             if self.needed:
                 raise
-            return _Missing("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
+            return Outlet("; ".join(f"{each.message}; {each.hint}" for each in error.findings))
 
 
-class _Missing:
-    """An outlet that is not served, and why."""
-
-    def __init__(self, notice: str) -> None:
-        self.notice = notice
-
-    def wanted(self) -> Collection[str]:
-        return ()
-
-    def message(self, topic: str, ns: int, data: bytes) -> None: ...
-
-    def watches(self) -> bool:
-        return False
-
-    def state(self, tick: int, state: WorldState) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class FoxgloveServer(_Missing):
+class FoxgloveServer(Outlet):
     """Serves a session to Foxglove: an outlet.
 
     Args:
@@ -119,7 +101,7 @@ class FoxgloveServer(_Missing):
                 port=port,
                 capabilities=[Capability.ConnectionGraph, Capability.Time],
                 server_listener=_Listener(self._subscribe, self._unsubscribe),
-                asset_handler=lambda uri: _asset(assets, uri),
+                asset_handler=lambda uri: asset(assets, uri),
                 context=context,
                 message_backlog_size=BACKLOG,
             )
@@ -190,17 +172,26 @@ class _Listener:
     def on_connection_graph_unsubscribe(self) -> None: ...
 
 
-def _assets(publisher: Publisher) -> Assets:
-    """The mesh files of robot and scene."""
+def _assets(publisher: Publisher) -> dict[str, Path]:
+    """The mesh files of robot and scene by URI, as in the URDF and the markers; read when they are fetched."""
     geometries = [g for link in publisher.robot.links for g in (*link.visuals, *link.collisions)]
-    return Assets(mesh_files([*geometries, *(g for body in publisher.scene.bodies for g in body.geometries)]))
+    return mesh_files([*geometries, *(g for body in publisher.scene.bodies for g in body.geometries)])
 
 
-def _asset(assets: Assets, uri: str) -> bytes | None:
+def asset(files: Mapping[str, Path], uri: str) -> bytes | None:
+    """The content of a file that clients may fetch.
+
+    None if no mesh has this URI, or the file is missing or larger than `MAX_ASSET`.
+    """
+    path = files.get(uri)
+    if path is None:
+        return None
     try:
-        return assets.read(uri)
-    except AssetRefused:
-        return None  # the library answers "not found"
+        with path.open("rb") as file:
+            found = file.read(MAX_ASSET + 1)
+    except OSError:
+        return None
+    return found if len(found) <= MAX_ASSET else None
 
 
 def _schema(kind: str, definition: str) -> foxglove.Schema:

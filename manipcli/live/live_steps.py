@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from manipcli.control.roles import is_follower
-from manipcli.core.errors import InvalidInput, NotPlannable
+from manipcli.core.errors import InvalidInput, NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import STEPS_ENDED
 from manipcli.live.pace import Pace
@@ -230,7 +230,9 @@ class LiveSteps:
             return loop.planned([(0,)])[0]
         except NotPlannable as refusal:
             return StepEnd("not_plannable", f"{refusal.cause}; {refusal.hint}" if refusal.hint else refusal.cause)
-        except (ArithmeticError, InvalidInput, LookupError, TypeError, ValueError) as error:
+        except SimulationFailed:
+            raise
+        except Exception as error:  # noqa: BLE001
             # A step that no check foresaw must not end the session of the others.
             return StepEnd("not_plannable", f"{type(error).__name__}: {error}")
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from manipcli.control.action import ErrorCode
-from manipcli.core.errors import ManipcliError
+from manipcli.core.errors import ManipcliError, SimulationFailed
 from manipcli.live import command as words
 from manipcli.live.command import Answer, Command, Values
 from manipcli.live.endpoint import KINDS, Endpoint, Kind
@@ -42,12 +42,14 @@ class Obedience:
             return False
         try:
             self._carry_out(command, endpoint, json.loads(command.json))
+        except SimulationFailed:
+            raise
         except ManipcliError as error:
             found = error.findings[0]
             hint = self._robot.manager.locked or found.hint
             text = f"{found.message}; {hint}" if hint else found.message
             self._refuse(command, text, getattr(error, "error_code", ErrorCode.INVALID_GOAL), logged=logged)
-        except (ArithmeticError, AssertionError, LookupError, MemoryError, TypeError, ValueError) as error:
+        except Exception as error:  # noqa: BLE001
             # A message that no check foresaw must not end the session of the others.
             self._refuse(command, f"{type(error).__name__}: {error}", ErrorCode.INVALID_GOAL, logged=logged)
         return True
@@ -65,7 +67,7 @@ class Obedience:
             command.answer(Answer(True, values))
 
     def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
-        """Answer; an event tells it, unless the command is not in the log either."""
+        """Answer, and record an event, unless the command is not in the log either."""
         if logged:
             self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}

@@ -29,34 +29,32 @@ class Network:
     title: str = ""
 
 
-class Outlet(Protocol):
-    """An open outlet. Its methods are called in the thread of the network and must not block.
+class Outlet:
+    """An open outlet; this one shows nothing. Its methods are called in the thread of the network and must not block.
 
     Attributes:
         notice: for the user at the begin of the session, such as its address; "": nothing.
     """
 
-    notice: str
+    def __init__(self, notice: str = "") -> None:
+        self.notice = notice
 
     def wanted(self) -> Collection[str]:
         """The topics whose messages it takes now."""
-        ...
+        return ()
 
     def message(self, topic: str, ns: int, data: bytes) -> None:
         """A message of a wanted or latched topic; `ns`: simulated time [ns]; `data`: CDR."""
-        ...
 
     def watches(self) -> bool:
         """Whether it takes states now."""
-        ...
+        return False
 
     def state(self, tick: int, state: WorldState) -> None:
         """The state at a tick, at most 100 times per simulated second; the arrays are only valid during the call."""
-        ...
 
     def close(self) -> None:
         """The session ends."""
-        ...
 
 
 class OutletOptions(Protocol):

@@ -1,6 +1,6 @@
 """Services of rosapi, which clients of rosbridge ask for names and types; they only read.
 
-`interfaces/parameters.py` has those of parameters.
+`interfaces/rosapi_parameters.py` has those of parameters.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def main(words: Sequence[str]) -> None:
 def _watch_server() -> None:
     """Watch stdin in a thread; for the command it is empty."""
     pipe = os.dup(0)
-    with open(os.devnull, "rb") as empty:
+    with Path(os.devnull).open("rb") as empty:
         os.dup2(empty.fileno(), 0)
     threading.Thread(target=_end_with, args=(pipe,), name="server", daemon=True).start()
 

@@ -7,17 +7,20 @@ import json
 import re
 import signal
 from collections.abc import Awaitable, Callable, Sequence
-from contextlib import AsyncExitStack
+from contextlib import suppress
 from pathlib import PurePath
 from typing import Annotated, Any, Final
 
 from pydantic import Field
 
-from manipcli.live.caller import Caller, CallFailed
+from manipcli.live.remote import Remote, RemoteFailed
+from manipcli.live.remote_goal import GoalResult, RemoteGoal
 from manipcli.mcp_server.child import GRACE, Runner, bounded, ended, readable, send_signal
 from manipcli.mcp_server.folder import LONGEST
 from manipcli.mcp_server.tools import Failed, Number, Overrides, TaskPath, inside, options
 
+PATIENCE: Final = 30.0
+"""[s] Longest wait for a response; goals have none."""
 LASTING: Final = 3600
 """[s] Longest session of wall time: its log grows while nothing happens, too."""
 RUN_STEP: Final = ("/task/run_step", "manipcli_msgs/action/RunStep")
@@ -77,21 +80,27 @@ class LiveTools:
     async def live_run_step(self, step: Step) -> str:
         """Plan and do one step in the live session, from the present state. Returns its outcome (done, or why not) and
         its margin as JSON."""
-        found = await self._asked(lambda caller: caller.goal(*RUN_STEP, {"step": _json(step)}))
+        text = _json(step)
+        found = await self._asked(lambda session: session.goal(*RUN_STEP, {"step": text}))
         if found.get("outcome") == "invalid":
             raise Failed(str(found.get("text")))
         return json.dumps(found)
 
     async def live_check_step(self, step: Step) -> str:
         """Whether a step is valid and has a plan from the present state of the live session; nothing moves."""
-        return json.dumps(await self._asked(lambda caller: caller.call(CHECK_STEP, {"step": _json(step)})))
+        text = _json(step)
+        return json.dumps(
+            await self._asked(
+                lambda session: session.ask(lambda remote: remote.call(CHECK_STEP, {"step": text}, patience=PATIENCE))
+            )
+        )
 
     async def live_state(self) -> str:
         """State of the live session as JSON: simulated time [s], joint positions [rad or m], and the pose of each
         object in the world [m, quaternion x y z w]."""
 
-        async def state(caller: Caller) -> dict[str, Any]:
-            joints, frames = await caller.latest("/joint_states"), await caller.latest("/tf")
+        def state(remote: Remote) -> dict[str, Any]:
+            joints, frames = _latest(remote, "/joint_states"), _latest(remote, "/tf")
             stamp = joints["header"]["stamp"]
             return {
                 "time": round(stamp["sec"] + 1e-9 * stamp["nanosec"], 3),
@@ -106,7 +115,7 @@ class LiveTools:
                 },
             }
 
-        return json.dumps(await self._asked(state))
+        return json.dumps(await self._asked(lambda session: session.ask(state)))
 
     async def live_stop(self) -> str:
         """End the live session: its log is finished and judged."""
@@ -119,11 +128,11 @@ class LiveTools:
         if self._session is not None:
             await self._session.close()
 
-    async def _asked(self, ask: Callable[[Caller], Awaitable[dict[str, Any]]]) -> dict[str, Any]:
+    async def _asked(self, ask: Callable[[_Session], Awaitable[dict[str, Any]]]) -> dict[str, Any]:
         session = self._opened()
         try:
-            return await ask(session.caller)
-        except CallFailed as error:
+            return await ask(session)
+        except RemoteFailed as error:
             if session.running:
                 raise Failed(str(error)) from None
             self._session = None
@@ -140,7 +149,8 @@ class _Session:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
-        self._stack = AsyncExitStack()
+        self._remote: Remote | None = None
+        self._lock = asyncio.Lock()
         self._output: asyncio.Task[str] | None = None
 
     @property
@@ -161,12 +171,59 @@ class _Session:
                 raise Failed(readable(printed.decode("utf-8", "replace")))
             printed += line
         self._output = asyncio.create_task(bounded(self._process.stdout))
-        self.caller = await self._stack.enter_async_context(Caller(found[0].decode()))
+        self._remote = await asyncio.to_thread(Remote, found[0].decode())
+
+    async def ask(
+        self, ask: Callable[[Remote], dict[str, Any]], cancel: Callable[[], None] = lambda: None
+    ) -> dict[str, Any]:
+        """What a function of the connection returns, called in a thread, one at a time.
+
+        Args:
+            ask: the function.
+            cancel: called if the caller is cancelled; the function goes on, and the next one waits for its end.
+        """
+        assert self._remote is not None
+        await self._lock.acquire()
+        asking = asyncio.ensure_future(asyncio.to_thread(ask, self._remote))
+        asking.add_done_callback(self._asked)
+        try:
+            return await asyncio.shield(asking)
+        except asyncio.CancelledError:
+            cancel()
+            raise
+
+    async def goal(self, action: str, kind: str, goal: dict[str, object]) -> dict[str, Any]:
+        """The result of a goal, however long it takes; a cancelled caller cancels it."""
+        sent: list[RemoteGoal] = []
+        canceled = False
+
+        def ask(remote: Remote) -> dict[str, Any]:
+            sent.append(RemoteGoal(remote, action, kind, goal, feedback=False))
+            if canceled:
+                sent[0].cancel()
+            *_, result = sent[0].events()
+            assert isinstance(result, GoalResult)
+            return result.values
+
+        def cancel() -> None:
+            nonlocal canceled
+            canceled = True
+            with suppress(RemoteFailed):
+                for each in sent:
+                    each.cancel()
+
+        return await self.ask(ask, cancel)
+
+    def _asked(self, asking: asyncio.Future[dict[str, Any]]) -> None:
+        self._lock.release()
+        if not asking.cancelled():
+            asking.exception()  # it is retrieved, also where nobody waits any more
 
     async def close(self) -> str:
         """End the process; returns what it printed after its start."""
         try:
-            await self._stack.aclose()
+            if self._remote is not None:
+                await asyncio.to_thread(self._remote.__exit__, None, None, None)
             if self._output is None:
                 return ""
             send_signal(self._process, signal.SIGINT)
@@ -178,6 +235,15 @@ class _Session:
             return "the session did not end, and was killed"
         finally:
             await ended(self._process)
+
+
+def _latest(remote: Remote, topic: str) -> dict[str, Any]:
+    """The next message of a topic; what else was on its way is passed over."""
+    try:
+        return next(remote.messages(topic, patience=PATIENCE))
+    finally:
+        remote.send(op="unsubscribe", topic=topic)
+        remote.settle()
 
 
 def _json(step: dict[str, Any]) -> str:

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from manipcli import pipeline
 from manipcli.cli.app import main
+from manipcli.judge.steps import STEPS_ENDED
 from manipcli.judge.verdict import Verdict
 from manipcli.record.read.reading import read_recording
 from manipcli.report.run_report import RunReport, Timing
 from tests.conftest import RunCli
 from tests.live.sessions import ROOT, SMALL
 
+WATCHED = ("/clock", "/joint_states", "/tf", "/arm_controller/controller_state", "/task/events")
 TOPIC, TYPE = "/arm_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory"
 MESSAGE = (
     "{joint_names: [joint_1, joint_2, joint_3, joint_4, joint_5, joint_6, joint_7], "
@@ -70,6 +77,43 @@ def test_bad_options_are_refused(words: list[str], code: str, call_cli: RunCli, 
     (tmp_path / "short").write_text("12345\n")
     ran = call_cli("serve", "small.yaml", *words, cwd=tmp_path)
     assert (ran.code, code in ran.err) == (4, True), ran.err
+
+
+@pytest.mark.slow
+def test_the_pour_passes_while_three_clients_watch(tmp_path: Path) -> None:
+    task = ROOT / "tasks/pour.yaml"
+    options = ["--run", "--port=0", "--no-page", "--no-foxglove", "--speed=max", "--log=pour.mcap"]
+    got: list[set[str]] = [set(), set(), set()]
+
+    def watch(url: str, topics: set[str]) -> None:
+        with connect(url, max_size=None) as client:
+            for topic in WATCHED:
+                client.send(json.dumps({"op": "subscribe", "topic": topic}))
+            with suppress(ConnectionClosed):
+                for frame in client:
+                    message = json.loads(frame)
+                    topics.add(message["topic"])
+                    if message["topic"] == "/task/events" and message["msg"].get("kind") == STEPS_ENDED:
+                        over.set()
+
+    over = threading.Event()
+    with subprocess.Popen(
+        [sys.executable, "-m", "manipcli", "serve", str(task), *options], stdout=subprocess.PIPE, text=True,
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        watchers = [threading.Thread(target=watch, args=(url, topics)) for topics in got]
+        for watcher in watchers:
+            watcher.start()
+        ended = over.wait(100)
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate(timeout=60)
+        for watcher in watchers:
+            watcher.join(10)
+    assert ended
+    assert (process.returncode, "pour passed" in out) == (0, True), out
+    assert got == [set(WATCHED)] * 3
 
 
 @pytest.mark.parametrize("words", [[], ["--run"]])

@@ -15,8 +15,7 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 
 from manipcli.core.errors import Diagnostic, InvalidInput
-from manipcli.live import assets
-from manipcli.live.assets import AssetRefused, Assets
+from manipcli.live import foxglove
 from manipcli.live.foxglove import FoxgloveOptions
 from manipcli.live.offer import Offer
 from manipcli.live.outlet import Network, Outlet
@@ -204,16 +203,9 @@ def test_a_port_in_use_and_a_missing_library_are_reported(monkeypatch: pytest.Mo
 def test_assets_are_the_listed_files_within_their_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "a.stl"
     file.write_bytes(b"12345")
-    served = Assets({"package://robot/a.stl": file, "package://robot/gone.stl": tmp_path / "gone.stl"})
-    assert served.read("package://robot/a.stl") == b"12345"
-    for uri, why in (
-        (f"file://{file}", "no mesh"),
-        (str(file), "no mesh"),
-        ("package://robot/gone.stl", "cannot be read"),
-    ):
-        with pytest.raises(AssetRefused, match=why) as refused:
-            served.read(uri)
-        assert str(tmp_path) not in str(refused.value)
-    monkeypatch.setattr(assets, "MAX_ASSET", 4)
-    with pytest.raises(AssetRefused, match="larger"):
-        served.read("package://robot/a.stl")
+    files = {"package://robot/a.stl": file, "package://robot/gone.stl": tmp_path / "gone.stl"}
+    assert foxglove.asset(files, "package://robot/a.stl") == b"12345"
+    for uri in (f"file://{file}", str(file), "package://robot/gone.stl"):
+        assert foxglove.asset(files, uri) is None
+    monkeypatch.setattr(foxglove, "MAX_ASSET", 4)
+    assert foxglove.asset(files, "package://robot/a.stl") is None

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 from manipcli import pipeline
+from manipcli.core.errors import SimulationFailed
 from manipcli.live.command import CALL_SERVICE, CANCEL_GOAL, END, SEND_GOAL, Answer, Command
+from manipcli.live.live_steps import LiveSteps
 from manipcli.logs.judge_log import judge_log
 from manipcli.record.read.reading import read_recording
-from tests.live.sessions import ROOT, simulated
+from manipcli.run.step_loop import StepLoop
+from tests.live.sessions import ROOT, SMALL, simulated
 
 POUR = ROOT / "tasks/pour.yaml"
 PICK = {"pick": {"object": "cup", "approach": {"from": "side", "distance": ["8 cm", "14 cm"]},
@@ -106,3 +109,37 @@ def test_steps_of_a_client(tmp_path: Path) -> None:
     }
     assert "rest@3" not in verdict.text
     assert pipeline.verify_log(log).identical
+
+
+def test_an_error_that_no_check_foresaw_ends_one_command_and_a_failed_simulation_the_session(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Fault(Exception):
+        """As libraries define them."""
+
+    errors = [Fault("odd"), SimulationFailed("the simulation diverged", time=0.05)]
+
+    def planned(*_: object) -> None:
+        raise RecursionError("deep")
+
+    def check(*_: object) -> None:
+        raise errors.pop(0)
+
+    monkeypatch.setattr(StepLoop, "planned", planned)
+    monkeypatch.setattr(LiveSteps, "check", check)
+    (tmp_path / "small.yaml").write_text(SMALL)
+    client, log = Client(), tmp_path / "session.mcap"
+    commands = {
+        10: [client.run("run", "{wait: 0 s}")],
+        30: [client.check("fault", "{}")],
+        50: [client.check("failed", "{}")],
+        100: [Command(END, "")],
+    }
+    simulated(tmp_path / "small.yaml", commands, log)
+    assert client.outcome("run")[2] == "not_plannable"
+    assert "RecursionError: deep" in str(client.result("run").values["text"])
+    assert (client.result("fault").ok, client.result("fault").text) == (False, "Fault: odd")
+    assert client.answers["failed"] == []
+    recording = read_recording(log)
+    assert "refused" in {event.kind for event in recording.events}
+    assert judge_log(log).simulated_time == pytest.approx(0.05, abs=0.002)

@@ -101,6 +101,11 @@ def test_the_tools_work_in_their_folder_and_nowhere_else(tmp_path: Path) -> None
         error, text = await call("live_run_step", step={"waitt": "0.1 s"})
         assert error
         assert "did you mean 'wait'" in text
+        with anyio.move_on_after(0.3) as scope:  # the next tool does not wait for a step that nobody wants
+            await call("live_run_step", step={"wait": "1000 s"})
+        assert scope.cancelled_caught
+        later = json.loads((await call("live_state"))[1])
+        assert state["time"] < later["time"] < 1000
         error, text = await call("live_stop")
         assert "session ended" in text
 

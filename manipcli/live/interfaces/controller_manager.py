@@ -19,7 +19,6 @@ from manipcli.spec.controllers import ControllerSpec, Interface
 from manipcli.spec.ros.write import type_in_ros, types_in_ros
 from manipcli.task.task import Task
 
-LIST_CONTROLLERS: Final = "/controller_manager/list_controllers"
 BEST_EFFORT: Final = 1
 MEASURED: Final = ("position", "velocity", "effort")
 """State interfaces of every joint."""

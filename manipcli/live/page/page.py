@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from manipcli.live.access import Access, query
 from manipcli.live.command import Answer
-from manipcli.live.outlet import Network
+from manipcli.live.outlet import Network, Outlet
 from manipcli.live.page import service_calls, texts
 from manipcli.live.page.controls import Controls
 from manipcli.live.page.door import MAY_COMMAND, door
@@ -48,7 +48,7 @@ PARTING: Final = 0.2
 """[s] That the last texts have to reach the browsers."""
 
 
-class LivePage(LocalServer):
+class LivePage(LocalServer, Outlet):
     """A served page: an outlet.
 
     Args:
@@ -160,16 +160,21 @@ class LivePage(LocalServer):
         pause = IDLE
         while not self._over.wait(pause):
             began = time.monotonic()
-            news = self._story.read()
-            watched = bool(self.viser.get_clients())
-            if watched != self._watched:
-                self._watched = watched
-                self._network.changed()
-            if not watched:
-                pause = IDLE
-                continue
-            self._update(began, news)
-            pause = max(PERIOD, SHARE * (time.monotonic() - began))
+            try:
+                self._look(began)
+            except Exception as error:  # noqa: BLE001 (shown; a thread that ends would freeze the page)
+                self._messages.content = texts.fault(error)
+            pause = max(PERIOD, SHARE * (time.monotonic() - began)) if self._watched else IDLE
+
+    def _look(self, now: float) -> None:
+        """Update the page, if a browser is connected."""
+        news = self._story.read()
+        watched = bool(self.viser.get_clients())
+        if watched != self._watched:
+            self._watched = watched
+            self._network.changed()
+        if watched:
+            self._update(now, news)
 
     def _update(self, now: float, news: bool) -> None:
         """Show what is new, and send what visitors ask."""

@@ -66,6 +66,11 @@ def messages(lines: Iterable[tuple[float, int, str]]) -> str:
     return _box("<br>".join(reversed(rows)), "max-height:11em;overflow-y:auto")
 
 
+def fault(error: Exception) -> str:
+    """An error of the page itself; the session goes on."""
+    return _box(f'<span style="color:{_COLORS[40]}">{escape(f"error of the page: {error!r}")}</span>')
+
+
 def read_only() -> str:
     """For visitors who cannot command."""
     return _box(READ_ONLY)

@@ -22,6 +22,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.live.command import Answer, Command
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.outlet import Network
+from manipcli.live.page import texts
 from manipcli.live.page.options import PageOptions
 from manipcli.live.page.page import LivePage
 from manipcli.live.publisher import Publisher
@@ -155,6 +156,19 @@ def test_messages_are_text_and_not_html(served: Served) -> None:
         served.live(reader, lambda: "alert(1)" in reader.text)
         assert "&lt;script&gt;" in reader.text
         assert "<script" not in reader.text
+
+
+def test_an_error_of_the_page_is_shown_and_the_page_goes_on(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> str:
+        raise RuntimeError("<odd>")
+
+    with Visitor(served.page.port) as reader:
+        with monkeypatch.context() as patched:
+            patched.setattr(texts, "status", fail)
+            served.live(reader, lambda: "error of the page: RuntimeError(&#x27;&lt;odd&gt;&#x27;)" in reader.text)
+        now = f"t = {served.ticks * 0.001 + 50:.2f}"
+        served.ticks += 50_000
+        served.live(reader, lambda: now[:-3] in reader.text)
 
 
 def test_no_state_is_wanted_while_no_browser_is_connected(served: Served) -> None:
