@@ -25,7 +25,7 @@ from manipcli.live.link import ANSWER, EVENT, HEAD, SAMPLE, TICK, WANTED, comple
 from manipcli.live.offer import Offer
 from manipcli.live.outlet import Network, Outlet, OutletOptions
 from manipcli.live.pending import Pending
-from manipcli.live.publisher import Publisher, is_sampled
+from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import Rosapi
 from manipcli.live.sample import Event, Sample
 from manipcli.live.server import LiveServer
@@ -100,7 +100,7 @@ class Hub:
         for outlet in self.outlets:
             self._wanted.update(outlet.wanted())
         watched = any(outlet.watches() for outlet in self.outlets)
-        self._numbers[WANTED] = watched or any(is_sampled(topic, self._publisher.offer) for topic in self._wanted)
+        self._numbers[WANTED] = watched or not self._publisher.sampled.isdisjoint(self._wanted)
 
     async def run(self) -> None:
         """Make each message once, for all who take it."""
@@ -158,7 +158,7 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
     stream = _Stream()
     hub = Hub(publisher, stream, numbers)
     transport, _ = await loop.create_unix_connection(lambda: stream, sock=end)
-    pending = Pending(numbers, transport.write)
+    pending = Pending(numbers, transport.write, setup.offer.readers)
     stream.answered = pending.answer
 
     def soon(call: Callable[[], object]) -> None:
@@ -166,10 +166,7 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
             loop.call_soon_threadsafe(call)
 
     def put(command: Command) -> bool:
-        if pending.full:
-            return False
-        soon(lambda: pending.put(command))
-        return True
+        return pending.put_soon(command, soon)
 
     rosapi = Rosapi(setup.offer, lambda: publisher.clock(numbers[TICK]))
     services = Services(setup.offer, hub.latched, rosapi, pending.put, soon, hub.subscribed)
