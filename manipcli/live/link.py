@@ -30,7 +30,7 @@ WAITING: Final = 1000
 KEPT_SAMPLES: Final = 50
 KEPT_MESSAGES: Final = 1000
 """Samples, and messages of events, that wait for the socket; the oldest are dropped."""
-SAMPLE, EVENT, ANSWER, CLOSE = "sample", "event", "answer", "close"
+SAMPLE, EVENT, ANSWER, CLOSE, DROPPED = "sample", "event", "answer", "close", "dropped"
 
 
 def shared_numbers(descriptor: int) -> memoryview:
@@ -71,7 +71,7 @@ class Link:
         end.setblocking(False)
         self.numbers = numbers
         self.lost = False
-        self.dropped = 0
+        self.dropped = self._reported = 0
         self._end = end
         self._answers: deque[bytes] = deque()
         self._events: deque[bytes] = deque()
@@ -89,7 +89,13 @@ class Link:
         self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, outputs))
 
     def event(self, topic: str, ns: int, data: bytes) -> None:
-        """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR."""
+        """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR.
+
+        Before it, how many samples and messages were dropped since the last one.
+        """
+        if self.dropped != self._reported:
+            self._put(self._events, None, (DROPPED, self.dropped - self._reported))
+            self._reported = self.dropped
         self._put(self._events, KEPT_MESSAGES, (EVENT, topic, ns, data))
 
     def close(self) -> None:

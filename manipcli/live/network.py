@@ -21,7 +21,8 @@ from manipcli.core.errors import InvalidInput
 from manipcli.live.access import Access
 from manipcli.live.command import Command
 from manipcli.live.connection import Services
-from manipcli.live.link import ANSWER, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
+from manipcli.live.drops import drop_line
+from manipcli.live.link import ANSWER, DROPPED, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
 from manipcli.live.offer import Offer
 from manipcli.live.outlet import Network, Outlet, OutletOptions
 from manipcli.live.pending import Pending
@@ -30,7 +31,7 @@ from manipcli.live.rosapi import Rosapi
 from manipcli.live.sample import Event, Sample
 from manipcli.live.server import LiveServer
 from manipcli.model.robot import RobotModel
-from manipcli.record.channels import Recorded
+from manipcli.record.channels import ROSOUT, Recorded
 from manipcli.scene.scene import Scene
 
 KEPT: Final = 20
@@ -59,6 +60,7 @@ class _Stream(asyncio.Protocol):
         self.samples: deque[Sample] = deque(maxlen=KEPT)
         self.something = asyncio.Event()
         self.over = asyncio.Event()
+        self.dropped = 0
         self.answered: Callable[..., None] = lambda *_: None
         self._received = bytearray()
 
@@ -67,9 +69,12 @@ class _Stream(asyncio.Protocol):
         for body in complete(self._received):
             kind, *values = pickle.loads(body)  # of the process that started this one
             if kind == SAMPLE:
+                self.dropped += len(self.samples) == KEPT
                 self.samples.append(Sample(*values))
             elif kind == EVENT:
                 self.events.append(Event(*values))
+            elif kind == DROPPED:
+                self.dropped += values[0]
             elif kind == ANSWER:
                 self.answered(*values)
             else:
@@ -108,11 +113,21 @@ class Hub:
         while True:
             await stream.something.wait()
             stream.something.clear()
+            if stream.events:
+                self._report_drops()
             while stream.events:
                 self._event(stream.events.popleft())
             while stream.samples:
                 self._sample(stream.samples.popleft())
                 await asyncio.sleep(0)
+
+    def _report_drops(self) -> None:
+        """With the next event: what the network was too slow to take."""
+        count, self._stream.dropped = self._stream.dropped, 0
+        if count and self.server is not None:
+            stamp = self._publisher.clock(self._numbers[TICK])
+            text = f"{count} samples and messages of the session were dropped: the server is too slow"
+            self.server.publish(ROSOUT, drop_line(text, stamp))
 
     def _event(self, event: Event) -> None:
         topic, latched = event.topic, event.topic in self._publisher.offer.latched

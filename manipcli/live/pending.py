@@ -58,7 +58,12 @@ class Pending:
         """As `put`, from another thread; `soon` calls in that of the network, where others may have come first."""
         if self.full(command):
             return False
-        soon(lambda: self.put(command) or command.answer(Answer(False, {}, text=TOO_MANY)))
+
+        def put() -> None:
+            if not self.put(command):
+                command.answer(Answer(False, {}, text=TOO_MANY))
+
+        soon(put)
         return True
 
     def answer(self, number: int, found: Answer) -> None:

@@ -10,6 +10,7 @@ import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -165,7 +166,9 @@ def test_a_network_that_takes_nothing_loses_the_oldest_samples_but_no_answer(bot
     assert ticks == sorted(ticks)
     assert ticks[-ends.KEPT_SAMPLES :] == [*range(2000 - ends.KEPT_SAMPLES, 2000)]
     assert both.link.dropped == 2000 - len(ticks) > 0
-    assert [values[0] for values in found if values[0] != SAMPLE] == [ends.ANSWER, EVENT]
+    assert [values[0] for values in found if values[0] != SAMPLE] == [ends.ANSWER, ends.DROPPED, EVENT]
+    (reported,) = (values[1] for values in found if values[0] == ends.DROPPED)
+    assert 0 < cast("int", reported) <= both.link.dropped
 
 
 def test_a_session_whose_network_is_killed_ends_and_its_log_is_complete(tmp_path: Path) -> None:
