@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Sequence
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -37,7 +38,6 @@ class Publisher:
         state: of the last sample.
         outputs: of the controllers in the last sample.
         latched: the last message of each latched topic, in CDR.
-        sampled: topics with messages at ticks; others only have them at events.
     """
 
     def __init__(
@@ -58,7 +58,11 @@ class Publisher:
         }
         self._topics: frozenset[str] = frozenset()
         self._block: Block | None = None
-        self.sampled = self._made(self._table).topics | {CLOCK}
+
+    @cached_property
+    def sampled(self) -> frozenset[str]:
+        """Topics with messages at ticks; others only have them at events."""
+        return self._made(self._table).topics | {CLOCK}
 
     def ns(self, tick: int) -> int:
         """The simulated time [ns] of a tick."""
