@@ -13,6 +13,10 @@ CANCEL_GOAL: Final = "cancel_action_goal"
 CALL_SERVICE: Final = "call_service"
 END: Final = "end"
 
+STOP: Final = "/emergency_stop"
+RELEASE: Final = "/emergency_stop_release"
+"""Services that are never refused because others wait."""
+
 Values = dict[str, object]
 
 
@@ -44,6 +48,7 @@ class Command:
         json: the message, goal or request, complete and valid for its type. The log has this text, so that a session
             that is simulated from its log reads the same numbers.
         answer: called in the thread of the control loop; it must not block.
+        guest: whether it is of a client that may only read.
     """
 
     op: Op
@@ -51,6 +56,7 @@ class Command:
     id: str = ""
     json: str = "{}"
     answer: Callable[[Answer], None] = nobody
+    guest: bool = False
 
 
 class Goal(Protocol):

@@ -11,6 +11,7 @@ from manipcli.live.command import Answer, Command
 from manipcli.live.fields import Refused
 from manipcli.live.offer import Offer
 from manipcli.live.outbox import Outbox
+from manipcli.live.pending import TOO_MANY
 from manipcli.live.rosapi import Rosapi
 
 LEVELS: Final = ("none", "error", "warning", "info")
@@ -99,5 +100,5 @@ class Connection:
             self.services.in_network(lambda: answer(found))
 
         text = json.dumps(message, separators=(",", ":"), allow_nan=False)
-        if not self.services.put(Command(op, name, id_, text, back)):
-            raise Refused("too many commands wait for the next tick")
+        if not self.services.put(Command(op, name, id_, text, back, guest=not self._commands)):
+            raise Refused(TOO_MANY)

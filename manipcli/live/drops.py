@@ -28,12 +28,13 @@ def report_drops(connection: Connection) -> list[str]:
             text = f"{one.topic}: {one.dropped} messages were dropped; read faster or throttle"
             connection.status("warning", text)
             stamp = connection.services.rosapi.now
-            lines.append(_line(f"client {connection.number}: {text}", stamp))
+            lines.append(drop_line(f"client {connection.number}: {text}", stamp))
             one.dropped = 0
     return lines
 
 
-def _line(text: str, stamp: Mapping[str, int]) -> str:
+def drop_line(text: str, stamp: Mapping[str, int]) -> str:
+    """The `publish` operation of a text on `/rosout`; `stamp`: builtin_interfaces/Time."""
     values = {"stamp": {**stamp}, "level": _WARN, "name": "manipcli", "msg": text, "function": "dropped"}
     message = from_json(definition(LOG), values)
     return json.dumps({"op": "publish", "topic": ROSOUT, "msg": message}, separators=(",", ":"))

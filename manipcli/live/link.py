@@ -19,17 +19,18 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from manipcli.live.command import SEND_GOAL, Answer, Command, nobody
+from manipcli.live.lanes import left_after, stop_first
 
 HEAD: Final = struct.Struct("<I")
 TICK, TAKEN, SENT, WANTED = range(4)
 """Shared numbers: the last tick and the commands taken, of the loop; the commands sent, and whether somebody wants
 samples, of the network."""
 WAITING: Final = 1000
-"""Most commands that wait for the next tick."""
+"""Most commands that wait for the next tick, besides those that change nothing."""
 KEPT_SAMPLES: Final = 50
 KEPT_MESSAGES: Final = 1000
 """Samples, and messages of events, that wait for the socket; the oldest are dropped."""
-SAMPLE, EVENT, ANSWER, CLOSE = "sample", "event", "answer", "close"
+SAMPLE, EVENT, ANSWER, CLOSE, DROPPED = "sample", "event", "answer", "close", "dropped"
 
 
 def shared_numbers(descriptor: int) -> memoryview:
@@ -70,7 +71,7 @@ class Link:
         end.setblocking(False)
         self.numbers = numbers
         self.lost = False
-        self.dropped = 0
+        self.dropped = self._reported = 0
         self._end = end
         self._answers: deque[bytes] = deque()
         self._events: deque[bytes] = deque()
@@ -80,13 +81,21 @@ class Link:
         self._received = bytearray()
         self._taken = 0
         self._given_back: list[Command] = []
+        self._batch: list[Command] = []
+        self._reads: deque[Command] = deque()
 
     def sample(self, tick: int, numbers: object, outputs: Sequence[object]) -> None:
         """Send the state of a tick: see `Sample`."""
         self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, outputs))
 
     def event(self, topic: str, ns: int, data: bytes) -> None:
-        """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR."""
+        """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR.
+
+        Before it, how many samples and messages were dropped since the last one.
+        """
+        if self.dropped != self._reported:
+            self._put(self._events, None, (DROPPED, self.dropped - self._reported))
+            self._reported = self.dropped
         self._put(self._events, KEPT_MESSAGES, (EVENT, topic, ns, data))
 
     def close(self) -> None:
@@ -98,7 +107,7 @@ class Link:
             self._flush()
 
     def take(self, tick: int) -> Sequence[Command]:
-        """The commands that have arrived."""
+        """The commands that have arrived, but for those that change nothing; see `stop_first`."""
         if self._waits:
             self._flush()
         if not self._given_back and self.numbers[SENT] == self._taken:
@@ -106,15 +115,21 @@ class Link:
         found, self._given_back = self._given_back, []
         if self.numbers[SENT] != self._taken and not self.lost:
             self._receive()
-            new = [self._command(body) for body in complete(self._received)]
-            self._taken += len(new)
+            for body in complete(self._received):
+                command, reads = self._command(body)
+                (self._reads if reads else found).append(command)
+                self._taken += 1
             self.numbers[TAKEN] = self._taken
-            found += new
-        return found
+        self._batch = found
+        return stop_first(found)
+
+    def read(self) -> Command | None:
+        """The next command that changes nothing."""
+        return self._reads.popleft() if self._reads else None
 
     def wait(self, seconds: float) -> bool:
         """Wait for commands, at most this wall time."""
-        if not self._given_back:
+        if not (self._given_back or self._reads):
             if self._waits:
                 self._flush()
             select.select([self._end], [self._end] if self._waits else [], [], seconds)
@@ -123,6 +138,10 @@ class Link:
     def give_back(self, commands: Sequence[Command]) -> None:
         """Take these again, before all others."""
         self._given_back[:0] = commands
+
+    def end(self, command: Command) -> None:
+        """A command has ended the session: those after it are for the next one."""
+        self.give_back(left_after(self._batch, command))
 
     def _receive(self) -> None:
         try:
@@ -137,15 +156,16 @@ class Link:
         except OSError:
             self.lost = True
 
-    def _command(self, body: bytes) -> Command:
-        number, op, name, id_, text = json.loads(body)
+    def _command(self, body: bytes) -> tuple[Command, bool]:
+        """A command, and whether it changes nothing."""
+        number, op, name, id_, text, reads = json.loads(body)
 
         def answer(found: Answer) -> None:
             feedback = op == SEND_GOAL and found.status is None
             if not feedback or len(self._answers) < KEPT_MESSAGES:
                 self._put(self._answers, None, (ANSWER, number, found))
 
-        return Command(op, name, id_, text, answer if number else nobody)
+        return Command(op, name, id_, text, answer if number else nobody), reads
 
     def _put(self, queue: deque[bytes], kept: int | None, message: tuple[object, ...]) -> None:
         if len(queue) == kept:

@@ -20,7 +20,7 @@ from manipcli.live.live_robot import LiveRobot
 from manipcli.live.live_session import LiveSession, SessionOver
 from manipcli.live.live_steps import LiveSteps
 from manipcli.live.obey import Obedience
-from manipcli.live.pace import Pace
+from manipcli.live.pace import Pace, Share
 from manipcli.live.play_state import Reset
 from manipcli.live.source import Source
 from manipcli.record.write.recorder import Recorder
@@ -34,6 +34,8 @@ from manipcli.task.task import Task
 END_COMMAND: Final = Command(END, "")
 POLL: Final = 0.05
 """[s] of wall time between two looks for an interruption while the session is paused."""
+READING: Final = 0.1
+"""Share of wall time for commands that change nothing, while the simulation is slower than asked."""
 STARTED: Final = "the controllers hold, and obey commands"
 
 
@@ -81,6 +83,7 @@ class _Turn:
 
     def __init__(self, robot: LiveRobot, obedience: Obedience, outside: Outside) -> None:
         self._robot, self._obedience, self._outside = robot, obedience, outside
+        self._reading = Share(READING)
 
     def before_tick(self) -> None:
         play, source, tick = self._robot.play, self._outside.source, self._robot.session.ticks
@@ -91,6 +94,7 @@ class _Turn:
                 break  # simulated from a log: it went on
             self._outside.pace.start()
             self._obey(tick)
+            self._read()
         if play.over and tick > 0:
             raise SessionOver
 
@@ -104,17 +108,26 @@ class _Turn:
             except KeyboardInterrupt:
                 interrupted = True
         commands = (END_COMMAND,) if interrupted else outside.source.take(tick)
-        for k, command in enumerate(commands):
+        for command in commands:
             if not self._obedience.obey(command):
                 play.end()
             if play.over:
-                outside.source.give_back(commands[k + 1 :])
+                outside.source.end(command)
                 return
 
     def after_tick(self) -> None:
         self._robot.play.ticked()
         self._obedience.after_tick()
+        if self._outside.pace.ahead or self._reading.free():
+            self._read()
         self._outside.pace.wait()
+
+    def _read(self) -> None:
+        """Answer one command that changes nothing: who only reads does not delay the tick by more."""
+        command = self._outside.source.read()
+        if command is not None:
+            with self._reading:
+                self._obedience.obey(command)
 
 
 def simulate_live(

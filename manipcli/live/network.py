@@ -23,16 +23,17 @@ from manipcli.core.errors import InvalidInput
 from manipcli.live.access import Access
 from manipcli.live.command import Command
 from manipcli.live.connection import Services
-from manipcli.live.link import ANSWER, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
+from manipcli.live.drops import drop_line
+from manipcli.live.link import ANSWER, DROPPED, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
 from manipcli.live.offer import Offer
 from manipcli.live.outlet import Network, Outlet, OutletOptions
 from manipcli.live.pending import Pending
-from manipcli.live.publisher import Publisher, is_sampled
+from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import Rosapi
 from manipcli.live.sample import Event, Sample
 from manipcli.live.server import LiveServer
 from manipcli.model.robot import RobotModel
-from manipcli.record.channels import Recorded
+from manipcli.record.channels import ROSOUT, Recorded
 from manipcli.scene.scene import Scene
 
 KEPT: Final = 20
@@ -62,6 +63,7 @@ class _Stream(asyncio.Protocol):
         self.samples: deque[Sample] = deque(maxlen=KEPT)
         self.something = asyncio.Event()
         self.over = asyncio.Event()
+        self.dropped = 0
         self.answered: Callable[..., None] = lambda *_: None
         self._received = bytearray()
 
@@ -70,9 +72,12 @@ class _Stream(asyncio.Protocol):
         for body in complete(self._received):
             kind, *values = pickle.loads(body)  # of the process that started this one
             if kind == SAMPLE:
+                self.dropped += len(self.samples) == KEPT
                 self.samples.append(Sample(*values))
             elif kind == EVENT:
                 self.events.append(Event(*values))
+            elif kind == DROPPED:
+                self.dropped += values[0]
             elif kind == ANSWER:
                 with reported("an answer was lost"):
                     self.answered(*values)
@@ -118,7 +123,7 @@ class Hub:
             watches.append(outlet.watches())
 
         self._for_outlets(ask)
-        self._numbers[WANTED] = any(watches) or any(is_sampled(topic, self._publisher.offer) for topic in self._wanted)
+        self._numbers[WANTED] = any(watches) or not self._publisher.sampled.isdisjoint(self._wanted)
 
     async def run(self) -> None:
         """Make each message once, for all who take it."""
@@ -126,11 +131,21 @@ class Hub:
         while True:
             await stream.something.wait()
             stream.something.clear()
+            if stream.events:
+                self._report_drops()
             while stream.events:
                 self._event(stream.events.popleft())
             while stream.samples:
                 self._sample(stream.samples.popleft())
                 await asyncio.sleep(0)
+
+    def _report_drops(self) -> None:
+        """With the next event: what the network was too slow to take."""
+        count, self._stream.dropped = self._stream.dropped, 0
+        if count and self.server is not None:
+            stamp = self._publisher.clock(self._numbers[TICK])
+            text = f"{count} samples and messages of the session were dropped: the server is too slow"
+            self.server.publish(ROSOUT, drop_line(text, stamp))
 
     def _event(self, event: Event) -> None:
         topic, latched = event.topic, event.topic in self._publisher.offer.latched
@@ -194,7 +209,7 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
     stream = _Stream()
     hub = Hub(publisher, stream, numbers)
     transport, _ = await loop.create_unix_connection(lambda: stream, sock=end)
-    pending = Pending(numbers, transport.write)
+    pending = Pending(numbers, transport.write, setup.offer.readers)
     stream.answered = pending.answer
 
     def soon(call: Callable[[], object]) -> None:
@@ -202,10 +217,7 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
             loop.call_soon_threadsafe(call)
 
     def put(command: Command) -> bool:
-        if pending.full:
-            return False
-        soon(lambda: pending.put(command))
-        return True
+        return pending.put_soon(command, soon)
 
     rosapi = Rosapi(setup.offer, lambda: publisher.clock(numbers[TICK]))
     services = Services(setup.offer, hub.latched, rosapi, pending.put, soon, hub.subscribed)

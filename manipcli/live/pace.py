@@ -50,6 +50,11 @@ class Pace:
             return False
         return time.perf_counter() - self._began >= self._lasting
 
+    @property
+    def ahead(self) -> bool:
+        """Whether the next tick is not due yet."""
+        return self._step is not None and time.perf_counter() < self._next + self._step
+
     def wait(self) -> None:
         """Wait until the next tick is due."""
         if self._step is None:
@@ -63,3 +68,26 @@ class Pace:
             if self._late is not None:
                 self._late(f"the simulation is slower than --speed {self._speed:g}; /clock shows the simulated time")
                 self._late = None
+
+
+class Share:
+    """A small share of wall time, for work that can wait.
+
+    Args:
+        share: of the time, in (0, 1).
+        clock: wall time [s].
+    """
+
+    def __init__(self, share: float, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._share, self._clock = share, clock
+        self._next = self._began = clock()
+
+    def free(self) -> bool:
+        """Whether the share is not used up."""
+        return self._clock() >= self._next
+
+    def __enter__(self) -> None:
+        self._began = self._clock()
+
+    def __exit__(self, *raised: object) -> None:
+        self._next = self._began + (self._clock() - self._began) / self._share

@@ -108,12 +108,13 @@ def _fields(kind: type[GainsSpec]) -> dict[str, Parameter]:
     return found
 
 
-def change(robot: LiveRobot, name: str, values: Mapping[str, Value]) -> None:
+def change(robot: LiveRobot, name: str, values: Mapping[str, Value], *, suggest: bool = True) -> None:
     """Change parameters of a controller from the next tick on, all or none.
 
     Args:
         robot, name: its robot and name.
         values: by name; None removes a bound.
+        suggest: see `known`.
 
     Raises:
         InvalidArgument: the controller is not loaded; a parameter that is unknown, cannot change, or is of another
@@ -121,7 +122,7 @@ def change(robot: LiveRobot, name: str, values: Mapping[str, Value]) -> None:
     """
     wanted: dict[tuple[str, str], object] = {}
     for word, value in values.items():
-        parameter = known(robot.manager, name, word)
+        parameter = known(robot.manager, name, word, suggest=suggest)
         if parameter.gain is None:
             message = f"parameter '{word}' of controller '{name}' is read-only"
             raise InvalidArgument("LIVE152", message, hint="set it in the controllers file")
@@ -144,15 +145,16 @@ def _check(robot: LiveRobot, name: str, gains: Mapping[str, GainsSpec]) -> None:
             raise InvalidArgument(problem.code or "CTRL100", text, hint=problem.hint)
 
 
-def known(manager: ControllerManager, name: str, word: str) -> Parameter:
-    """As `parameter_of`.
+def known(manager: ControllerManager, name: str, word: str, *, suggest: bool = True) -> Parameter:
+    """As `parameter_of`; `suggest`: with the nearest name, which takes longer than all else.
 
     Raises:
         InvalidArgument: the controller is not loaded, or has no such parameter.
     """
     found = parameter_of(manager, name, word)
     if found is None:
-        hint = did_you_mean(word[:80], parameter_names(manager, name), kind="parameters")
+        names = parameter_names(manager, name) if suggest else ()
+        hint = did_you_mean(word[:80], names, kind="parameters")
         raise InvalidArgument("LIVE151", f"controller '{name}' has no parameter '{word[:80]}'", hint=hint)
     return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Sequence
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -58,6 +59,11 @@ class Publisher:
         self._topics: frozenset[str] = frozenset()
         self._block: Block | None = None
 
+    @cached_property
+    def sampled(self) -> frozenset[str]:
+        """Topics with messages at ticks; others only have them at events."""
+        return self._made(self._table).topics | {CLOCK}
+
     def ns(self, tick: int) -> int:
         """The simulated time [ns] of a tick."""
         return round(tick * self.period * 1e9)
@@ -75,7 +81,7 @@ class Publisher:
         self.outputs = sample.outputs
         if CLOCK in wanted:
             found[CLOCK] = clock_message(self.ns(sample.tick))
-        own = self._table.keys() & wanted
+        own = {*wanted} & self.sampled - {CLOCK}
         if not own:
             return found
         content = self._encoded(own, sample)
@@ -91,13 +97,16 @@ class Publisher:
         """The message records of one tick, by the encoder of the log."""
         if self._block is None or wanted != self._topics:
             self._topics = frozenset(wanted)
-            table = [self._table[topic] for topic in sorted(wanted)]
-            every = Selection({word(topic): 1 for topic in wanted})
-            self._block = Block(self.robot, self.scene, self.recorded, table, every, self.period, 1)
+            self._block = self._made(wanted)
         outputs: Any = [None if own is None else SimpleNamespace(rows=own[0], speed=own[1]) for own in sample.outputs]
         self._block.add(sample.tick, self.state, outputs)
         content = self._block.encode([])
         return b"" if content is None else content.data
+
+    def _made(self, wanted: Collection[str]) -> Block:
+        table = [self._table[topic] for topic in sorted(wanted)]
+        every = Selection({word(topic): 1 for topic in wanted})
+        return Block(self.robot, self.scene, self.recorded, table, every, self.period, 1)
 
     def text(self, topic: str, data: bytes) -> str:
         """The `publish` operation of a message in CDR."""
@@ -116,11 +125,6 @@ def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]
         (topics.MARKERS, messages.marker_message(scene, 0)),
         *((each.status_topic, no_goals.data) for each in actions),
     )
-
-
-def is_sampled(topic: str, offer: Offer) -> bool:
-    """Whether a topic can have messages at ticks, not only once."""
-    return topic in offer.published and topic not in offer.latched
 
 
 def clock_message(ns: int) -> bytes:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
 
 MAX_CLIENTS: Final = 32
+MAX_READERS: Final = 24
+"""Those of them without the token."""
 UNREAD: Final = 10.0
 """[s] A client that takes nothing for this time is disconnected."""
 READ: Final = 4096
@@ -45,6 +47,7 @@ class LiveServer:
     def __init__(self, services: Services, access: Access, *, unread: float = UNREAD) -> None:
         self._services, self._access, self._unread = services, access, unread
         self._clients: dict[int, Client] = {}
+        self._readers: set[int] = set()
         self._numbers = 0
         self._turn, self._share = asyncio.Lock(), Share()
 
@@ -92,20 +95,28 @@ class LiveServer:
         if decision.refused is not None:
             code, why = decision.refused
             return connection.respond(_status(code), f"{why}\n")
-        if len(self._clients) >= MAX_CLIENTS:
-            return connection.respond(_status(503), f"more than {MAX_CLIENTS} clients\n")
+        if full := self._full(may=decision.commands):
+            return connection.respond(_status(503), f"{full}\n")
         connection.commands = decision.commands  # type: ignore[attr-defined]
         return None
+
+    def _full(self, *, may: bool) -> str:
+        """Why one more client is refused; "" if it is not. Readers cannot keep out those who command."""
+        if not may and len(self._readers) >= MAX_READERS:
+            return f"more than {MAX_READERS} clients without the token"
+        return f"more than {MAX_CLIENTS} clients" if len(self._clients) >= MAX_CLIENTS else ""
 
     async def _serve(self, connection: ServerConnection) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        if len(self._clients) >= MAX_CLIENTS:
-            await connection.close(1013, f"more than {MAX_CLIENTS} clients")
+        may: bool = connection.commands  # type: ignore[attr-defined]
+        if full := self._full(may=may):
+            await connection.close(1013, full)
             return
         self._numbers += 1
         number = self._numbers
-        may: bool = connection.commands  # type: ignore[attr-defined]
+        if not may:
+            self._readers.add(number)
         client = self._clients[number] = Client(number, commands=may, services=self._services)
         sending = asyncio.create_task(self._send(connection, client))
         connection.transport.max_size = READ  # type: ignore[attr-defined]  # of asyncio's transports of sockets
@@ -123,6 +134,7 @@ class LiveServer:
         finally:
             sending.cancel()
             del self._clients[number]
+            self._readers.discard(number)
             self._services.subscribed()
 
     async def _receive(self, client: Client, frame: str | bytes) -> float:

@@ -20,12 +20,20 @@ class Source(Protocol):
         """The commands that take effect at control tick `tick`, in order; called again for a tick that waits."""
         ...
 
+    def read(self) -> Command | None:
+        """The next command that changes nothing, for when the loop has time; None: there is none."""
+        ...
+
     def wait(self, seconds: float) -> bool:
         """Wait for a command, at most this wall time; False: none will come at this tick."""
         ...
 
     def give_back(self, commands: Sequence[Command]) -> None:
-        """Take these again, before all others: they came after the command that ended the session."""
+        """Take these again, before all others."""
+        ...
+
+    def end(self, command: Command) -> None:
+        """A command has ended the session: those after it are for the next one."""
         ...
 
 
@@ -40,11 +48,17 @@ class Schedule:
         first, self._taken = tick != self._taken, tick
         return self._commands.get(tick, ()) if first else ()
 
+    def read(self) -> Command | None:
+        return None
+
     def wait(self, seconds: float) -> bool:
         return False
 
     def give_back(self, commands: Sequence[Command]) -> None:
         """No effect: the session of a schedule ends with it."""
+
+    def end(self, command: Command) -> None:
+        """No effect."""
 
 
 def recorded_commands(log: Path, period: float, *, failed: bool) -> Schedule:

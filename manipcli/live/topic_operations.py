@@ -107,9 +107,11 @@ class TopicOperations:
         else:
             length = max(each.length for each in asked)
             before = subscriptions.get(topic)
-            waiting = deque(before.waiting if before is not None else (), maxlen=length)
+            kept = () if before is None else before.waiting
+            dropped = 0 if before is None else before.dropped + max(0, len(kept) - length)
+            waiting = deque(kept, maxlen=length)
             throttle, names = min(each.throttle for each in asked), frozenset(each.name for each in asked)
-            subscriptions[topic] = Subscription(topic, throttle, waiting, names=names)
+            subscriptions[topic] = Subscription(topic, throttle, waiting, dropped, names=names)
         self._connection.services.subscribed()
 
     def _warn_of_ignored(self, frame: Mapping[str, Any]) -> None:

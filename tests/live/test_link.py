@@ -7,17 +7,18 @@ import os
 import pickle
 import signal
 import socket
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
 from manipcli.live import link as ends
-from manipcli.live.command import CALL_SERVICE, END, PUBLISH, SEND_GOAL, Answer, Command
+from manipcli.live.command import CALL_SERVICE, END, PUBLISH, RELEASE, SEND_GOAL, STOP, Answer, Command
 from manipcli.live.link import EVENT, SAMPLE, TAKEN, WAITING, Link, complete
-from manipcli.live.pending import Pending
+from manipcli.live.pending import READS, Pending
 from manipcli.live.source import recorded_commands
 from manipcli.record.foreign.topics import open_topics
 from tests.live.sessions import opened, serving
@@ -68,6 +69,75 @@ def test_no_more_commands_wait_than_may() -> None:
     assert [pending.put(Command(PUBLISH, "a")) for _ in range(2)] == [True, False]
 
 
+STOPPING, RELEASING, RESET = (Command(CALL_SERVICE, name) for name in (STOP, RELEASE, "/reset"))
+X, Y = Command(PUBLISH, "x"), Command(PUBLISH, "y")
+
+
+@pytest.mark.parametrize(
+    ("batch", "order"),
+    [
+        ((X, STOPPING, Y), (STOPPING, X, Y)),
+        ((X, RELEASING, Y), (X, RELEASING, Y)),  # what was sent while the robot was stopped is refused
+        ((X, RELEASING, STOPPING, Y), (RELEASING, STOPPING, X, Y)),
+        ((X, STOPPING, RELEASING), (STOPPING, X, RELEASING)),
+    ],
+)
+def test_a_stop_is_first_and_the_last_of_stop_and_release_wins(
+    both: Ends, batch: tuple[Command, ...], order: tuple[Command, ...]
+) -> None:
+    for command in batch:
+        both.pending.put(command)
+    assert [command.name for command in both.link.take(0)] == [command.name for command in order]
+
+
+def test_a_stop_that_overtook_a_reset_also_stops_the_next_session(both: Ends) -> None:
+    answers: list[Answer] = []
+    for command in (X, RESET, Y, replace(STOPPING, answer=answers.append)):
+        both.pending.put(command)
+    taken = both.link.take(0)
+    assert [command.name for command in taken] == [STOP, "x", "/reset", "y"]
+    both.link.end(taken[2])
+    again = both.link.take(1)
+    assert [command.name for command in again] == [STOP, "y"]
+    again[0].answer(Answer(True, {}))  # it was answered before the reset
+    assert both.arrived() == []
+
+
+def test_an_emergency_stop_is_never_refused_and_guests_who_read_take_no_places(
+    both: Ends, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("manipcli.live.pending.WAITING", 30)
+    pending = Pending(both.link.numbers, both.far.sendall, {"/read"})
+    read = Command(CALL_SERVICE, "/read")
+    guest = replace(read, guest=True)
+    assert [pending.put(guest) for _ in range(READS + 5)] == [True] * READS + [False] * 5
+    assert pending.put(read)
+    others = 30 - READS - 1
+    assert [pending.put(X) for _ in range(others + 1)] == [True] * others + [False]
+    assert [pending.put(RELEASING), pending.put(STOPPING)] == [True, True]
+    assert [command.name for command in both.link.take(0)] == [RELEASE, STOP, *["x"] * others]
+    assert not pending.put(guest)
+    for _ in range(2):
+        one = both.link.read()
+        assert one is not None
+        one.answer(Answer(True, {}))
+    for _, number, found in both.arrived():
+        pending.answer(number, found)  # type: ignore[arg-type]
+    assert [pending.put(guest), pending.put(guest)] == [True, False]
+
+
+def test_a_command_that_another_thread_could_not_put_is_refused_later() -> None:
+    pending = Pending(memoryview(bytearray(64)).cast("q"), lambda data: None)
+    soon: list[Callable[[], object]] = []
+    answers: list[Answer] = []
+    command = Command(PUBLISH, "a", answer=answers.append)
+    assert [pending.put_soon(command, soon.append) for _ in range(WAITING + 3)] == [True] * (WAITING + 3)
+    for call in soon:
+        call()
+    assert [found.ok for found in answers] == [False] * 3
+    assert not pending.put_soon(command, soon.append)
+
+
 def test_answers_reach_who_asked_and_a_goal_is_answered_until_its_result(both: Ends) -> None:
     got: list[tuple[str, Answer]] = []
     for op in (PUBLISH, CALL_SERVICE, SEND_GOAL):
@@ -96,7 +166,9 @@ def test_a_network_that_takes_nothing_loses_the_oldest_samples_but_no_answer(bot
     assert ticks == sorted(ticks)
     assert ticks[-ends.KEPT_SAMPLES :] == [*range(2000 - ends.KEPT_SAMPLES, 2000)]
     assert both.link.dropped == 2000 - len(ticks) > 0
-    assert [values[0] for values in found if values[0] != SAMPLE] == [ends.ANSWER, EVENT]
+    assert [values[0] for values in found if values[0] != SAMPLE] == [ends.ANSWER, ends.DROPPED, EVENT]
+    (reported,) = (values[1] for values in found if values[0] == ends.DROPPED)
+    assert 0 < cast("int", reported) <= both.link.dropped
 
 
 def test_a_session_whose_network_is_killed_ends_and_its_log_is_complete(tmp_path: Path) -> None:

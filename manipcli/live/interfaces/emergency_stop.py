@@ -14,14 +14,12 @@ from typing import Any, Final
 from manipcli.control.controller import Controller
 from manipcli.control.roles import Hand, is_hand, takes_goals
 from manipcli.core.text import listed
-from manipcli.live.command import Command, Values
+from manipcli.live.command import RELEASE, STOP, Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.live_robot import LiveRobot
 from manipcli.record import schemas
 from manipcli.task.task import Task
 
-STOP: Final = "/emergency_stop"
-RELEASE: Final = "/emergency_stop_release"
 REASON: Final = "emergency stop"
 LOCKED: Final = f"the emergency stop is active; release it with the service {RELEASE}"
 

@@ -26,7 +26,7 @@ from manipcli.live.parameter import (
 from manipcli.record.json_message import definition, from_json
 from manipcli.task.task import Task
 
-MOST: Final = 200
+MOST: Final = 32
 """Most items of one request."""
 T = TypeVar("T")
 _VALUE = definition("rcl_interfaces/ParameterValue")
@@ -114,8 +114,9 @@ def _describe(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Va
 
 def _set(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """Each by itself; what is refused is an event, too."""
-    each = [_tried(robot, _node(command), [parameter]) for parameter in _few(request["parameters"])]
-    return {"results": each}
+    every = _few(request["parameters"])
+    suggest = len(every) == 1
+    return {"results": [_tried(robot, _node(command), [one], suggest=suggest) for one in every]}
 
 
 def _set_atomically(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
@@ -123,10 +124,11 @@ def _set_atomically(robot: LiveRobot, command: Command, request: dict[str, Any])
     return {"result": _tried(robot, _node(command), _few(request["parameters"]))}
 
 
-def _tried(robot: LiveRobot, node: str, parameters: Sequence[dict[str, Any]]) -> Values:
+def _tried(robot: LiveRobot, node: str, parameters: Sequence[dict[str, Any]], *, suggest: bool = True) -> Values:
     """rcl_interfaces/SetParametersResult of a change of these rcl_interfaces/Parameter."""
     try:
-        change(robot, node, {each["name"]: _given(robot.manager, node, each) for each in parameters})
+        given = {each["name"]: _given(robot.manager, node, each, suggest=suggest) for each in parameters}
+        change(robot, node, given, suggest=suggest)
     except InvalidArgument as error:
         found = error.findings[0]
         reason = f"{found.message}; {found.hint}" if found.hint else found.message
@@ -135,14 +137,14 @@ def _tried(robot: LiveRobot, node: str, parameters: Sequence[dict[str, Any]]) ->
     return {"successful": True, "reason": ""}
 
 
-def _given(manager: ControllerManager, node: str, parameter: dict[str, Any]) -> Value:
+def _given(manager: ControllerManager, node: str, parameter: dict[str, Any], *, suggest: bool) -> Value:
     """The value of a rcl_interfaces/Parameter; as in ROS 2, an integer is not a double."""
     name, kind = parameter["name"], parameter["value"]["type"]
     if kind == NOT_SET:
         return None
     if kind not in FIELDS:
         raise InvalidArgument("LIVE153", f"parameter '{name}': unknown type {kind}; expected 1 to 9")
-    if kind == INTEGER and known(manager, node, name).type == DOUBLE:
+    if kind == INTEGER and known(manager, node, name, suggest=suggest).type == DOUBLE:
         raise InvalidArgument("LIVE153", f"parameter '{name}' is of type double (3), not integer (2)")
     value: Value = parameter["value"][FIELDS[kind]]
     return value

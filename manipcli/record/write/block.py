@@ -161,7 +161,7 @@ class _Group:
 
 
 class Block:
-    """Buffer for `capacity` ticks; `channels`: recorded channels."""
+    """Buffer for `capacity` ticks; `channels`: recorded channels; `topics`: those of them with messages at ticks."""
 
     def __init__(
         self,
@@ -189,6 +189,7 @@ class Block:
         self._idle = [*_NOBODY]
         self._ids = {channel.topic: channel.id for channel in channels}
         sources = self._sources(robot, scene, controllers)
+        self.topics = frozenset(source.topic for source in sources)
         strides = [selection.stride(source.topic, period) for source in sources]
         self._groups = []
         for stride in sorted(set(strides)):
