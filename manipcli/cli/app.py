@@ -128,6 +128,16 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
 }
 
 
+_LIST: Final = r"^-(?=\s)"
+YAML_WITH_HYPHEN: Final[dict[str, str]] = {
+    "param set": r"^-(?=[\s.\d])",
+    "topic pub": _LIST,  # -1 is --once
+    "service call": _LIST,
+    "action send": _LIST,
+}
+"""Commands with arguments in YAML, and the beginnings of those that look like options."""
+
+
 def _app(words: Sequence[str]) -> typer.Typer:
     """The Typer app for a command line of these words.
 
@@ -160,6 +170,15 @@ def _called(words: Sequence[str]) -> str | None:
     """The called command: `check`, or `topic echo` with its group."""
     names = [word for word in words if not word.startswith("-")]
     return " ".join(names[: 2 if names and names[0] in GROUPS else 1]) or None
+
+
+def _with_yaml(words: Sequence[str]) -> list[str]:
+    """The words, where YAML that begins with a hyphen (-30, -.inf, a list) is not read as options.
+
+    A line break before it keeps the parser off, and changes neither YAML nor a number.
+    """
+    pattern = YAML_WITH_HYPHEN.get(_called(words) or "")
+    return [*words] if pattern is None else [re.sub(pattern, "\n-", word) for word in words]
 
 
 def _defaults(words: Sequence[str]) -> tuple[dict[str, object], tuple[str, ...]]:
@@ -219,7 +238,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with announced_to(console.talk):
             defaults, told = _defaults(words)
-            asked = words if words and "".join(words) not in GROUPS else [*words, "--help"]
+            asked = _with_yaml(words) if words and "".join(words) not in GROUPS else [*words, "--help"]
             code = _app(words)(args=asked, prog_name="manipcli", standalone_mode=False, default_map=defaults)
         if code == _INTERRUPTED_BY_TYPER:
             raise KeyboardInterrupt

@@ -48,7 +48,10 @@ def refuse_inactive(controller: str, accepts_goals: bool) -> None:
         GoalRejected: the controller is inactive.
     """
     if not accepts_goals:
-        hint = "activate it first: `switch_controllers` in a task, `manager.switch(activate=...)` in Python"
+        hint = (
+            "activate it first: `switch_controllers` in a task, `manager.switch(activate=...)` in Python, "
+            "or `/controller_manager/switch_controller` in a live session"
+        )
         raise GoalRejected("CTRL122", f"controller '{controller}' is not active and accepts no goals", hint=hint)
 
 

@@ -21,6 +21,7 @@ from tests.live.sessions import HOME, serving
 
 ARM = [f"joint_{k}" for k in range(1, 8)]
 FOLLOW = ("/arm_controller/follow_joint_trajectory", "control_msgs/action/FollowJointTrajectory")
+GRIP = "control_msgs/action/ParallelGripperCommand"
 TOPIC = ("/arm_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory")
 
 Run = Callable[..., tuple[int, str, str]]
@@ -83,6 +84,8 @@ def errors_of_names_and_messages(run: Run, url: str) -> None:
         (["topic", "echo", "/joint_states", "--once", "--field", "pose"], "USE161", "fields: header, name"),
         (["service", "call", "/controller_manager/list_controler"], "LIVE192", "list_controllers"),
         (["action", "send", *FOLLOW, goal(1, ["elbow", *ARM[1:]])], "LIVE191", "INVALID_JOINTS (-2)"),
+        (["topic", "pub", "--once", *TOPIC, "- {joint_names: []}"], "USE159", "the message is a list"),
+        (["service", "call", "/emergency_stop", "- {}"], "USE159", "the message is a list"),
         (["param", "set", "/arm_controller", "gains.joint_1.p", "[1]"], "LIVE191", "double"),
         (["param", "get", "/arm_controller", "no_such"], "LIVE192", "no parameter '/arm_controller:no_such'"),
     ):  # fmt: skip
@@ -101,6 +104,11 @@ def services_and_goals(run: Run, url: str) -> None:
     name = "/controller_manager/switch_controller"
     request = "{deactivate_controllers: [hand_controller], strictness: 2}"
     code, out, _ = run("service", "call", name, "controller_manager_msgs/srv/SwitchController", request, url=url)
+    assert (code, yaml.safe_load(out)) == (0, {"ok": True, "message": ""})
+    refused = run("action", "send", "/hand_controller/gripper_cmd", GRIP, "{command: {position: [0.1]}}", url=url)[2]
+    assert "'hand_controller' is not active and accepts no goals" in refused
+    assert name in refused
+    code, out, _ = run("service", "call", name, "{activate_controllers: [hand_controller], strictness: 2}", url=url)
     assert (code, yaml.safe_load(out)) == (0, {"ok": True, "message": ""})
     assert f"{FOLLOW[0]} [{FOLLOW[1]}]" in run("action", "list", "-t", url=url)[1]
     code, out, _ = run("action", "send", *FOLLOW, goal(1), "--feedback", url=url)
@@ -128,6 +136,11 @@ def parameters(run: Run, url: str) -> None:
     before = yaml.safe_load(run("param", "get", *words, url=url)[1])
     assert run("param", "set", *words, str(before + 1.0), url=url)[0] == 0
     assert yaml.safe_load(run("param", "get", ":".join(words), url=url)[1]) == before + 1.0
+    for value in ("-30", "-1.5e1"):
+        assert run("param", "set", "/arm_controller:gains.joint_1.u_clamp_min", value, url=url)[0] == 0
+        out = run("param", "get", "/arm_controller:gains.joint_1.u_clamp_min", url=url)[1]
+        assert yaml.safe_load(out) == float(value)
+    assert "--url" in run("param", "set", *words, "--ulr", url=url)[2]
     assert run("param", "get", "robot_description", url=url)[1].startswith("<?xml")
 
 

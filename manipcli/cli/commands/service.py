@@ -17,6 +17,7 @@ from manipcli.cli.remote_options import (
     patience,
     print_names,
     rooted,
+    value_of,
 )
 from manipcli.core.errors import ExitCode
 
@@ -45,9 +46,7 @@ def type_(name: Service, *, url: Url = LOCAL) -> ExitCode:
 
 def call(
     name: Service,
-    kind: Annotated[
-        str | None, typer.Argument(metavar="TYPE", help="Its type [default: asked from the server].")
-    ] = None,
+    kind: Annotated[str | None, typer.Argument(metavar="TYPE", help="Its type; may be left out.")] = None,
     request: Annotated[
         str | None, typer.Argument(metavar="REQUEST", help="Request as YAML; fields left out are 0 or empty.")
     ] = None,
@@ -56,6 +55,8 @@ def call(
     url: Url = LOCAL,
 ) -> ExitCode:
     """Call a service and print its response as YAML."""
+    if request is None and kind is not None and not isinstance(value_of(kind), str):
+        kind, request = None, kind
     name, values, wait = rooted(name), message_of(request), patience(timeout)
     with connected(url) as remote:
         from manipcli.live import remote_names
