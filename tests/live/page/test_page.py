@@ -120,8 +120,11 @@ def test_without_the_token_there_is_nothing_to_command_with(served: Served) -> N
             if "value" in one:
                 reader.set(uuid, value=0.1)
         reader.send(type="GuiFormDirtyMessage", uuid="x")
-        before = time.monotonic()
-        assert served.live(visitor, lambda: time.monotonic() - before > 0.5) == []
+        reader.socket.send("not of the protocol")
+        with pytest.raises(ConnectionClosed):  # all that was sent before it has been read
+            reader.until(lambda: False)
+        served.ticks += 100_000
+        assert served.live(visitor, lambda: f"t = {served.ticks // 1000}." in visitor.text) == []
 
 
 def test_who_may_enter(served: Served) -> None:
@@ -155,7 +158,9 @@ def test_messages_are_text_and_not_html(served: Served) -> None:
         assert "<script" not in reader.text
 
 
-def test_no_state_is_wanted_while_no_browser_is_connected(served: Served) -> None:
+def test_no_state_is_wanted_while_no_browser_is_connected(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    for interval in ("IDLE", "ASKING"):
+        monkeypatch.setattr(f"manipcli.live.page.page.{interval}", 0.005)
     with Visitor(served.page.port) as reader:
         served.live(reader, served.page.watches)
     end = time.monotonic() + 10.0
@@ -164,7 +169,7 @@ def test_no_state_is_wanted_while_no_browser_is_connected(served: Served) -> Non
         time.sleep(0.01)
     while not served.commands.empty():
         served.tick()
-    time.sleep(0.6)
+    time.sleep(0.05)  # ten passes of the page
     assert served.commands.empty(), "no questions either"
 
 
