@@ -13,6 +13,10 @@ CANCEL_GOAL: Final = "cancel_action_goal"
 CALL_SERVICE: Final = "call_service"
 END: Final = "end"
 
+STOP: Final = "/emergency_stop"
+RELEASE: Final = "/emergency_stop_release"
+"""Services that are never refused because others wait."""
+
 Values = dict[str, object]
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MAX_CLIENTS: Final = 32
 UNREAD: Final = 10.0
 """[s] A client that takes nothing for this time is disconnected."""
-TOLD: Final = 5.0
+REPORT_PERIOD: Final = 5.0
 """[s] Between two warnings that messages are dropped."""
 
 
@@ -113,7 +113,7 @@ class LiveServer:
         """Send what waits; disconnect a client that does not read."""
         from websockets.exceptions import ConnectionClosed
 
-        told = time.monotonic()
+        reported = time.monotonic()
         try:
             while True:
                 await client.outbox.ready.wait()
@@ -123,8 +123,8 @@ class LiveServer:
                 for text in client.outbox.take():
                     async with asyncio.timeout(self._unread):
                         await connection.send(text)
-                if time.monotonic() - told > TOLD:
-                    told = time.monotonic()
+                if time.monotonic() - reported > REPORT_PERIOD:
+                    reported = time.monotonic()
                     for line in client.report_drops():
                         self.publish(ROSOUT, line)
         except TimeoutError:

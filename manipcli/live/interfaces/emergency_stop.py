@@ -14,14 +14,12 @@ from typing import Any, Final
 from manipcli.control.controller import Controller
 from manipcli.control.roles import Hand, is_hand, takes_goals
 from manipcli.core.text import listed
-from manipcli.live.command import Command, Values
+from manipcli.live.command import RELEASE, STOP, Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.live_robot import LiveRobot
 from manipcli.record import schemas
 from manipcli.task.task import Task
 
-STOP: Final = "/emergency_stop"
-RELEASE: Final = "/emergency_stop_release"
 REASON: Final = "emergency stop"
 LOCKED: Final = f"the emergency stop is active; release it with the service {RELEASE}"
 
@@ -66,7 +64,7 @@ class _EmergencyStop:
             return {"success": False, "message": "there is no emergency stop to release"}
         manager.locked = ""
         for hand in self._hands:
-            _accept_goals(hand, yes=any(info.name == hand.name and info.state == "active" for info in manager.list()))
+            _accept_goals(hand, yes=manager.is_active(hand.name))
         switched = manager.switch(activate=self._stopped, strictness="best_effort", time=robot.time)
         text = "; ".join((f"emergency stop released: {listed(switched.activated)} activated", *switched.messages))
         robot.event("emergency_stop_released", text)
