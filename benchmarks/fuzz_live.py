@@ -1,7 +1,8 @@
 """Attacks on the server of a live session: `python -m benchmarks.fuzz_live [--frames N]`.
 
-A good client reads the joint states and sends one goal after the other, while others attack. Measured are the rate that
-it receives and the time of its goals, against those before the attack. In the end the log has no command but its goals.
+A good client in its own process reads the joint states and sends one goal after the other, while others attack.
+Measured are the rate that it receives and the time of its goals, and the processor time and memory of the network, in
+turn with those without an attack. In the end the log has no command but its goals.
 """
 
 from __future__ import annotations
@@ -10,74 +11,95 @@ import argparse
 import asyncio
 import contextlib
 import json
+import os
 import random
 import signal
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Awaitable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.extensions.permessage_deflate import ClientPerMessageDeflateFactory
 
-from benchmarks.live import Worker, worker
-from benchmarks.live_worker import HOME
-from benchmarks.malformed_frames import GOAL, malformed
+from benchmarks.good_client import TRAJECTORY_MESSAGE
+from benchmarks.live import ROOT, Worker, children, line, worker
+from benchmarks.malformed_frames import malformed
 from manipcli.live.source import recorded_commands
 
-BURST: Final = 950
-"""Frames of one connection: those at once before the limit of its rate."""
-JOINTS: Final = [f"joint_{k}" for k in range(1, 8)]
-POINT: Final = {"positions": [*HOME], "time_from_start": {"sec": 0, "nanosec": 500_000_000}}
-TRAJECTORY_MESSAGE: Final = {"joint_names": JOINTS, "points": [POINT]}
+ATTACKERS: Final = 8
+PARTS: Final = 3
+"""The malformed frames come in so many parts, with pauses in between."""
 
 
-class Good:
-    """The good client: times of its messages and its goals [s], and whatever else it is sent."""
+class Beside:
+    """The good client, and the process of the network."""
 
-    def __init__(self) -> None:
-        self.messages: list[float] = []
-        self.goals: list[float] = []
+    def __init__(self, own: Worker) -> None:
+        command = [sys.executable, "-m", "benchmarks.good_client", own.url]
+        self._own = own
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+        (self._network,) = [pid for pid in children(own.process.pid) if _serves(pid)]
         self.others: list[str] = []
 
-    async def work(self, url: str) -> None:
-        async with connect(url) as socket:
-            await socket.send(json.dumps({"op": "subscribe", "topic": "/joint_states"}))
-            sent = await self._goal(socket)
-            async for text in socket:
-                message = json.loads(text)
-                if message["op"] == "publish":
-                    self.messages.append(time.perf_counter())
-                elif message["op"] == "action_result" and message["status"] == 4:
-                    self.goals.append(time.perf_counter() - sent)
-                    sent = await self._goal(socket)
-                else:
-                    self.others.append(str(text)[:200])
+    def noticed(self) -> dict[str, Any]:
+        """By the good client, since the last call."""
+        assert self.process.stdin
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+        found: dict[str, Any] = json.loads(line(self.process))
+        self.others += [text for text in found["others"] if "dropped" not in text]
+        return found
 
-    async def _goal(self, socket: ClientConnection) -> float:
-        goal = {"op": "send_action_goal", "action": GOAL, "id": f"g{len(self.goals)}"}
-        await socket.send(json.dumps({**goal, "args": {"trajectory": TRAJECTORY_MESSAGE}}))
-        return time.perf_counter()
+    def used(self) -> float:
+        """Processor time of the network [s]."""
+        words = Path(f"/proc/{self._network}/stat").read_text().rpartition(")")[2].split()
+        return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+    def memory(self) -> int:
+        """Resident memory of the network [MiB]."""
+        return int(Path(f"/proc/{self._network}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") >> 20
 
     async def during(self, name: str, attack: Awaitable[object]) -> None:
         """Print what it notices of an attack."""
-        self.messages.clear()
-        self.goals.clear()
-        began = time.perf_counter()
+        self.noticed()
+        began, used = time.perf_counter(), self.used()
+        attacking = time.process_time()
+        ticks = self._own.numbers[0]
         found = await attack
         seconds = time.perf_counter() - began
-        gap = max((b - a for a, b in zip(self.messages, self.messages[1:], strict=False)), default=0.0)
-        goals = f"{statistics.median(self.goals):.2f} s" if self.goals else "-"
-        rate = len(self.messages) / seconds
-        print(f"{name}: {seconds:.1f} s, {rate:.0f} Hz, longest gap {gap:.2f} s, goals {goals}; {found}", flush=True)
+        speed = 0.001 * (self._own.numbers[0] - ticks) / seconds
+        seen = await asyncio.to_thread(self.noticed)
+        goals = f"{statistics.median(seen['goals']):.2f} s" if seen["goals"] else "-"
+        rate = seen["messages"] / seconds
+        rates = f"{rate:.0f} Hz ({rate / speed:.0f} per simulated second)"
+        good = f"{rates}, longest gap {seen['gap']:.2f} s, goals {goals}"
+        network = f"network {100 * (self.used() - used) / seconds:.0f} % of a core, {self.memory()} MiB"
+        own = f"speed {speed:.2f}, attackers {100 * (time.process_time() - attacking) / seconds:.0f} %"
+        print(f"{name}: {seconds:.1f} s, {good}; {network}; {own}; {found}", flush=True)
 
 
-async def fuzz(url: str, frames: int) -> str:
-    """Malformed frames from several connections at once."""
+def _serves(pid: int) -> bool:
+    return b"manipcli.live.network" in Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+async def busy(seconds: float = 5.0) -> str:
+    """Frames are made and sent to nobody: what the load of the machine alone costs."""
+    draw, began = random.Random(0), time.perf_counter()
+    while time.perf_counter() - began < seconds:
+        malformed(draw, TRAJECTORY_MESSAGE)
+        await asyncio.sleep(0)
+    return ""
+
+
+async def fuzz(url: str, frames: int, first: int) -> str:
+    """Malformed frames of as many connections as there are `ATTACKERS`, with seeds from `first` on."""
     codes: Counter[object] = Counter()
     sent = 0
 
@@ -86,27 +108,58 @@ async def fuzz(url: str, frames: int) -> str:
             async for text in socket:
                 codes[json.loads(text).get("op")] += 1
                 assert "Traceback" not in str(text)
-        codes[f"closed {socket.close_code}"] += 1
+        codes[f"closed {socket.close_code} {(socket.close_reason or '').partition(';')[0]}"] += 1
 
     async def one(seed: int) -> None:
         nonlocal sent
-        draw = random.Random(seed)
-        left = min(BURST, frames - BURST * seed)
+        draw = random.Random(first + seed)
+        left = frames // ATTACKERS
         while left > 0:
-            async with connect(url, max_size=None) as socket:
+            async with connect(url, max_size=None, ping_interval=None, close_timeout=120.0) as socket:
                 reading = asyncio.create_task(read(socket))
                 with contextlib.suppress(ConnectionClosed, AttributeError):  # of a transport that is closed
                     while left > 0:
                         left -= 1
                         await socket.send(malformed(draw, TRAJECTORY_MESSAGE))
                         sent += 1
-                        await asyncio.sleep(0)  # the good client is in this process, too
+                        await asyncio.sleep(0)
             await reading
 
-    seeds = [*range(-(-frames // BURST))]
-    for k in range(0, len(seeds), 8):
-        await asyncio.gather(*(one(seed) for seed in seeds[k : k + 8]))
+    await asyncio.gather(*(one(seed) for seed in range(ATTACKERS)))
     return f"{sent} frames sent; answers: {dict(codes.most_common())}"
+
+
+async def raw(url: str, frame: bytes, count: int = 100_000) -> str:
+    """The same frame in large writes, from four connections at once."""
+
+    async def one() -> str:
+        sent = 0
+        async with connect(url, compression=None, ping_interval=None, max_queue=None) as socket:
+            answer = asyncio.create_task(socket.recv())
+            with contextlib.suppress(ConnectionClosed):
+                while sent < count and not socket.transport.is_closing():
+                    socket.transport.write(frame * 1000)  # the mask is 0
+                    sent += 1000
+                    while socket.transport.get_write_buffer_size() and not socket.transport.is_closing():
+                        await asyncio.sleep(0.001)
+                await socket.send("")
+            with contextlib.suppress(ConnectionClosed, TimeoutError):
+                await answer
+                async with asyncio.timeout(5.0):
+                    await socket.wait_closed()
+        return f"{sent} sent, closed {socket.close_code} {(socket.close_reason or '').partition(';')[0]}"
+
+    return str(dict(Counter(await asyncio.gather(*(one() for _ in range(4))))))
+
+
+def tiny(url: str) -> Awaitable[str]:
+    """Empty text frames."""
+    return raw(url, bytes([0x81, 0x80, 0, 0, 0, 0]))
+
+
+def pings(url: str) -> Awaitable[str]:
+    """Empty pings, each of which is answered by the library."""
+    return raw(url, bytes([0x89, 0x80, 0, 0, 0, 0]))
 
 
 async def half_open(port: int, count: int = 300) -> str:
@@ -121,13 +174,18 @@ async def half_open(port: int, count: int = 300) -> str:
 
 async def large(url: str) -> str:
     """Frames of 1 MiB, and one that is larger."""
-    async with connect(url, max_size=None, compression=None) as socket:
-        for _ in range(50):
-            await socket.send("[" + "1," * ((1 << 19) - 2) + "1]")
-            await asyncio.sleep(0)
-        await socket.send(" " * (2 << 20))
-        await socket.wait_closed()
-        return f"50 frames of 1 MiB; one of 2 MiB: close code {socket.close_code}"
+    sent, answers = 0, 0
+    async with connect(url, compression=None) as socket:
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await socket.send("[" + "1," * ((1 << 19) - 2) + "1]")
+                sent += 1
+                answers += "msg" in str(await socket.recv())
+    async with connect(url, compression=None) as other:
+        with contextlib.suppress(ConnectionClosed):
+            await other.send(" " * (2 << 20))
+            await other.wait_closed()
+    return f"{answers} frames of 1 MiB were refused, then: {socket.close_code}; one of 2 MiB: {other.close_code}"
 
 
 async def bomb(url: str) -> str:
@@ -183,22 +241,27 @@ async def deaf(url: str) -> str:
     return f"disconnected after {time.perf_counter() - began:.0f} s"
 
 
-async def attacks(url: str, frames: int) -> None:
+async def attacks(own: Worker, frames: int) -> None:
     """All of them."""
+    url, beside = own.url, Beside(own)
     port = int(url.partition("?")[0].rstrip("/").rpartition(":")[2])
-    good = Good()
-    working = asyncio.create_task(good.work(url))
-    await asyncio.sleep(1.0)
-    await good.during("nothing", asyncio.sleep(5.0))
-    for name, attack in (
-        (f"{frames} malformed frames", fuzz(url, frames)), ("large frames", large(url)), ("compression", bomb(url)),
-        ("60 clients", crowd(url)), ("strangers", strangers(url)), ("half-open", half_open(port)), ("deaf", deaf(url)),
-    ):  # fmt: skip
-        await good.during(name, attack)
-    await good.during("nothing", asyncio.sleep(5.0))
-    working.cancel()
-    others = [text for text in good.others if "dropped" not in text]
-    print(f"the good client was told nothing else: {not others} {others[:3]}")
+    try:
+        await asyncio.sleep(2.0)
+        part = -(-frames // PARTS)
+        for k in range(PARTS):
+            await beside.during("nothing", asyncio.sleep(5.0))
+            await beside.during("a busy process", busy())
+            await beside.during(f"{part} malformed frames", fuzz(url, part, 1000 * k))
+        for name, attack in (
+            ("tiny frames", tiny(url)), ("pings", pings(url)), ("large frames", large(url)), ("compression", bomb(url)),
+            ("60 clients", crowd(url)), ("strangers", strangers(url)), ("half-open", half_open(port)),
+            ("deaf", deaf(url)), ("nothing", asyncio.sleep(5.0)),
+        ):  # fmt: skip
+            await beside.during(name, attack)
+        print(f"the good client was told nothing else: {not beside.others} {beside.others[:3]}")
+    finally:
+        beside.process.kill()
+        beside.process.wait()
 
 
 def recorded(own: Worker, log: Path) -> str:
@@ -219,7 +282,7 @@ def main() -> None:
         tempfile.TemporaryDirectory(prefix="manipcli-benchmark-") as name,
         worker(Path(name) / "serve", "serve", "1") as own,
     ):
-        asyncio.run(attacks(own.url, options.frames))
+        asyncio.run(attacks(own, options.frames))
         print(f"commands in the log: {recorded(own, Path(name) / 'serve' / 'serve.mcap')}")
 
 

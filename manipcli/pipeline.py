@@ -273,8 +273,9 @@ def serve_task(
     Args:
         path: the task file.
         live: how it is served.
-        log: path of the log; default `runs/<task>@live.mcap`, which is replaced. The next ones end with -2, -3, ...
-        force: replace `log` if it exists.
+        log: path of the log; default `runs/<task>@live.mcap`. The next ones, and those after an existing one, end with -2,
+            -3, ...
+        force: replace logs that exist.
         embed_meshes: see `run_task`.
         progress: receives warnings and steps.
         between: called before each tick; a KeyboardInterrupt ends the session.
@@ -294,15 +295,12 @@ def serve_task(
     (plan, warnings), planning = timed(_plan, task, progress, None)
     if isinstance(plan, Verdict):
         return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings), ""
-    overwrite = force or log is None
-    logs = session_logs(log if log is not None else default_log(task), overwrite=overwrite)
+    logs = session_logs(log if log is not None else default_log(task), overwrite=force, named=log is not None)
     manager, late = build_manager(task, plan.planner.kinematics), partial(progress.message, detail=False)
     with served(task, manager, live, between=between, announce=announce, late=late) as outside:
         while True:
             where = next(logs)
-            verdict, timing = _record(
-                task, plan, where, progress, outside, overwrite=overwrite, embed_meshes=embed_meshes
-            )
+            verdict, timing = _record(task, plan, where, progress, outside, overwrite=force, embed_meshes=embed_meshes)
             timing = replace(timing, load=loading, plan=planning + timing.plan)
             report = RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
             if not outside.again():

@@ -10,8 +10,9 @@ from __future__ import annotations
 import hmac
 import secrets
 from dataclasses import dataclass
+from ipaddress import ip_address
 from typing import Final
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
 from manipcli.replay.page_server import HOST, is_meant_for
 
@@ -44,6 +45,17 @@ class Access:
         """Whether only this machine can connect."""
         return self.host == HOST
 
+    @property
+    def address(self) -> str:
+        """The host in a URL for clients; of a server that listens on all addresses, that of this machine."""
+        try:
+            host = ip_address(self.host)
+        except ValueError:  # a name
+            return self.host
+        if host.version == 4:
+            return HOST if host.is_unspecified else self.host
+        return "[::1]" if host.is_unspecified else f"[{self.host}]"
+
     def decide(
         self, path: str, *, port: int, host: str | None, origin: str | None, authorization: str | None
     ) -> Decision:
@@ -63,6 +75,11 @@ class Access:
         if not is_meant_for(host, None if known else origin, port):
             return Decision(refused=(403, "only programs and pages of this machine have access"))
         return Decision(commands=known or self.token is None)
+
+
+def query(token: str | None) -> str:
+    """The path and query of a URL that carries a token; "" without one."""
+    return "" if token is None else f"/?token={quote(token, safe='')}"
 
 
 def random_token() -> str:

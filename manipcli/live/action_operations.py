@@ -45,6 +45,7 @@ class ActionOperations:
             raise Refused(f"goal '{id_[:60]}' is still active; each goal needs its own id")
         if len(self._goals) >= MAX_GOALS:
             raise Refused(f"more than {MAX_GOALS} goals are active")
+        self._connection.check_right(name)  # before the long check of the message
         message = arguments(definition(goal_type(kind)), frame.get("args", {}))
         self._sent += 1
         own = f"{self._connection.number}.{self._sent}"

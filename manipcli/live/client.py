@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from manipcli.core.text import did_you_mean
 from manipcli.live.action_operations import ActionOperations
-from manipcli.live.budget import RATE, Budget
+from manipcli.live.budget import OPERATION, RATE, REFUSED_BURST, REFUSED_RATE, Budget
 from manipcli.live.command import Answer
 from manipcli.live.connection import LEVELS, Connection, Services
 from manipcli.live.drops import report_drops
@@ -36,14 +36,18 @@ class Client:
         number: of the connection in the session.
         commands: whether it may command.
         services: see there.
+
+    Attributes:
+        offence: why the connection is to be closed; "" if it is not.
     """
 
     def __init__(self, number: int, *, commands: bool, services: Services) -> None:
         self._connection = Connection(number, commands=commands, services=services)
         topics = TopicOperations(self._connection)
         self._services, self._actions = ServiceOperations(self._connection), ActionOperations(self._connection)
-        self._budget = Budget()
+        self._budget, self._refusals = Budget(), Budget(REFUSED_RATE, REFUSED_BURST)
         self._warned = 0.0
+        self.offence = ""
         self._operations: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "advertise": topics.advertise,
             "unadvertise": topics.unadvertise,
@@ -57,10 +61,14 @@ class Client:
         }
         self.outbox, self.status = self._connection.outbox, self._connection.status
 
-    def receive(self, text: str | bytes) -> None:
-        """Carry out one frame; whatever is wrong with it is a status message, or the answer that the client expects."""
+    def receive(self, text: str | bytes) -> bool:
+        """Carry out one frame; whatever is wrong with it is a status message, or the answer that the client expects.
+
+        Returns:
+            Whether it was carried out and is short; the client has to wait after another one.
+        """
         if not self._within_rate(len(text)):
-            return
+            return False
         frame: dict[str, Any] = {}
         try:
             frame = read_frame(text)
@@ -71,10 +79,13 @@ class Client:
                 raise Refused(f"unknown op '{op[:60]}'; {did_you_mean(op[:60], self._operations, kind='ops')}")
             self._operations[op](frame)
         except (BadFrame, BadMessage, Refused) as error:
-            self._refuse(frame, str(error))
+            self._refuse(frame, str(error), len(text))
+            return False
+        return len(text) < OPERATION
 
-    def _refuse(self, frame: Mapping[str, Any], text: str) -> None:
+    def _refuse(self, frame: Mapping[str, Any], text: str, size: int) -> None:
         """An operation that waits for a response gets one; others get a status."""
+        self._count_refusal(text, size)
         op = frame.get("op")
         if op == "call_service" and isinstance(frame.get("service"), str):
             self._services.respond(frame, Answer(False, {}, text=text))
@@ -91,10 +102,16 @@ class Client:
         now = time.monotonic()
         if self._budget.spend(now, size):
             return True
+        why = f"more than {RATE:g} operations per second; the others are dropped"
         if now - self._warned > 1.0:
             self._warned = now
-            self.status("error", f"more than {RATE:g} operations per second; the others are dropped")
+            self.status("error", why)
+        self._count_refusal(why, 0)
         return False
+
+    def _count_refusal(self, why: str, size: int) -> None:
+        if not self._refusals.spend(time.monotonic(), size):
+            self.offence = f"too many refused operations; the last: {why}"
 
     def _set_level(self, frame: Mapping[str, Any]) -> None:
         level = text_of(frame, "level")

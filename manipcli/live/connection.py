@@ -16,6 +16,8 @@ from manipcli.record.json_message import compact
 
 LEVELS: Final = ("none", "error", "warning", "info")
 """Of status messages; a client gets those up to its level."""
+MAX_STATUS: Final = 1000
+"""Longest text of a status [characters]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,15 @@ class Connection:
     def status(self, level: str, text: str, id_: object = None) -> None:
         """Send a status message, if the client wants this level."""
         if LEVELS.index(level) <= LEVELS.index(self.level):
-            self.answer({"op": "status", "level": level, "msg": text}, id_)
+            self.answer({"op": "status", "level": level, "msg": text[:MAX_STATUS]}, id_)
+
+    def check_right(self, name: str) -> None:
+        """
+        Raises:
+            Refused: the client may only read.
+        """
+        if not self._commands and name not in self.offer.readers:
+            raise Refused("this connection may only read: connect with the token that `manipcli serve` printed")
 
     def command(self, op: str, name: str, id_: str, message: object, answer: Callable[[Answer], None]) -> None:
         """Hand a command to the control loop.
@@ -84,8 +94,7 @@ class Connection:
         Raises:
             Refused: the client may only read, or too many commands wait.
         """
-        if not self._commands and name not in self.offer.readers:
-            raise Refused("this connection may only read: connect with the token that `manipcli serve` printed")
+        self.check_right(name)
 
         def back(found: Answer) -> None:
             self.services.in_network(lambda: answer(found))

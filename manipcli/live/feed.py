@@ -11,7 +11,11 @@ from typing import Final
 
 from manipcli.control.controller import ControllerOutput
 from manipcli.live.link import TICK, WANTED, Link
+from manipcli.live.offer import RESET, SESSION_ENDED
 from manipcli.model.state import Contact, WorldState
+from manipcli.record.channels import EVENTS, ROSOUT
+from manipcli.record.messages import event_message, log_message
+from manipcli.record.recording import TaskEvent
 from manipcli.simulate.session import Observer
 
 SAMPLE_PERIOD: Final = 0.01
@@ -54,6 +58,13 @@ class Feed:
         self.observer, self._numbers[TICK] = None, 0
         for topic, data in self._again:
             self.message(topic, 0, data)
+
+    def over(self, time: float, *, resets: bool) -> None:
+        """Report that the session ended at a simulated time [s]; its log is closed and judged, which can take long."""
+        event = TaskEvent(time, RESET if resets else SESSION_ENDED, "", "", "", "", "")
+        ns = round(time * 1e9)
+        self.message(EVENTS, ns, event_message(ns, event))
+        self.message(ROSOUT, ns, log_message(ns, event))
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         if self.observer is not None:

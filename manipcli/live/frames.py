@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import re
 from typing import Any, Final
 
 MAX_FRAME: Final = 1 << 20
 """Largest frame [byte]; a larger one closes the connection."""
 MAX_DEPTH: Final = 32
 """Deepest nesting of a frame."""
-_BRACKETS = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}]', re.DOTALL)
-"""A text, or a bracket; an open text ends with the frame, so that the search is linear."""
+_SQUARE = bytes.maketrans(b"{}", b"[]")
+_OTHERS = bytes(set(range(256)) - set(b"[]{}"))
 
 
 class BadFrame(ValueError):
@@ -47,10 +46,8 @@ def _too_deep(text: str) -> bool:
     """Whether brackets outside of texts are nested deeper than the limit."""
     if text.count("[") + text.count("{") <= MAX_DEPTH:
         return False
-    depth = 0
-    for found in _BRACKETS.finditer(text):
-        first = text[found.start()]
-        depth += 1 if first in "[{" else -1 if first in "]}" else 0
-        if depth > MAX_DEPTH:
-            return True
-    return False
+    outside = "".join(text.replace("\\\\", "").replace('\\"', "").split('"')[::2])
+    left = outside.encode("ascii", "ignore").translate(_SQUARE, _OTHERS)
+    for _ in range(MAX_DEPTH):  # each removes the innermost level
+        left = left.replace(b"[]", b"")
+    return b"[]" in left or left.count(b"[") > MAX_DEPTH

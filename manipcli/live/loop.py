@@ -158,6 +158,7 @@ def simulate_live(
                 steps.abandon(why)
                 obedience.after_tick()
                 obedience.abort(why)
+                outside.feed.over(session.time, resets=outside.reset is not None)
             finally:
                 replanning = steps.planning.seconds
                 record_saturations(session, recorder)

@@ -11,10 +11,12 @@ import contextlib
 import json
 import pickle
 import socket
+import sys
 from collections import deque
-from collections.abc import Callable, Sequence
-from contextlib import AsyncExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AsyncExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from manipcli.core.errors import InvalidInput
@@ -49,6 +51,7 @@ class Setup:
     access: Access
     port: int
     outlets: Sequence[OutletOptions] = ()
+    title: str = ""
 
 
 class _Stream(asyncio.Protocol):
@@ -71,7 +74,8 @@ class _Stream(asyncio.Protocol):
             elif kind == EVENT:
                 self.events.append(Event(*values))
             elif kind == ANSWER:
-                self.answered(*values)
+                with reported("an answer was lost"):
+                    self.answered(*values)
             else:
                 self.over.set()
         self.something.set()
@@ -80,8 +84,18 @@ class _Stream(asyncio.Protocol):
         self.over.set()
 
 
+@contextmanager
+def reported(consequence: str, drop: Callable[[], object] = lambda: None) -> Iterator[None]:
+    """Report an exception in one line on stderr instead of ending the session; `drop` is called then."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001 (of whatever an outlet is made of)
+        sys.stderr.write(f"manipcli: {consequence}: {type(error).__name__}: {str(error)[:200]}\n")
+        drop()
+
+
 class Hub:
-    """Hands samples and events to the server and the outlets."""
+    """Hands samples and events to the server and the outlets; an outlet that raises is dropped."""
 
     def __init__(self, publisher: Publisher, stream: _Stream, numbers: memoryview) -> None:
         self._publisher, self._stream, self._numbers = publisher, stream, numbers
@@ -97,10 +111,14 @@ class Hub:
     def subscribed(self) -> None:
         """Somebody subscribes to more or less than before."""
         self._wanted = set() if self.server is None else self.server.wanted()
-        for outlet in self.outlets:
+        watches: list[bool] = []
+
+        def ask(outlet: Outlet) -> None:
             self._wanted.update(outlet.wanted())
-        watched = any(outlet.watches() for outlet in self.outlets)
-        self._numbers[WANTED] = watched or any(is_sampled(topic, self._publisher.offer) for topic in self._wanted)
+            watches.append(outlet.watches())
+
+        self._for_outlets(ask)
+        self._numbers[WANTED] = any(watches) or any(is_sampled(topic, self._publisher.offer) for topic in self._wanted)
 
     async def run(self) -> None:
         """Make each message once, for all who take it."""
@@ -123,9 +141,12 @@ class Hub:
             if latched:
                 self._texts[topic] = text
             self.server.publish(topic, text)
-        for outlet in self.outlets:
+
+        def hand(outlet: Outlet) -> None:
             if latched or topic in outlet.wanted():
                 outlet.message(topic, event.ns, event.data)
+
+        self._for_outlets(hand)
 
     def _sample(self, sample: Sample) -> None:
         found = self._publisher.sample(sample, self._wanted)
@@ -134,11 +155,26 @@ class Hub:
             for topic in found.keys() & due:
                 self.server.publish(topic, self._publisher.text(topic, found[topic]))
         ns = self._publisher.ns(sample.tick)
-        for outlet in self.outlets:
+
+        def hand(outlet: Outlet) -> None:
             for topic in found.keys() & outlet.wanted():
                 outlet.message(topic, ns, found[topic])
             if outlet.watches():
                 outlet.state(sample.tick, self._publisher.state)
+
+        self._for_outlets(hand)
+
+    def _for_outlets(self, call: Callable[[Outlet], None]) -> None:
+        for outlet in [*self.outlets]:
+            with reported(f"{outlet.notice or 'an outlet'} is closed", partial(self.drop, outlet)):
+                call(outlet)
+
+    def drop(self, outlet: Outlet) -> None:
+        """Close an outlet, unless it is closed already."""
+        if outlet in self.outlets:
+            self.outlets.remove(outlet)
+            with reported("an outlet was not closed properly"):
+                outlet.close()
 
 
 def main(socket_descriptor: int, numbers_descriptor: int) -> None:
@@ -173,14 +209,14 @@ async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
 
     rosapi = Rosapi(setup.offer, lambda: publisher.clock(numbers[TICK]))
     services = Services(setup.offer, hub.latched, rosapi, pending.put, soon, hub.subscribed)
-    network = Network(publisher, put, lambda: soon(hub.subscribed))
+    network = Network(publisher, put, lambda: soon(hub.subscribed), setup.title)
     server = LiveServer(services, setup.access)
     async with AsyncExitStack() as stack:
         try:
             port = await stack.enter_async_context(server.listening(setup.port))
             for options in setup.outlets:
                 hub.outlets.append(options.open(network))
-                stack.callback(hub.outlets[-1].close)
+                stack.callback(hub.drop, hub.outlets[-1])
         except InvalidInput as error:
             _report(transport, {"findings": [[each.code, each.message, each.hint] for each in error.findings]})
             return

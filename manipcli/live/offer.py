@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 CLOCK: Final = "/clock"
+RESET, SESSION_ENDED = "simulation_reset", "session_ended"
+"""Kinds of events on `/task/events` at the end of a session; its log, which ends, does not have them."""
 
 
 @dataclass(frozen=True, slots=True)

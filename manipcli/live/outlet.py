@@ -20,11 +20,13 @@ class Network:
         put: hands a command to the control loop, from any thread; False if too many wait. `Command.answer` is called
             in the thread of the network.
         changed: to be called, from any thread, when what the outlet wants has changed.
+        title: of the session, for windows.
     """
 
     publisher: Publisher
     put: Callable[[Command], bool]
     changed: Callable[[], None]
+    title: str = ""
 
 
 class Outlet(Protocol):

@@ -55,8 +55,8 @@ class RemoteGoal:
                 if message.get("result") is False:
                     raise RemoteFailed("LIVE191", f"{self._action}: goal refused: {values}")
                 status = message.get("status")
-                known = status in [*GoalStatus] if isinstance(status, int) else False
-                yield GoalResult(GoalStatus(status if known else 0).name, values if isinstance(values, dict) else {})
+                word = next((each.name for each in GoalStatus if each == status), GoalStatus.UNKNOWN.name)
+                yield GoalResult(word, values if isinstance(values, dict) else {})
                 return
         raise RemoteFailed("LIVE193", f"{self._action}: no result within {patience:g} s", hint="wait longer: --timeout")
 

@@ -7,11 +7,12 @@ import errno
 import logging
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import TYPE_CHECKING, Any, Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.live.access import Access
+from manipcli.live.budget import Share
 from manipcli.live.client import Client
 from manipcli.live.connection import Services
 from manipcli.live.frames import MAX_FRAME
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 MAX_CLIENTS: Final = 32
 UNREAD: Final = 10.0
 """[s] A client that takes nothing for this time is disconnected."""
+READ: Final = 4096
+"""[byte] Read from one client at once: small frames and pings of more would keep the others waiting."""
+MAX_REASON: Final = 120
+"""Longest reason of a close [byte]; 123 in the protocol."""
 REPORT_PERIOD: Final = 5.0
 """[s] Between two warnings that messages are dropped."""
 
@@ -41,6 +46,7 @@ class LiveServer:
         self._services, self._access, self._unread = services, access, unread
         self._clients: dict[int, Client] = {}
         self._numbers = 0
+        self._turn, self._share = asyncio.Lock(), Share()
 
     @asynccontextmanager
     async def listening(self, port: int) -> AsyncIterator[int]:
@@ -51,6 +57,8 @@ class LiveServer:
         """
         try:
             from websockets.asyncio.server import serve
+
+            from manipcli.live.opening import Opening
         except ImportError as error:
             message = "serve needs the library websockets, which is not installed"
             raise InvalidInput([Diagnostic("USE132", message, hint='pip install "manipcli[live]"')]) from error
@@ -62,6 +70,8 @@ class LiveServer:
             server = await serve(
                 self._serve, self._access.host, port, process_request=self._checked, max_size=MAX_FRAME, max_queue=16,
                 compression=None, open_timeout=10.0, close_timeout=1.0, server_header=None, logger=quiet,
+                ping_timeout=None,  # the answer of a client that has to wait comes late; see `unread`
+                create_connection=Opening,
             )  # fmt: skip
         except OSError as error:
             raise _unusable(self._access.host, port, error) from error
@@ -98,16 +108,35 @@ class LiveServer:
         may: bool = connection.commands  # type: ignore[attr-defined]
         client = self._clients[number] = Client(number, commands=may, services=self._services)
         sending = asyncio.create_task(self._send(connection, client))
+        connection.transport.max_size = READ  # type: ignore[attr-defined]  # of asyncio's transports of sockets
         try:
             async for frame in connection:
-                client.receive(frame)
-                await asyncio.sleep(0)  # one frame of each client in turn
+                used = await self._receive(client, frame)
+                if client.offence:
+                    await connection.close(1008, client.offence.encode()[:MAX_REASON].decode(errors="ignore"))
+                elif used:
+                    with suppress(TimeoutError):
+                        async with asyncio.timeout(self._share.wait(time.monotonic(), used)):
+                            await connection.wait_closed()
         except ConnectionClosed:
             pass
         finally:
             sending.cancel()
             del self._clients[number]
             self._services.subscribed()
+
+    async def _receive(self, client: Client, frame: str | bytes) -> float:
+        """One frame of one client in a turn of the event loop, so that samples are sent before the next frame.
+
+        Returns:
+            Processor time [s] for which the client has to wait; 0: it has not.
+        """
+        async with self._turn:
+            began = time.thread_time()
+            waits = not client.receive(frame)
+            used = time.thread_time() - began
+            await asyncio.sleep(0)
+        return used if waits else 0.0
 
     async def _send(self, connection: ServerConnection, client: Client) -> None:
         """Send what waits; disconnect a client that does not read."""

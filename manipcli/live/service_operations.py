@@ -35,6 +35,7 @@ class ServiceOperations:
             return
         if self._calls >= MAX_CALLS:
             raise Refused(f"more than {MAX_CALLS} services wait for a response")
+        self._connection.check_right(name)  # before the long check of the message
         message = arguments(definition(request_type(kind)), frame.get("args", {}))
 
         def answered(answer: Answer) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from manipcli.control.manager import ControllerManager
 from manipcli.judge.steps import RunStatus
-from manipcli.live.access import Access
+from manipcli.live.access import Access, query
 from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
@@ -53,8 +53,7 @@ class LiveOptions:
 
     def url(self, port: int) -> str:
         """The address for clients, with the token."""
-        token = f"/?token={self.access.token}" if self.access.token is not None else ""
-        return f"ws://{self.access.host}:{port}{token}"
+        return f"ws://{self.access.address}:{port}{query(self.access.token)}"
 
 
 @contextmanager
@@ -87,7 +86,8 @@ def served(
     robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
     offer = offer_of(endpoints_of(task, manager.controllers), channels)
-    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets)
+    title = " · ".join(dict.fromkeys((task.spec.task, robot.name)))
+    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets, title)
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with NetworkProcess(setup) as network:
         least = FAST_PERIOD if options.speed is None else 0.0
@@ -116,15 +116,16 @@ def served(
         yield outside
 
 
-def session_logs(first: Path, *, overwrite: bool) -> Iterator[Path]:
+def session_logs(first: Path, *, overwrite: bool, named: bool) -> Iterator[Path]:
     """The log of each session between resets: `runs/pour@live.mcap`, `runs/pour@live-2.mcap`, ...
 
-    Unless they may be replaced, numbers whose log exists are left out; the first log is refused when it is opened.
+    A session cannot be repeated by hand: unless logs may be replaced, numbers whose log exists or is being written are
+    left out. If the first log is `named` by the user, it is refused when it is opened.
     """
-    yield first
-    for number in count(2):
-        path = first.with_name(f"{first.stem}-{number}{first.suffix}")
-        if overwrite or not path.exists():
+    for number in count(1):
+        path = first if number == 1 else first.with_name(f"{first.stem}-{number}{first.suffix}")
+        taken = path.exists() or path.with_name(f"{path.name}.partial").exists()
+        if overwrite or not taken or (named and number == 1):
             yield path
 
 

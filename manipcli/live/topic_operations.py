@@ -57,7 +57,9 @@ class TopicOperations:
     def publish(self, frame: Mapping[str, Any]) -> None:
         """Check a message and hand it to the control loop."""
         topic = topic_of(frame)
-        message = from_json(definition(self._input(topic)), frame.get("msg", {}))
+        kind = self._input(topic)
+        self._connection.check_right(topic)  # before the long check of the message
+        message = from_json(definition(kind), frame.get("msg", {}))
 
         def refused(answer: Answer) -> None:
             if not answer.ok:

@@ -51,13 +51,16 @@ class Runner:
         return [f"--package-path={path}" for path in self.packages]
 
     async def start(self, words: Sequence[str]) -> asyncio.subprocess.Process:
-        """Start `manipcli WORDS`; stderr is part of its stdout."""
+        """Start `manipcli WORDS`; stderr is part of its stdout.
+
+        Its stdin stays open as long as this process lives: when it is closed, the command ends.
+        """
         root, packages = str(self.folder.root), [str(path) for path in self.packages]
         return await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "manipcli.mcp_server.confined", root, *packages, "--", *words),
             cwd=root,
             env={**os.environ, **self.environment},
-            stdin=asyncio.subprocess.DEVNULL,
+            stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,
             start_new_session=True,

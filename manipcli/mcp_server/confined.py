@@ -3,6 +3,8 @@
 A task names other files (robot, controllers, includes, meshes). An audit hook of Python refuses to open those outside
 of the folder, the folders of packages and Python's own, and to write anywhere but in `runs`, temporary files and the
 cache. It guards what files can name; it is no sandbox for foreign code, which tasks cannot contain.
+
+stdin is a pipe that the server holds open. When the server has ended, however it ended, the command is interrupted.
 """
 
 from __future__ import annotations
@@ -10,13 +12,19 @@ from __future__ import annotations
 import errno
 import os
 import runpy
+import signal
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+LAST: Final = 30.0
+"""[s] Longest end of a command whose server has ended; its log is finished and judged. Then it is killed."""
 _WRITES: Final = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _CHANGES: Final = {
     **dict.fromkeys(("os.mkdir", "os.rmdir", "os.remove", "os.chmod", "os.chown", "os.truncate"), 1),
@@ -28,6 +36,7 @@ _SYSTEM: Final = ("/usr", "/lib", "/lib64", "/opt", "/proc", "/sys", "/dev", "/e
 
 def main(words: Sequence[str]) -> None:
     """Run manipcli with the words after `--`."""
+    _watch_server()
     end = words.index("--")
     folder, *packages = words[:end]
     cache = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
@@ -37,6 +46,24 @@ def main(words: Sequence[str]) -> None:
     sys.addaudithook(_hook([*written, *python, *named], written))
     sys.argv = ["manipcli", *words[end + 1 :]]
     runpy.run_module("manipcli", run_name="__main__", alter_sys=True)
+
+
+def _watch_server() -> None:
+    """Watch stdin in a thread; for the command it is empty."""
+    pipe = os.dup(0)
+    with open(os.devnull, "rb") as empty:
+        os.dup2(empty.fileno(), 0)
+    threading.Thread(target=_end_with, args=(pipe,), name="server", daemon=True).start()
+
+
+def _end_with(pipe: int) -> None:
+    """Interrupt this process when a pipe is closed, and kill it with those it started if it does not end."""
+    while os.read(pipe, 1):
+        pass
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(LAST)
+    with suppress(ProcessLookupError):
+        os.killpg(os.getpid(), signal.SIGKILL)
 
 
 def _hook(read: Sequence[Path], written: Sequence[Path]) -> Callable[[str, tuple[Any, ...]], None]:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import functools
 import logging
+import os
+import shutil
+import signal
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.version import __version__
 from manipcli.mcp_server.child import Runner
 from manipcli.mcp_server.live_tools import LiveTools
@@ -25,7 +28,7 @@ INSTRUCTIONS: Final = (
 
 
 def serve(runner: Runner) -> None:
-    """Serve until the client closes stdin.
+    """Serve until the client closes stdin; a signal ends the process.
 
     Raises:
         InvalidInput: USE151 the library is not installed.
@@ -33,19 +36,28 @@ def serve(runner: Runner) -> None:
     library = _library()
     logging.getLogger("mcp").setLevel(logging.CRITICAL)  # what a model got wrong is its own answer
     server = library.MCPServer("manipcli", version=__version__, instructions=INSTRUCTIONS, log_level="CRITICAL")
-    with TemporaryDirectory(prefix="manipcli-mcp-") as scratch:  # others may have files in the usual one
-        runner = replace(runner, environment={**runner.environment, "TMPDIR": scratch})
+    # Others may have files in the usual folder; a command that is ending may still write to this one.
+    with TemporaryDirectory(prefix="manipcli-mcp-", ignore_cleanup_errors=True) as name:
+        runner = replace(runner, environment={**runner.environment, "TMPDIR": name})
         live = LiveTools(runner)
         for tool in (*Tools(runner).all, *live.all):
             server.add_tool(_answering(tool), structured_output=False)
-        asyncio.run(_run(server, live))
+        asyncio.run(_run(server, live, lambda: shutil.rmtree(name, ignore_errors=True)))
 
 
-async def _run(server: Any, live: LiveTools) -> None:
-    try:
-        await server.run_stdio_async()
-    finally:
-        await live.close()
+async def _run(server: Any, live: LiveTools, clean: Callable[[], None]) -> None:
+    """Serve; the session ends first. Commands that run at a signal end by themselves, see `confined`."""
+    signaled = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, signaled.set)
+    serving = asyncio.create_task(server.run_stdio_async())
+    waiting = asyncio.create_task(signaled.wait())
+    await asyncio.wait((serving, waiting), return_when=asyncio.FIRST_COMPLETED)
+    await live.close()
+    if signaled.is_set():
+        clean()
+        os._exit(ExitCode.INTERRUPTED)  # the thread that reads stdin cannot be ended
+    serving.result()
 
 
 def _answering(tool: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,8 @@ from manipcli.record.schemas import schema_text
 
 MAX_VALUES = 200_000
 """Most values in a message from a client."""
+_TOO_MANY = f"more than {MAX_VALUES} values in one message"
+_SURROGATE = re.compile("[\ud800-\udfff]")
 _INTEGERS = {
     "byte": (0, 255), "char": (0, 255), "uint8": (0, 255), "int8": (-128, 127), "uint16": (0, 2**16 - 1),
     "int16": (-(2**15), 2**15 - 1), "uint32": (0, 2**32 - 1), "int32": (-(2**31), 2**31 - 1),
@@ -111,14 +114,14 @@ class _Checking:
     def _value(self, kind: Type, value: object, path: str) -> object:
         self._left -= 1
         if self._left < 0:
-            raise BadMessage(f"more than {MAX_VALUES} values in one message")
+            raise BadMessage(_TOO_MANY)
         match kind:
             case Number():
                 return _number(kind, value, path)
             case Text():
                 if not isinstance(value, str):
                     raise BadMessage(f"{path} is {_word(value)}; expected a text")
-                if "\0" in value or any(0xD800 <= ord(letter) < 0xE000 for letter in value):
+                if "\0" in value or not (value.isascii() or _SURROGATE.search(value) is None):
                     raise BadMessage(f"{path} has a character that is not allowed in a text")
                 return value
             case Message():
@@ -137,6 +140,8 @@ class _Checking:
                 raise BadMessage(f"{path} is not base64") from None
         if not isinstance(value, list):
             raise BadMessage(f"{path} is {_word(value)}; expected a list")
+        if len(value) > self._left:
+            raise BadMessage(_TOO_MANY)
         return value
 
 

@@ -39,9 +39,18 @@ def render_run(report: RunReport, *, verbose: bool = False) -> str:
     return "\n".join(lines)
 
 
-def render_session(report: RunReport, failure: str) -> str:
-    """A live session: how long it was, the expectations of its task, and its log; `failure`: of the simulation."""
+def render_session(report: RunReport, failure: str, *, judged: bool = False) -> str:
+    """A live session: how long it was, the expectations of its task, and its log.
+
+    Args:
+        report: of the session.
+        failure: why the simulation or the network failed; "" if neither did.
+        judged: the steps of the task were done: the session is shown as a run.
+    """
     verdict = report.verdict
+    if judged:
+        run = render_run(report)
+        return f"{run}\n{FAIL} {verdict.task}: {failure}" if failure and failure not in run else run
     first = f"{FAIL} {verdict.task}: {failure}" if failure else f"{PASS} {verdict.task}: session ended"
     lines = [f"{first} ({verdict.simulated_time:.2f} s simulated, {report.wall_time:.2f} s real)"]
     if verdict.expectations:

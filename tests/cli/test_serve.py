@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from manipcli import pipeline
 from manipcli.cli.app import main
+from manipcli.judge.verdict import Verdict
 from manipcli.record.read.reading import read_recording
+from manipcli.report.run_report import RunReport, Timing
 from tests.conftest import RunCli
 from tests.live.sessions import ROOT, SMALL
 
@@ -58,6 +61,7 @@ def test_a_published_message_moves_the_arm_and_a_signal_ends_the_session_well(
         (["--speed", "0"], "USE130"),
         (["--open", "--host", "0.0.0.0"], "USE133"),
         (["--token-file", "short"], "USE134"),
+        (["--host", ""], "USE131"),
         (["--host", "no.such.host.invalid"], "USE131"),
     ],
 )
@@ -66,6 +70,18 @@ def test_bad_options_are_refused(words: list[str], code: str, call_cli: RunCli, 
     (tmp_path / "short").write_text("12345\n")
     ran = call_cli("serve", "small.yaml", *words, cwd=tmp_path)
     assert (ran.code, code in ran.err) == (4, True), ran.err
+
+
+@pytest.mark.parametrize("words", [[], ["--run"]])
+def test_a_lost_network_fails_a_session_whose_steps_passed(
+    words: list[str], call_cli: RunCli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    why = "the process of the network was ended by signal 9"
+    report = RunReport(Verdict("small", "passed", 1, "pybullet", 1.0, (), ()), Timing(simulate=1.0), log="a.mcap")
+    monkeypatch.setattr(pipeline, "serve_task", lambda *_, **__: (report, why))
+    (tmp_path / "small.yaml").write_text(SMALL)
+    ran = call_cli("serve", "small.yaml", *words, cwd=tmp_path)
+    assert (ran.code, ran.out.count(why)) == (1, 1)
 
 
 def test_a_port_in_use_is_named_and_leaves_no_log(call_cli: RunCli, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from manipcli import pipeline
 from manipcli.live.access import Access
 from manipcli.live.connection import Services
 from manipcli.live.offer import Offer
+from manipcli.live.opening import MAX_OPENING
 from manipcli.live.rosapi import Rosapi
 from manipcli.live.server import LiveServer
 from manipcli.live.source import recorded_commands
@@ -140,7 +141,37 @@ def test_without_the_token_a_client_only_reads(tmp_path: Path) -> None:
     assert recorded_ops(serving(tmp_path, use)) == ["end"]
 
 
-def test_malformed_frames_disturb_no_other_client_and_are_no_commands(tmp_path: Path) -> None:
+class Broken:
+    """An outlet that takes messages, and raises at the third; as options it opens itself."""
+
+    notice = "broken: nowhere"
+
+    def __init__(self) -> None:
+        self.messages = 0
+
+    def open(self, network: object) -> Broken:
+        return self
+
+    def wanted(self) -> tuple[str, ...]:
+        return ("/joint_states",)
+
+    def message(self, topic: str, ns: int, data: bytes) -> None:
+        self.messages += 1
+        if self.messages > 2:
+            raise KeyError("lost")
+
+    def watches(self) -> bool:
+        return True
+
+    def state(self, tick: int, state: object) -> None: ...
+
+    def close(self) -> None:
+        raise OSError("cannot close")
+
+
+def test_malformed_frames_and_a_broken_outlet_disturb_no_other_client_and_are_no_commands(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     async def attack(url: str, seed: int, frames: int) -> None:
         draw = random.Random(seed)
         socket = await connect(url)
@@ -164,7 +195,7 @@ def test_malformed_frames_disturb_no_other_client_and_are_no_commands(tmp_path: 
     async def use(url: str) -> None:
         good = await opened(url)
         await good.send(op="subscribe", topic="/joint_states", throttle_rate=5, queue_length=100)
-        attackers = asyncio.gather(*(attack(url, seed, 500) for seed in range(4)))
+        attackers = asyncio.gather(*(attack(url, seed, 250) for seed in range(4)))
         count = 0
         while not attackers.done():
             await good.until(op="publish", topic="/joint_states")
@@ -175,7 +206,11 @@ def test_malformed_frames_disturb_no_other_client_and_are_no_commands(tmp_path: 
         assert (await good.call("/rosapi/nodes"))["values"] == {"nodes": ["/manipcli"]}
         await good.socket.close()
 
-    assert recorded_ops(serving(tmp_path, use)) == ["end"]
+    assert recorded_ops(serving(tmp_path, use, outlets=[Broken()], speed=1.0)) == ["end"]
+    assert [line for line in capfd.readouterr().err.splitlines() if line.startswith("manipcli:")] == [
+        "manipcli: broken: nowhere is closed: KeyError: 'lost'",
+        "manipcli: an outlet was not closed properly: OSError: cannot close",
+    ]
 
 
 def test_a_large_frame_closes_the_connection(tmp_path: Path) -> None:
@@ -206,15 +241,44 @@ def test_the_hand_closes_by_its_action(tmp_path: Path) -> None:
     serving(tmp_path, use)
 
 
-def test_a_client_that_never_reads_is_disconnected() -> None:
+def large() -> Services:
+    """A topic with a large text, and nothing else."""
     offer = Offer({"/large": "std_msgs/msg/String"}, frozenset({"/large"}), {}, {}, {}, frozenset())
     text = json.dumps({"op": "publish", "topic": "/large", "msg": {"data": "x" * 100_000}})
-    services = Services(
+    return Services(
         offer, lambda topic: text, Rosapi(offer, dict), lambda command: False, lambda call: call(), lambda: None
     )
 
+
+def test_many_refused_frames_and_handshakes_that_do_not_end_are_closed() -> None:
     async def use() -> None:
-        async with LiveServer(services, Access(None), unread=0.1).listening(0) as port:
+        async with LiveServer(large(), Access(None)).listening(0) as port:
+            idle = [await asyncio.open_connection("127.0.0.1", port) for _ in range(MAX_OPENING + 9)]
+            good = await opened(f"ws://127.0.0.1:{port}")
+            for reader, _ in idle[:10]:  # the oldest have made room
+                assert await reader.read() == b""
+            assert not idle[10][0].at_eof()
+            bad = await connect(f"ws://127.0.0.1:{port}")
+            with pytest.raises(ConnectionClosed) as closed:
+                for k in range(2000):
+                    await bad.send("[" * (1_000_000 if k < 4 else 1))  # a long one counts as 245 short ones
+                    assert "Traceback" not in str(await bad.recv())
+            assert k < 100
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1008
+            assert "too many refused operations; the last: invalid JSON" in closed.value.rcvd.reason
+            assert (await good.call("/rosapi/nodes"))["result"] is True
+            await good.socket.close()
+            for _, writer in idle:
+                writer.close()
+
+    asyncio.run(asyncio.wait_for(use(), 60.0))
+
+
+def test_a_client_that_never_reads_is_disconnected() -> None:
+
+    async def use() -> None:
+        async with LiveServer(large(), Access(None), unread=0.1).listening(0) as port:
             deaf = await connect(f"ws://127.0.0.1:{port}", max_queue=1)
             with pytest.raises(ConnectionClosed):
                 while True:  # each is answered with the whole text

@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ import pytest
 from mcp import Client
 from mcp.client.stdio import StdioServerParameters, stdio_client
 
-from manipcli.core.errors import InvalidInput
+from manipcli.core.errors import ExitCode, InvalidInput
 from manipcli.judge.verdict import INTERRUPTED
 from manipcli.logs.judge_log import judge_log
 from manipcli.mcp_server import child, server
@@ -123,6 +126,35 @@ def test_the_tools_work_in_their_folder_and_nowhere_else(tmp_path: Path) -> None
             await use(client)
 
     asyncio.run(session())
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_a_session_ends_with_its_server_however_that_ends(number: signal.Signals, tmp_path: Path) -> None:
+    (tmp_path / "small.yaml").write_text(SMALL)
+    served = command(tmp_path)
+    client = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "test", "version": "1"}}
+    frames = (
+        {"id": 1, "method": "initialize", "params": client},
+        {"method": "notifications/initialized"},
+        {"id": 2, "method": "tools/call", "params": {"name": "live_start", "arguments": {"task": "small.yaml"}}},
+    )
+    with subprocess.Popen(
+        [served.command, *served.args], env=served.env, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for frame in frames:
+            process.stdin.write(json.dumps({"jsonrpc": "2.0", **frame}) + "\n")
+            process.stdin.flush()
+            while "id" in frame and json.loads(process.stdout.readline()).get("id") != frame["id"]:
+                pass
+        assert any(str(tmp_path) in line for line in confined())
+        process.send_signal(number)
+        code = process.wait(60)
+    assert code == (-number if number == signal.SIGKILL else ExitCode.INTERRUPTED)
+    while any(str(tmp_path) in line for line in confined()):
+        time.sleep(0.05)
+    assert judge_log(tmp_path / "runs" / "small@live.mcap").verdict == "passed"
 
 
 def test_a_folder_resolves_links_and_has_its_logs_below_runs(tmp_path: Path) -> None:

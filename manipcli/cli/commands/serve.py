@@ -75,9 +75,13 @@ def serve(
     run: Annotated[bool, typer.Option("--run", help="Also do the steps of the task, then hold.")] = False,
     log: Annotated[
         Path | None,
-        typer.Option("--log", metavar="PATH", help="Write the log to PATH [default: runs/<task>@live.mcap]."),
+        typer.Option(
+            "--log",
+            metavar="PATH",
+            help="Write the log to PATH [default: runs/<task>@live.mcap, or the next free number, -2, ...].",
+        ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the --log file if it exists.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace logs that exist.")] = False,
     seed: Seed = None,
     sample: Sample = None,
     overrides: Overrides = None,
@@ -93,6 +97,8 @@ def serve(
     from manipcli.cli.interrupts import Interrupts
 
     factor, wall = _speed(speed), None if lasting is None else seconds(lasting)
+    if wall is not None and not wall > 0.0:
+        raise InvalidInput([Diagnostic("USE050", f"--for is '{lasting}'; expected a time above 0", hint="write 30s")])
     token = _token(token_file, host=host, open_=open_)
     served = _served(task, robot, controllers, run=run)
     with Interrupts() as interrupts:
@@ -113,7 +119,7 @@ def serve(
             console.talk("Press Ctrl-C to end the session.")
 
         def shown(report: RunReport, failure: str) -> str:
-            return text.render_run(report) if run else text.render_session(report, failure)
+            return text.render_session(report, failure, judged=run)
 
         def ended(report: RunReport, failure: str) -> None:
             console.result(shown(report, failure))
@@ -135,7 +141,8 @@ def serve(
                 allow_outside=allow_outside,
             )
         console.result(shown(report, failure))
-        return exit_code(report.verdict) if run else ExitCode.FAILED if failure else ExitCode.PASSED
+        code = exit_code(report.verdict) if run else ExitCode.PASSED
+        return ExitCode.FAILED if failure and code is ExitCode.PASSED else code
 
 
 def _served(
@@ -217,10 +224,13 @@ def _token(file: Path | None, *, host: str, open_: bool) -> str | None:
     """The token of the server; None for `--open`.
 
     Raises:
-        InvalidInput: options that exclude each other, or a token that is too short or not one line of text.
+        InvalidInput: no address, options that exclude each other, or a token that is too short or not one line of text.
     """
     from manipcli.live.access import MIN_TOKEN, random_token
 
+    if not host:
+        hint = "name an address of this machine; 0.0.0.0 is all of them"
+        raise InvalidInput([Diagnostic("USE131", "--host is empty; expected an address", hint=hint)])
     if open_:
         if host != LOCAL or file is not None:
             what = "--token-file" if file is not None else "--host"

@@ -66,6 +66,7 @@ class Controls:
         self._robot, self._offer = robot, offer
         self._put, self._answered = put, answered
         self._lock = threading.Lock()
+        self._pose: str | None = None
         self._motions = {drive.controller: _Motion() for drive in drives}
         self.drives = tuple(drives)
 
@@ -88,25 +89,21 @@ class Controls:
                 motion.touched, motion.dragged = now, True
 
     def go(self, pose: str) -> None:
-        """Move to a named pose at the next `send`, with the drives that have its joints."""
-        named = self._robot.pose(pose)
-        values = dict(zip(named.joints, named.positions, strict=True))
+        """Move to a named pose at the next `send`, with the drives that have its joints: with all of them or none."""
         with self._lock:
-            for drive in self.drives:
-                own = {joint: values[joint] for joint in drive.joints if joint in values}
-                if own:
-                    motion = self._motions[drive.controller]
-                    motion.waiting, motion.dragged = own, False
+            self._pose = pose
 
     def send(self, snapshot: Snapshot, now: float) -> None:
-        """Send what waits, at most every `PERIOD` of wall time; what waits for an inactive drive is dropped."""
+        """Send what waits, at most every `PERIOD` of wall time; what cannot be moved now is dropped, and reported."""
+        self._take_pose(snapshot)
         for drive in self.drives:
             motion = self._motions[drive.controller]
             if not motion.waiting or now - motion.sent < PERIOD:
                 continue
             with self._lock:
                 waiting, motion.waiting = motion.waiting, {}
-            if not snapshot.is_active(drive.controller):
+            if obstacle := snapshot.obstacle(drive.controller):
+                self._not_moved(drive.controller, obstacle)
                 continue
             here, velocity = snapshot.reference(drive)
             rest = here if motion.target is None or motion.is_over(snapshot.time) else motion.target
@@ -115,6 +112,27 @@ class Controls:
             motion.sent, motion.target = now, target
             motion.began, motion.until = snapshot.time, snapshot.time + seconds + SETTLING
             self.put(drive.controller, drive.command(target, seconds, self._offer, id_=f"page.{next(_GOALS)}"))
+
+    def _take_pose(self, snapshot: Snapshot) -> None:
+        with self._lock:
+            pose, self._pose = self._pose, None
+        if pose is None:
+            return
+        named = self._robot.pose(pose)
+        values = dict(zip(named.joints, named.positions, strict=True))
+        moved = [drive for drive in self.drives if values.keys() & set(drive.joints)]
+        if obstacle := next(filter(None, (snapshot.obstacle(drive.controller) for drive in moved)), ""):
+            self._not_moved(pose, obstacle)
+            return
+        with self._lock:
+            for drive in moved:
+                motion = self._motions[drive.controller]
+                motion.waiting = {joint: values[joint] for joint in drive.joints if joint in values}
+                motion.dragged = False
+
+    def _not_moved(self, name: str, obstacle: str) -> None:
+        self.refused(name)
+        self._answered(name, Answer(False, {}, text=f"{obstacle}: not moved"))
 
     def put(self, name: str, command: Command | None) -> None:
         """Hand over a command, whose failure is reported under a name."""

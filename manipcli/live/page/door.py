@@ -11,7 +11,7 @@ from http import HTTPStatus
 from typing import TYPE_CHECKING, Final
 from urllib.parse import quote, urlsplit
 
-from manipcli.live.access import Access
+from manipcli.live.access import Access, query
 from manipcli.replay.view.viser_server import Answer
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def door(access: Access) -> Answer:
         if headers.get("Upgrade") is not None:
             MAY_COMMAND.set(decision.commands)
         elif decision.commands and access.token is not None and urlsplit(request.path).path == "/":
-            return _leads_on(connection, f"ws://{host}/?token={quote(access.token, safe='')}")
+            return _leads_on(connection, f"ws://{host}{query(access.token)}")
         return None
 
     return check

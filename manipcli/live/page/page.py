@@ -15,7 +15,7 @@ from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Final
 
-from manipcli.live.access import Access
+from manipcli.live.access import Access, query
 from manipcli.live.command import Answer
 from manipcli.live.outlet import Network
 from manipcli.live.page import service_calls, texts
@@ -24,7 +24,7 @@ from manipcli.live.page.door import MAY_COMMAND, door
 from manipcli.live.page.drive import drives_of
 from manipcli.live.page.panel import Panel
 from manipcli.live.page.reader import Reader
-from manipcli.live.page.snapshot import Snapshot
+from manipcli.live.page.snapshot import ENDED, Snapshot
 from manipcli.live.page.story import TOPICS, Story
 from manipcli.model.configuration import configuration
 from manipcli.model.state import WorldState
@@ -44,6 +44,8 @@ ASKING: Final = 0.5
 """[s] Between two questions for the states of controllers and simulation, and two texts."""
 IDLE: Final = 0.2
 """[s] Between two looks for visitors."""
+PARTING: Final = 0.2
+"""[s] That the last texts have to reach the browsers."""
 
 
 class LivePage(LocalServer):
@@ -63,8 +65,8 @@ class LivePage(LocalServer):
 
     def __init__(self, network: Network, *, token: str | None, port: int | None) -> None:
         robot, scene = network.publisher.robot, network.publisher.scene
-        super().__init__(robot.name, port=port, option="--page-port", check=door(Access(token)))
-        self.notice = f"page: {self.url}" if token is None else f"page: {self.url}/?token={token}"
+        super().__init__(network.title or robot.name, port=port, option="--page-port", check=door(Access(token)))
+        self.notice = f"page: {self.url}{query(token)}"
         self._network, self._offer, self._robot = network, network.publisher.offer, robot
         self._drives = drives_of(robot, network.publisher.recorded, self._offer)
         self._placing = Placing(robot, scene)
@@ -77,7 +79,7 @@ class LivePage(LocalServer):
         self._asks = self._watched = False
         self._clock: deque[tuple[float, float]] = deque(maxlen=5)
         self._shown: Snapshot | None = None
-        self._asked = 0.0
+        self._asked = self._timed = 0.0
         self._over = threading.Event()
         drawing = draw(robot, scene)
         self._notes = drawing.missing
@@ -117,11 +119,27 @@ class LivePage(LocalServer):
     def close(self) -> None:
         self._over.set()
         self._thread.join(timeout=2.0)
-        self.stop()
+        try:
+            self._part()
+        finally:
+            self.stop()
+
+    def _part(self) -> None:
+        """Show the end of the session, which browsers keep on their screens."""
+        clients = self.viser.get_clients().values()
+        if not clients or self._thread.is_alive():
+            return
+        self._story.read()
+        self._story.phase = ENDED
+        self._update(time.monotonic(), news=True)
+        self.viser.flush()
+        for client in clients:
+            client.flush()
+        time.sleep(PARTING)
 
     async def _came(self, client: viser.ClientHandle) -> None:
         if not MAY_COMMAND.get():
-            self._visitors[client.client_id] = Reader(client, self._controllers_folder)
+            self._visitors[client.client_id] = Reader(client, self._controllers_folder, self._controllers)
             return
         answered = partial(self._answered, client.client_id)
         controls = Controls(self._robot, self._drives, self._offer, self._network.put, answered)
@@ -156,10 +174,18 @@ class LivePage(LocalServer):
         self._take_answers()
         newest = self._newest
         self._asks = True
+        if now - self._asked >= ASKING:
+            self._asked = now
+            self._ask()
         if newest is None:
             return
+        story = self._story
         snapshot = replace(
-            newest, controllers=self._controllers, simulation=self._simulation, stopped=self._story.stopped
+            newest,
+            controllers=self._controllers,
+            simulation=self._simulation,
+            stopped=story.stopped,
+            phase=story.phase,
         )
         if newest is not self._shown:
             self._shown = newest
@@ -169,14 +195,17 @@ class LivePage(LocalServer):
             visitor.update(snapshot, now)
         if news or not self._messages.content:
             self._show_events()
-        if now - self._asked >= ASKING:
-            self._asked = now
-            self._ask(now, snapshot)
+        due = now - self._timed >= ASKING
+        if due:
+            self._timed = now
+            self._clock.append((now, snapshot.time))
+        if due or news:
+            self._status.content = texts.status(snapshot, self._factor(), self._notes)
 
-    def _ask(self, now: float, snapshot: Snapshot) -> None:
-        """Show the time, and ask for the states of controllers and simulation."""
-        self._clock.append((now, snapshot.time))
-        self._status.content = texts.status(snapshot, self._factor(), self._notes)
+    def _ask(self) -> None:
+        """Ask for the states of controllers and simulation."""
+        if self._story.phase:
+            return
         for kind in (service_calls.LIST, service_calls.GET_STATE):
             service = service_calls.service_of(self._offer, kind)
             if service is not None and service in self._offer.readers:
@@ -199,6 +228,7 @@ class LivePage(LocalServer):
             if number is None:
                 self._states_of(answer.values)
                 continue
+            self._asked = 0.0  # it can have changed what is asked for
             why = service_calls.failure(answer)
             visitor = self._visitors.get(number)
             if why is not None and visitor is not None:

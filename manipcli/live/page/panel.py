@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 from manipcli.live.offer import Offer
 from manipcli.live.page import service_calls
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 ROW: Final = 24
 """Characters of the names in one row of buttons."""
+_Button: TypeAlias = "viser.GuiButtonHandle | viser.GuiButtonGroupHandle"
 _CLEAR: Final = 6.0
 """[s] That a notification is shown."""
 
@@ -64,6 +65,8 @@ class Panel:
         self._folder = folder
         self._period = period
         self._playing = False
+        self._buttons: list[_Button] = []
+        self._poses: list[_Button] = []
         gui = client.gui
         self._add_button("EMERGENCY STOP", EMERGENCY_STOP, color="red", order=0.0)
         self._release = self._add_button("Release emergency stop", RELEASE, color=None, order=0.5)
@@ -73,6 +76,7 @@ class Panel:
                 for k, row in enumerate(rows(names, ROW)):
                     group = gui.add_button_group(label if k == 0 else "", row)
                     group.on_click(self._posed(group))
+                    self._poses.append(group)
         for drive in controls.drives:
             with gui.add_folder(f"{drive.controller} [{units(robot, drive)}]", order=5):
                 self._sliders[drive] = [self._slider(gui, robot, drive, joint) for joint in drive.joints]
@@ -91,6 +95,7 @@ class Panel:
         if service not in self._offer.services:
             return None
         button = self._client.gui.add_button(label, color=color, order=order)
+        self._buttons.append(button)
 
         @button.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
@@ -103,6 +108,8 @@ class Panel:
         if not names:
             return
         group = gui.add_button_group("simulation", names, order=2, hint=f"Step: {STEP_TIME:g} s, then pause")
+
+        self._buttons.append(group)
 
         @group.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
@@ -144,12 +151,19 @@ class Panel:
         self._playing = snapshot.simulation == PLAYING
         if self._release is not None:
             self._release.visible = snapshot.stopped
+        over, stopped = bool(snapshot.phase), snapshot.stopped
         with self._client.atomic():
+            for button in self._buttons:
+                button.disabled = over
+            for group in self._poses:
+                group.disabled = over or stopped
+            for box in list(self._switches.values()):
+                box.disabled = over or (stopped and not box.value)
             for drive, sliders in self._sliders.items():
-                active = snapshot.is_active(drive.controller)
+                obstacle = bool(snapshot.obstacle(drive.controller))
                 follows = self._controls.follows(drive, snapshot, now)
                 for slider, k in zip(sliders, drive.columns, strict=True):
-                    slider.disabled = not active or slider.max <= slider.min
+                    slider.disabled = obstacle or slider.max <= slider.min
                     value = round(slider.step * round(float(snapshot.state.position[k]) / slider.step), 9)
                     value = min(max(value, slider.min), slider.max)
                     if follows and abs(value - slider.value) > 0.5 * slider.step:

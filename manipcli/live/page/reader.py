@@ -18,12 +18,13 @@ class Reader:
     Args:
         client: his browser.
         folder: of the controllers, which all visitors see.
+        states: of the controllers, as far as they are known.
     """
 
-    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
+    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle, states: Mapping[str, str]) -> None:
         client.gui.add_html(texts.read_only(), order=0)
         with folder:
-            self._states = client.gui.add_html("")
+            self._states = client.gui.add_html(texts.controllers(states))
 
     def update(self, snapshot: Snapshot, now: float) -> None:
         """Nothing is his own."""

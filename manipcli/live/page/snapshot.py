@@ -13,6 +13,7 @@ from manipcli.live.page.drive import Drive
 from manipcli.model.state import WorldState
 
 ACTIVE = "active"
+RESETTING, ENDED = "resetting", "ended"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,7 @@ class Snapshot:
         controllers: their states by name, as in list_controllers.
         simulation: as in simulation_interfaces/SimulationState; None if it is unknown.
         stopped: whether the emergency stop is active.
+        phase: `RESETTING` or `ENDED`; "" while the session goes on.
     """
 
     time: float
@@ -34,6 +36,7 @@ class Snapshot:
     controllers: Mapping[str, str] = field(default_factory=dict)
     simulation: int | None = None
     stopped: bool = False
+    phase: str = ""
 
     @classmethod
     def of(cls, time: float, state: WorldState, outputs: Sequence[tuple[Array, Array] | None]) -> Self:
@@ -46,6 +49,14 @@ class Snapshot:
     def is_active(self, controller: str) -> bool:
         """Whether a controller is active, or not yet known."""
         return self.controllers.get(controller, ACTIVE) == ACTIVE
+
+    def obstacle(self, controller: str) -> str:
+        """Why a controller cannot be moved now; "" if it can."""
+        if self.phase:
+            return "the session has ended" if self.phase == ENDED else "the simulation is reset"
+        if self.stopped:
+            return 'the emergency stop is active; press "Release emergency stop"'
+        return "" if self.is_active(controller) else f"{controller} is not active"
 
     def reference(self, drive: Drive) -> tuple[Array, Array]:
         """(n) positions and (n) velocities where a drive is: its references; as measured while it has none."""

@@ -6,11 +6,17 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from typing import Final
 
-from manipcli.live.page.snapshot import ACTIVE, Snapshot
+from manipcli.live.page.snapshot import ACTIVE, ENDED, RESETTING, Snapshot
 from manipcli.live.play_state import PAUSED
 
 READ_ONLY: Final = "Read only: open the address with <code>?token=</code> that <code>manipcli serve</code> printed."
-STOPPED: Final = '<br><b style="color:#e03131">emergency stop: the brakes hold</b>'
+STOPPED: Final = (
+    '<br><b style="color:#e03131">emergency stop: the brakes hold</b><br>To go on, press "Release emergency stop".'
+)
+ENDS: Final = {
+    RESETTING: "<b>resetting ...</b><br>The log is closed and judged, then the simulation starts.",
+    ENDED: '<b style="color:#e03131">session ended</b><br>This page shows its last state.',
+}
 _SIGNS: Final = {"running": ("▸", "#228be6"), "done": ("✓", "#2f9e44"), "skipped": ("–", "inherit")}
 _FAILED: Final = ("✗", "#e03131")
 _COLORS: Final = {30: "#e8890c", 40: "#e03131", 50: "#e03131"}
@@ -22,9 +28,11 @@ def status(snapshot: Snapshot | None, factor: float | None, notes: Iterable[str]
     """Simulated time, real-time factor and state; then one line per note."""
     if snapshot is None:
         return _box("<b>starting</b>")
+    if snapshot.phase:
+        return _box(f"<b>t = {snapshot.time:.2f} s</b> · {ENDS[snapshot.phase]}")
     paused = snapshot.simulation == PAUSED
     speed = "" if factor is None or paused else f" · real-time factor {factor:.2f}"
-    word = " · <b>paused</b>" if paused else ""
+    word = " · <b>paused</b><br>Motions wait for Play or Step." if paused else ""
     word += STOPPED if snapshot.stopped else ""
     lines = [f"<b>t = {snapshot.time:.2f} s</b>{speed}{word}", *(escape(note) for note in notes)]
     return _box("<br>".join(lines))

@@ -16,7 +16,9 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
+from html import escape
 from typing import TYPE_CHECKING, Any, Final, Self
+from urllib.parse import urlsplit
 from weakref import WeakSet
 
 from manipcli.core.errors import ManipcliError
@@ -51,7 +53,7 @@ class LocalServer:
     """A viser server on 127.0.0.1. A context manager that stops it at the end.
 
     Args:
-        title: title of the panel.
+        title: of the panel and of the window.
         port: port to listen on; None: 8080 or the next free port; 0: any free port.
         option: which sets the port, for the hint of an error.
         check: answers requests before viser, instead of `of_this_machine`. What it sets in context variables holds for
@@ -74,7 +76,7 @@ class LocalServer:
         # A browser that leaves during an update, or sends nonsense, is nothing for the user.
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
         warnings.filterwarnings("ignore", message=r"\[viser\] .* does not match annotation")
-        with _silent(), _checked_requests(check or of_this_machine) as made:
+        with _silent(), _checked_requests(check or of_this_machine, title) as made:
             server = Private(host=HOST, port=DEFAULT_PORT if port is None else port, label=title, verbose=False)
         self.viser: viser.ViserServer = server
         self._stopped = False
@@ -127,7 +129,7 @@ def of_this_machine(connection: ServerConnection, request: Request) -> Response 
 
 
 @contextmanager
-def _checked_requests(check: Answer) -> Iterator[list[object]]:
+def _checked_requests(check: Answer, title: str) -> Iterator[list[object]]:
     """Check requests before viser answers them: viser has no option for it, but its websocket library has.
 
     Yields a list that is not empty once a server was started with the check.
@@ -158,6 +160,8 @@ def _checked_requests(check: Answer) -> Iterator[list[object]]:
 
     class Checked(library.serve):
         def __init__(self, *arguments: object, process_request: Answer, **options: object) -> None:
+            titled = _titled(process_request, title)
+
             def answer(connection: ServerConnection, request: Request) -> Response | None:
                 # Faults of one connection are no texts for the user.
                 asyncio.get_running_loop().set_exception_handler(lambda loop, context: None)
@@ -171,7 +175,7 @@ def _checked_requests(check: Answer) -> Iterator[list[object]]:
                     if sum(one.state in (State.CONNECTING, State.OPEN) for one in connected) >= MAX_BROWSERS:
                         return connection.respond(http.HTTPStatus.SERVICE_UNAVAILABLE, "Too many browsers.\n")
                     connected.add(connection)
-                return process_request(connection, request)
+                return titled(connection, request)
 
             # viser's other options are passed on unchanged.
             options |= {"max_size": MAX_MESSAGE, "create_connection": Limited, "logger": _quiet()}
@@ -184,6 +188,24 @@ def _checked_requests(check: Answer) -> Iterator[list[object]]:
         yield made
     finally:
         library.serve = before  # type: ignore[misc]
+
+
+def _titled(process_request: Answer, title: str) -> Answer:
+    """The same answers, with a title of the window: viser has no option for it."""
+
+    def answer(connection: ServerConnection, request: Request) -> Response | None:
+        page = request.headers.get("Upgrade") is None and urlsplit(request.path).path == "/"
+        if page and "Accept-Encoding" in request.headers:
+            del request.headers["Accept-Encoding"]  # its text is needed
+        response = process_request(connection, request)
+        if page and response is not None and response.body is not None:
+            named = f"<title>{escape(title)}</title>".encode()
+            response.body = response.body.replace(b"<title>Viser</title>", named, 1)
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
+        return response
+
+    return answer
 
 
 def _quiet() -> logging.Logger:

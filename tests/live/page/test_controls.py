@@ -18,7 +18,7 @@ from manipcli.live.offer import Offer
 from manipcli.live.page.controls import PERIOD, Controls
 from manipcli.live.page.drive import RISE, Drive, drives_of
 from manipcli.live.page.service_calls import PAUSE, RESET, failure, press, switch
-from manipcli.live.page.snapshot import Snapshot
+from manipcli.live.page.snapshot import ENDED, RESETTING, Snapshot
 from manipcli.model.state import WorldState
 from manipcli.run.execute import build_manager
 from manipcli.run.run_log import recorded
@@ -114,24 +114,47 @@ def test_a_dragged_slider_sends_its_last_value_at_a_limited_rate(
     assert 9 <= len(sent) <= 12
 
 
-def test_a_pose_moves_the_active_drives_that_it_names(
+def test_a_pose_moves_all_drives_that_it_names_or_none(
     loaded: tuple[Task, ControllerManager, Offer], drives: tuple[Drive, ...]
 ) -> None:
     task, _, offer = loaded
     sent: list[Command] = []
-    controls = Controls(task.robot, drives, offer, lambda command: not sent.append(command), lambda name, answer: None)
+    why: list[tuple[str, str]] = []
+    controls = Controls(
+        task.robot,
+        drives,
+        offer,
+        lambda command: not sent.append(command),
+        lambda name, answer: why.append((name, answer.text)),
+    )
     assert controls.poses == {"robot": ["zero", "home"], "hand": ["open", "wrap"]}
     controls.go("wrap")
     controls.send(at(task), 0.0)
     (command,) = sent
     assert command.name == "/hand_controller/gripper_cmd"
     assert json.loads(command.json)["command"]["position"] == [0.6] * 6
-    stopped = replace(at(task), controllers={"arm_controller": "active", "hand_controller": "inactive"})
-    controls.go("zero")
-    controls.send(stopped, 1.0)
-    assert [each.name for each in sent[1:]] == ["/arm_controller/joint_trajectory"]
+    off = {"controllers": {"arm_controller": "inactive", "hand_controller": "active"}}
+    release = 'the emergency stop is active; press "Release emergency stop": not moved'
+    for obstacle, expected in (
+        (off, "arm_controller is not active: not moved"),
+        ({"stopped": True}, release),
+        ({"stopped": True, **off}, release),
+        ({"phase": RESETTING}, "the simulation is reset: not moved"),
+        ({"phase": ENDED}, "the session has ended: not moved"),
+    ):
+        controls.go("zero")
+        controls.send(replace(at(task), **obstacle), 1.0)
+        assert why.pop() == ("zero", expected)
+        controls.slide(drives[0], "joint_1", 0.5, now=1.0)
+        controls.send(replace(at(task), **obstacle), 1.0)
+        assert why.pop() == ("arm_controller", expected)
+        assert controls.follows(drives[0], at(task), 9.0), "it shows where the robot is"
     controls.send(at(task), 2.0)
-    assert len(sent) == 2, "what waited for the inactive hand is dropped"
+    assert len(sent) == 1, "what could not be moved is dropped"
+    assert why == []
+    controls.go("zero")
+    controls.send(at(task), 3.0)
+    assert [each.name for each in sent[1:]] == ["/arm_controller/joint_trajectory", "/hand_controller/gripper_cmd"]
 
 
 def test_services_that_the_offer_lacks_have_no_command(loaded: tuple[Task, ControllerManager, Offer]) -> None:

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
+from manipcli.live.page.service_calls import PAUSED
+from manipcli.live.page.snapshot import ENDED, RESETTING, Snapshot
 from manipcli.live.page.story import SHOWN, Story
-from manipcli.live.page.texts import steps
+from manipcli.live.page.texts import status, steps
+from manipcli.model.state import WorldState
 from manipcli.record.channels import EVENTS, ROSOUT
 from manipcli.record.messages import event_message, log_message
 from manipcli.record.recording import TaskEvent
@@ -59,7 +66,50 @@ def test_only_the_last_messages_are_kept() -> None:
     for k in range(3 * SHOWN):
         hear(story, "refused", outcome="error", text=f"number {k}")
     story.read()
-    assert [text for _, _, text in story.messages] == [
-        f"refused error: number {k}" for k in range(2 * SHOWN, 3 * SHOWN)
-    ]
+    assert [text for _, _, text in story.messages] == [f"refused: number {k}" for k in range(2 * SHOWN, 3 * SHOWN)]
     assert {level for _, level, _ in story.messages} == {40}
+    hear(story, "session_started")
+    hear(story, "goal_sent", text="arm_controller")
+    story.read()
+    assert [text for _, _, text in story.messages] == ["session started", "goal sent: arm_controller"], "after a reset"
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "shown"),
+    [
+        ("emergency_stop", "emergency stop: brakes hold", "emergency stop: brakes hold"),
+        ("emergency_stop_released", "emergency stop released: arm", "emergency stop released: arm"),
+        ("refused", "out of reach: 2 m", "refused: out of reach: 2 m"),
+        ("simulation_reset", "", "simulation reset"),
+    ],
+)
+def test_no_message_says_anything_twice(kind: str, text: str, shown: str) -> None:
+    story = Story()
+    for outcome in ("error", ""):
+        hear(story, kind, outcome=outcome, text=text)
+        story.read()
+        assert story.messages.pop()[2] == shown
+
+
+def test_a_session_ends_or_is_reset() -> None:
+    story = Story()
+    snapshot = Snapshot(12.34, WorldState.room(1, 0), simulation=1)
+    for kind, phase, words in (
+        ("session_started", "", "real-time factor 1.00"),
+        ("simulation_reset", RESETTING, "t = 12.34 s</b> · <b>resetting"),
+        ("session_started", "", "real-time factor 1.00"),
+        ("session_ended", ENDED, "session ended"),
+    ):
+        hear(story, kind)
+        story.read()
+        assert story.phase == phase
+        shown = status(replace(snapshot, phase=story.phase), 1.0)
+        assert words in shown
+        assert "t = 12.34 s" in shown
+        assert ("real-time" in shown) is (phase == "")
+
+
+def test_what_can_be_done_is_said() -> None:
+    snapshot = Snapshot(1.0, WorldState.room(1, 0), simulation=PAUSED)
+    assert "wait for Play" in status(snapshot, None)
+    assert "Release emergency stop" in status(replace(snapshot, stopped=True), None)
