@@ -273,8 +273,8 @@ def serve_task(
     Args:
         path: the task file.
         live: how it is served.
-        log: path of the log; default `runs/<task>@live.mcap`. The next ones, and those after an existing one, end with -2,
-            -3, ...
+        log: path of the log; default `runs/<task>@live.mcap`. The next ones, and those after an existing one, end with
+            -2, -3, ...
         force: replace logs that exist.
         embed_meshes: see `run_task`.
         progress: receives warnings and steps.

@@ -10,11 +10,12 @@ import typer
 
 from manipcli.cli import console
 from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.live.names import DEFAULT_PORT
 
 if TYPE_CHECKING:
     from manipcli.live.remote import Remote
 
-LOCAL = "ws://127.0.0.1:9090"
+LOCAL = f"ws://127.0.0.1:{DEFAULT_PORT}"
 
 Url = Annotated[
     str,

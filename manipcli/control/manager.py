@@ -134,8 +134,7 @@ class ControllerManager:
         """
         if controller.name in self._slots:
             raise InvalidArgument("CTRL141", f"duplicate controller name '{controller.name}'")
-        findings = conflicts([controller], self.joints, self.following)
-        if findings:
+        if findings := conflicts([controller], self.joints, self.following):
             raise InvalidInput(findings)
         every = 1 if update_rate is None else ticks_between(update_rate, self.period)
         where = [self.joints.index(name) for name in controller.joints]
@@ -218,9 +217,8 @@ class ControllerManager:
         Raises:
             InvalidArgument: an unknown strictness.
         """
-        word = strictness_of(strictness)
-        lists = Switch(activate=names_of(activate), deactivate=names_of(deactivate), strictness=word)
-        return self.carry_out(lists, time=time)
+        on, off = names_of(activate), names_of(deactivate)
+        return self.carry_out(Switch(activate=on, deactivate=off, strictness=strictness_of(strictness)), time=time)
 
     def switch_to(
         self, names: Collection[str], *, strictness: Strictness = "strict", time: float = 0.0
@@ -244,6 +242,10 @@ class ControllerManager:
             self._slots[name].first = self._tick
         self._rearrange()
         return decision
+
+    def is_active(self, name: str) -> bool:
+        """Whether a controller is loaded and active."""
+        return any(slot.controller.name == name for slot in self._active)
 
     def list(self) -> tuple[ControllerInfo, ...]:
         """All loaded controllers, and their claims."""
@@ -283,8 +285,7 @@ class ControllerManager:
         """Update the modes of the joints and the work per tick, after a change of loaded or active controllers."""
         active = [slot for slot in self._slots.values() if slot.state == "active"]
         targets = {slot.controller.name: target_of(slot.controller) for slot in active}
-        # Those that precede others are updated first.
-        self._active = tuple(sorted(active, key=lambda slot: -depth_of(slot.controller, targets)))
+        self._active = tuple(sorted(active, key=lambda slot: -depth_of(slot.controller, targets)))  # preceding first
         self._chain()
         claimed = Claims.of([slot.controller for slot in self._active])
         modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
@@ -388,8 +389,7 @@ class ControllerManager:
         """Deactivate, as failed, all controllers whose commands are not finite."""
         for slot in self._active:
             for interface, command in zip(slot.controller.interfaces, slot.controller.output.commands, strict=True):
-                bad = np.flatnonzero(~np.isfinite(command))
-                if len(bad):
+                if len(bad := np.flatnonzero(~np.isfinite(command))):
                     joint = slot.controller.joints[bad[0]]
                     self._fail(slot, f"its command for {joint}/{interface} is {command[bad[0]]}", time)
                     break

@@ -1,13 +1,16 @@
-"""Roles of controllers for steps: trajectory follower and hand; and controllers that read sensors."""
+"""Roles of controllers for steps, trajectory follower and hand, and what else some of them can do."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Protocol, TypeGuard
 
+import numpy.typing as npt
+
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.controller import Controller
 from manipcli.control.jog import JogTarget
+from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
@@ -59,6 +62,36 @@ class Jogged(Controller, Protocol):
         ...
 
 
+class Commanded(Controller, Protocol):
+    """A controller that takes one value per joint."""
+
+    def set_command(self, values: npt.ArrayLike) -> None:
+        """Set the command from the next update on.
+
+        Raises:
+            InvalidArgument: not one finite number per joint.
+        """
+        ...
+
+
+class Referenced(Controller, Protocol):
+    """A controller with one reference per joint, and its rate."""
+
+    def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
+        """Set the reference from the next update on.
+
+        Raises:
+            InvalidArgument: not one finite number per joint, or rates where it has none.
+        """
+        ...
+
+
+class Scaled(Controller, Protocol):
+    """A controller whose trajectories have a speed."""
+
+    scaling: SpeedScaling
+
+
 class SensorReader(Controller, Protocol):
     """Reads sensors."""
 
@@ -85,6 +118,21 @@ def takes_goals(controller: Controller) -> TypeGuard[GoalTaker]:
 def is_jogged(controller: Controller) -> TypeGuard[Jogged]:
     """Whether it can be jogged."""
     return hasattr(controller, "jog")
+
+
+def is_referenced(controller: Controller) -> TypeGuard[Referenced]:
+    """Whether it has a topic for references."""
+    return hasattr(controller, "set_reference")
+
+
+def is_commanded(controller: Controller) -> TypeGuard[Commanded]:
+    """Whether it has a topic for commands."""
+    return hasattr(controller, "set_command")
+
+
+def is_scaled(controller: Controller) -> TypeGuard[Scaled]:
+    """Whether its trajectories have a speed."""
+    return hasattr(controller, "scaling")
 
 
 def reads_sensors(controller: Controller) -> TypeGuard[SensorReader]:

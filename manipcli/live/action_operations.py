@@ -15,13 +15,12 @@ from manipcli.live import command as words
 from manipcli.live.command import Answer
 from manipcli.live.connection import Connection
 from manipcli.live.fields import MAX_NAME, Refused, arguments, check_type, near, rooted, text_of
+from manipcli.live.names import GoalStatus
 from manipcli.live.offer import goal_type
 from manipcli.record.json_message import definition
 
 MAX_GOALS: Final = 100
 """Active goals of one client."""
-UNKNOWN: Final = 0
-"""STATUS_UNKNOWN of action_msgs/GoalStatus."""
 
 
 class ActionOperations:
@@ -69,7 +68,7 @@ class ActionOperations:
         if not answer.ok:
             code = answer.values.get("error_code")
             text = f"{ErrorCode(code).name} ({code}): {answer.text}" if isinstance(code, int) else answer.text
-            found |= {"values": text, "status": UNKNOWN, "result": False}
+            found |= {"values": text, "status": GoalStatus.UNKNOWN, "result": False}
             found |= {"error_code": code} if isinstance(code, int) else {}
         self._connection.answer(found, frame.get("id"))
 

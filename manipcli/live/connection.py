@@ -13,6 +13,7 @@ from manipcli.live.offer import Offer
 from manipcli.live.outbox import Outbox
 from manipcli.live.pending import TOO_MANY
 from manipcli.live.rosapi import Rosapi
+from manipcli.record.json_message import compact
 
 LEVELS: Final = ("none", "error", "warning", "info")
 """Of status messages; a client gets those up to its level."""
@@ -99,6 +100,6 @@ class Connection:
         def back(found: Answer) -> None:
             self.services.in_network(lambda: answer(found))
 
-        text = json.dumps(message, separators=(",", ":"), allow_nan=False)
+        text = compact(message)
         if not self.services.put(Command(op, name, id_, text, back, guest=not self._commands)):
             raise Refused(TOO_MANY)

@@ -5,12 +5,11 @@ The line is not in the log: how fast somebody reads depends on the machine, and 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 
 from manipcli.live.connection import Connection
 from manipcli.record.channels import ROSOUT
-from manipcli.record.json_message import definition, from_json
+from manipcli.record.json_message import compact, definition, from_json
 from manipcli.record.schemas import LOG
 
 _WARN = 30
@@ -37,4 +36,4 @@ def drop_line(text: str, stamp: Mapping[str, int]) -> str:
     """The `publish` operation of a text on `/rosout`; `stamp`: builtin_interfaces/Time."""
     values = {"stamp": {**stamp}, "level": _WARN, "name": "manipcli", "msg": text, "function": "dropped"}
     message = from_json(definition(LOG), values)
-    return json.dumps({"op": "publish", "topic": ROSOUT, "msg": message}, separators=(",", ":"))
+    return compact({"op": "publish", "topic": ROSOUT, "msg": message})

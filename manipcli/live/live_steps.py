@@ -189,10 +189,9 @@ class LiveSteps:
     @property
     def _claims(self) -> Claims:
         """The controllers as they are now."""
-        active = {info.name for info in self._session.manager.list() if info.state == "active"}
         claims = Claims.of(self._task.controllers)
         every = [claim.name for claim in claims.controllers]
-        return claims.switched([name for name in every if name in active], every)
+        return claims.switched([name for name in every if self._session.manager.is_active(name)], every)
 
     @property
     def _moving(self) -> str:

@@ -11,9 +11,8 @@ from manipcli.core.errors import ManipcliError, SimulationFailed
 from manipcli.live import command as words
 from manipcli.live.command import Answer, Command, Values
 from manipcli.live.endpoint import KINDS, Endpoint, Kind
-from manipcli.live.interfaces.controllers import ABORTED
-from manipcli.live.interfaces.simulation import FAILED as OPERATION_FAILED
 from manipcli.live.live_robot import LiveRobot
+from manipcli.live.names import GoalStatus, Result
 from manipcli.record.json_message import definition, from_json
 from manipcli.run.observer import FEEDBACK_PERIOD
 
@@ -67,11 +66,11 @@ class Obedience:
             command.answer(Answer(True, values))
 
     def _refuse(self, command: Command, text: str, code: ErrorCode, *, logged: bool) -> None:
-        """Answer, and record an event, unless the command is not in the log either."""
+        """Answer, and record it as an event, unless the command is not in the log either."""
         if logged:
             self._robot.event("refused", f"{command.op} {command.name}: {text}", outcome="error")
         values: Values = {"error_code": int(code), "error_string": text} if command.op == words.SEND_GOAL else {}
-        command.answer(Answer(False, values, text=text, status=ABORTED))
+        command.answer(Answer(False, values, text=text, status=GoalStatus.ABORTED))
 
     def abort(self, why: str) -> None:
         """End all goals of clients as aborted, and all services that wait."""
@@ -80,7 +79,7 @@ class Obedience:
             if endpoint is None:
                 goal.command.answer(Answer(False, {}, text=why))
             else:
-                goal.command.answer(Answer(True, _aborted(endpoint.type, why), status=ABORTED))
+                goal.command.answer(Answer(True, _aborted(endpoint.type, why), status=GoalStatus.ABORTED))
         self._robot.goals.clear()
 
     def after_tick(self) -> None:
@@ -103,5 +102,5 @@ def _aborted(action: str, why: str) -> Values:
     empty = from_json(definition(f"{action}_Result"), {})
     known: Values = {"error_code": int(ErrorCode.INVALID_GOAL), "error_string": why}
     if "result" in empty:
-        known["result"] = {"result": OPERATION_FAILED, "error_message": why}
+        known["result"] = {"result": Result.FAILED, "error_message": why}
     return {name: known.get(name, value) for name, value in empty.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Sequence
 from functools import cached_property
 from types import SimpleNamespace
@@ -18,7 +17,7 @@ from manipcli.record import messages
 from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.channels import ControllerChannel, Recorded, channel_table
 from manipcli.record.definition import read_definition
-from manipcli.record.json_message import definition, to_json
+from manipcli.record.json_message import compact, definition, to_json
 from manipcli.record.records import MESSAGE_HEAD, PAYLOAD
 from manipcli.record.selection import Selection, word
 from manipcli.record.write.block import Block
@@ -111,7 +110,7 @@ class Publisher:
     def text(self, topic: str, data: bytes) -> str:
         """The `publish` operation of a message in CDR."""
         message = to_json(self._kinds[topic], data)
-        return json.dumps({"op": "publish", "topic": topic, "msg": message}, separators=(",", ":"), allow_nan=False)
+        return compact({"op": "publish", "topic": topic, "msg": message})
 
 
 def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]) -> tuple[tuple[str, bytes], ...]:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
+from manipcli.live.names import GoalStatus
 from manipcli.live.remote import Remote, RemoteFailed
-
-STATUS: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
-"""Words of action_msgs/GoalStatus, by number."""
 
 
 @dataclass(frozen=True, slots=True)
 class GoalResult:
-    """How a goal ended: a word of `STATUS`, and the values of the result."""
+    """How a goal ended: a word of `GoalStatus`, and the values of the result."""
 
     status: str
     values: dict[str, Any]
@@ -57,7 +55,7 @@ class RemoteGoal:
                 if message.get("result") is False:
                     raise RemoteFailed("LIVE191", f"{self._action}: goal refused: {values}")
                 status = message.get("status")
-                word = STATUS[status] if isinstance(status, int) and 0 <= status < len(STATUS) else STATUS[0]
+                word = next((each.name for each in GoalStatus if each == status), GoalStatus.UNKNOWN.name)
                 yield GoalResult(word, values if isinstance(values, dict) else {})
                 return
         raise RemoteFailed("LIVE193", f"{self._action}: no result within {patience:g} s", hint="wait longer: --timeout")

@@ -31,7 +31,7 @@ READ: Final = 4096
 """[byte] Read from one client at once: small frames and pings of more would keep the others waiting."""
 MAX_REASON: Final = 120
 """Longest reason of a close [byte]; 123 in the protocol."""
-TOLD: Final = 5.0
+REPORT_PERIOD: Final = 5.0
 """[s] Between two warnings that messages are dropped."""
 
 
@@ -154,7 +154,7 @@ class LiveServer:
         """Send what waits; disconnect a client that does not read."""
         from websockets.exceptions import ConnectionClosed
 
-        told = time.monotonic()
+        reported = time.monotonic()
         try:
             while True:
                 await client.outbox.ready.wait()
@@ -164,8 +164,8 @@ class LiveServer:
                 for text in client.outbox.take():
                     async with asyncio.timeout(self._unread):
                         await connection.send(text)
-                if time.monotonic() - told > TOLD:
-                    told = time.monotonic()
+                if time.monotonic() - reported > REPORT_PERIOD:
+                    reported = time.monotonic()
                     for line in client.report_drops():
                         self.publish(ROSOUT, line)
         except TimeoutError:

@@ -15,6 +15,7 @@ from manipcli.live.access import Access, query
 from manipcli.live.feed import FAST_PERIOD, Feed
 from manipcli.live.interface import endpoints_of, offer_of
 from manipcli.live.loop import Outside
+from manipcli.live.names import DEFAULT_PORT
 from manipcli.live.network_process import NetworkProcess
 from manipcli.live.offer import CLOCK
 from manipcli.live.pace import Pace
@@ -26,8 +27,6 @@ from manipcli.task.task import Task
 if TYPE_CHECKING:
     from manipcli.live.outlet import OutletOptions
 
-DEFAULT_PORT: Final = 9090
-"""rosbridge's."""
 WATCHED: Final = 500
 """Ticks between two looks at the process of the network."""
 

@@ -41,7 +41,7 @@ def serve(runner: Runner) -> None:
         runner = replace(runner, environment={**runner.environment, "TMPDIR": name})
         live = LiveTools(runner)
         for tool in (*Tools(runner).all, *live.all):
-            server.add_tool(_told(tool), structured_output=False)
+            server.add_tool(_answering(tool), structured_output=False)
         asyncio.run(_run(server, live, lambda: shutil.rmtree(name, ignore_errors=True)))
 
 
@@ -60,18 +60,18 @@ async def _run(server: Any, live: LiveTools, clean: Callable[[], None]) -> None:
     serving.result()
 
 
-def _told(tool: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:
+def _answering(tool: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:
     """The tool, with its failures as errors of the protocol that the model reads."""
     from mcp.types import CallToolResult, TextContent
 
     @functools.wraps(tool)
-    async def told(*arguments: Any, **named: Any) -> Any:
+    async def answering(*arguments: Any, **named: Any) -> Any:
         try:
             return await tool(*arguments, **named)
         except Failed as error:
             return CallToolResult(content=[TextContent(type="text", text=str(error))], is_error=True)
 
-    return told
+    return answering
 
 
 def _library() -> Any:

@@ -6,6 +6,7 @@ As in rosbridge: an object with all fields, `uint8[]` as base64 text, NaN and in
 from __future__ import annotations
 
 import base64
+import json
 import math
 import re
 from functools import cache
@@ -191,3 +192,8 @@ def _word(value: object) -> str:
         return {None: "null", True: "true", False: "false"}[value]
     text = repr(value) if not isinstance(value, int) or abs(value) < 2**64 else "a number of many digits"
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def compact(message: object) -> str:
+    """JSON without spaces."""
+    return json.dumps(message, separators=(",", ":"), allow_nan=False)

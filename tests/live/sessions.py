@@ -113,7 +113,7 @@ def serving(
     finally:
         over.set()
         thread.join(60)
-    assert failures == []
+    assert failures == [], failures
     return log
 
 

@@ -6,12 +6,14 @@ import json
 from collections import deque
 from typing import Any
 
+import numpy as np
 import pytest
 
 from manipcli.live.client import UNSUPPORTED, Client
 from manipcli.live.command import Answer, Command
 from manipcli.live.connection import Services
 from manipcli.live.interface import Offer
+from manipcli.live.outbox import Subscription
 from manipcli.live.rosapi import Rosapi
 
 FOLLOW = "control_msgs/action/FollowJointTrajectory"
@@ -140,6 +142,15 @@ def test_dropped_messages_are_counted_on_rosout_and_in_a_status() -> None:
         "/joint_states: 3 messages were dropped; read faster or throttle"
     ]
     assert peer.client.report_drops() == []
+
+
+def test_a_throttled_topic_has_at_most_two_messages_more_than_its_rate_allows() -> None:
+    times = np.cumsum(np.random.default_rng(1).exponential(0.007, 2000))
+    subscription = Subscription("/a", 0.02, deque(maxlen=1))
+    sent = times[[subscription.offer("", now) for now in times]]
+    assert len(sent) > 0.9 * times[-1] / 0.02
+    for n in range(3, 100):
+        assert np.min(sent[n:] - sent[:-n]) > 0.02 * (n - 2)
 
 
 def test_every_service_that_is_listed_has_a_type_with_a_request_and_a_response() -> None:

@@ -182,7 +182,7 @@ def test_a_session_whose_network_is_killed_ends_and_its_log_is_complete(tmp_path
         await client.socket.wait_closed()
         await asyncio.sleep(1.0)  # the control loop notices it, too
 
-    with pytest.raises(AssertionError):  # of a session with a failure
+    with pytest.raises(AssertionError, match="ended by signal 9"):
         serving(tmp_path, use)
     log = tmp_path / "session.mcap"
     assert not open_topics(log).faults

@@ -12,6 +12,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Sample, Seed, seconds
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+from manipcli.live.names import DEFAULT_PORT
 
 if TYPE_CHECKING:
     from manipcli.live.outlet import OutletOptions
@@ -31,7 +32,7 @@ def serve(
     ] = None,
     port: Annotated[
         int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port of the server; 0 is any free port.")
-    ] = 9090,
+    ] = DEFAULT_PORT,
     page_port: Annotated[
         int | None,
         typer.Option(

@@ -14,6 +14,7 @@ from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.fields import MAX_NAME
 from manipcli.live.live_robot import LiveRobot
+from manipcli.live.names import title
 from manipcli.record.json_message import definition, from_json
 from manipcli.spec.controllers import ControllerSpec, Interface
 from manipcli.spec.ros.write import type_in_ros, types_in_ros
@@ -43,17 +44,15 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoin
 
 
 def _service(name: str, handle: Any, *, reads: bool = False) -> Endpoint:
-    kind = "".join(map(str.title, name.split("_")))
-    return Endpoint(
-        "service", f"/controller_manager/{name}", f"controller_manager_msgs/srv/{kind}", handle, reads=reads
-    )
+    kind = f"controller_manager_msgs/srv/{title(name)}"
+    return Endpoint("service", f"/controller_manager/{name}", kind, handle, reads=reads)
 
 
 def list_controllers(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """The response of controller_manager_msgs/ListControllers: the loaded controllers."""
     manager = robot.manager
     loaded = manager.list()
-    active = [manager[info.name] for info in loaded if info.state == "active"]
+    active = [manager[info.name] for info in loaded if manager.is_active(info.name)]
     chained = {target_of(controller) for controller in active}
     found = []
     for info in loaded:
@@ -104,11 +103,11 @@ def _list_types(robot: LiveRobot, command: Command, request: dict[str, Any]) -> 
 def _list_interfaces(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """Interfaces of all moving joints, commands of those that follow no other, and of controllers with references."""
     manager = robot.manager
-    active = [manager[info.name] for info in manager.list() if info.state == "active"]
+    active = [manager[info.name] for info in manager.list() if manager.is_active(info.name)]
     claimed = {f"{joint}/{interface}" for joint, interface in Claims.of(active).owners}
     names = dict.fromkeys(_commandable(robot), True)
     for info in manager.list():
-        names |= dict.fromkeys(_references(manager[info.name]), info.state == "active")
+        names |= dict.fromkeys(_references(manager[info.name]), manager.is_active(info.name))
     commands = [_interface(name, available, claimed=name in claimed) for name, available in names.items()]
     states = [_interface(f"{joint}/{word}", True) for joint in manager.joints for word in MEASURED]
     return {"command_interfaces": commands, "state_interfaces": states}

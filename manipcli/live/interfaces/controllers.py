@@ -4,62 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol, TypeGuard
-
-import numpy.typing as npt
+from typing import Any, Final
 
 from manipcli.control.action import Feedback, GoalHandle, refuse_inactive
 from manipcli.control.controller import Controller
-from manipcli.control.roles import is_follower, is_hand
+from manipcli.control.roles import is_commanded, is_follower, is_hand, is_referenced
 from manipcli.core.errors import InvalidArgument
 from manipcli.live.command import Answer, Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.goals import action_goal, gripper_goal, topic_goal
 from manipcli.live.live_robot import LiveRobot
+from manipcli.live.names import GoalStatus
 from manipcli.record import schemas
 from manipcli.record.json_message import definition, to_json
 from manipcli.run.run_log import action_of
 from manipcli.task.task import Task
 
-ABORTED: Final = 6
-STATUS: Final = {"succeeded": 4, "canceled": 5, "aborted": ABORTED}
-"""action_msgs/GoalStatus of a goal that ended."""
-_FOLLOW = "control_msgs/action/FollowJointTrajectory"
-_GRIP = "control_msgs/action/ParallelGripperCommand"
-
-
-class Commanded(Controller, Protocol):
-    """A controller that takes one value per joint."""
-
-    def set_command(self, values: npt.ArrayLike) -> None:
-        """Set the command from the next update on.
-
-        Raises:
-            InvalidArgument: not one finite number per joint.
-        """
-        ...
-
-
-class Referenced(Controller, Protocol):
-    """A controller with one reference per joint, and its rate."""
-
-    def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
-        """Set the reference from the next update on.
-
-        Raises:
-            InvalidArgument: not one finite number per joint, or rates where it has none.
-        """
-        ...
-
-
-def is_referenced(controller: Controller) -> TypeGuard[Referenced]:
-    """Whether it has a topic for references."""
-    return hasattr(controller, "set_reference")
-
-
-def is_commanded(controller: Controller) -> TypeGuard[Commanded]:
-    """Whether it has a topic for commands."""
-    return hasattr(controller, "set_command")
+_FOLLOW: Final = "control_msgs/action/FollowJointTrajectory"
+_GRIP: Final = "control_msgs/action/ParallelGripperCommand"
 
 
 def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoint]:
@@ -77,13 +39,18 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoin
             yield Endpoint("topic", f"/{name}/reference", "control_msgs/msg/MultiDOFCommand", _refer)
 
 
+def node_of(command: Command) -> str:
+    """The controller under whose name a command was sent."""
+    return command.name.strip("/").rpartition("/")[0]
+
+
 def controller_of(robot: LiveRobot, command: Command) -> Controller:
-    """The controller under whose name a command was sent.
+    """The same as an object.
 
     Raises:
         InvalidArgument: it is not loaded.
     """
-    return robot.manager[command.name.strip("/").rpartition("/")[0]]
+    return robot.manager[node_of(command)]
 
 
 def _follow_topic(robot: LiveRobot, command: Command, message: dict[str, Any]) -> None:
@@ -135,8 +102,7 @@ def refuse_unless_active(robot: LiveRobot, controller: Controller) -> None:
     Raises:
         GoalRejected: the controller is not active.
     """
-    active = any(info.name == controller.name and info.state == "active" for info in robot.manager.list())
-    refuse_inactive(controller.name, active)
+    refuse_inactive(controller.name, robot.manager.is_active(controller.name))
 
 
 def _accept(robot: LiveRobot, command: Command, controller: str, handle: GoalHandle, *, gripper: bool) -> None:
@@ -166,7 +132,7 @@ class ControllerGoal:
             values: Values = {"state": state, "stalled": result.stalled, "reached_goal": result.reached_goal}
         else:
             values = {"error_code": int(result.code), "error_string": result.text}
-        return Answer(True, values, status=STATUS[result.status])
+        return Answer(True, values, status=GoalStatus[result.status.upper()])
 
     def _feedback(self, feedback: Feedback) -> Values:
         """The `feedback` of the message that the log has, by the same encoder."""

@@ -64,7 +64,7 @@ class _EmergencyStop:
             return {"success": False, "message": "there is no emergency stop to release"}
         manager.locked = ""
         for hand in self._hands:
-            _accept_goals(hand, yes=any(info.name == hand.name and info.state == "active" for info in manager.list()))
+            _accept_goals(hand, yes=manager.is_active(hand.name))
         switched = manager.switch(activate=self._stopped, strictness="best_effort", time=robot.time)
         text = "; ".join((f"emergency stop released: {listed(switched.activated)} activated", *switched.messages))
         robot.event("emergency_stop_released", text)

@@ -12,9 +12,10 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import did_you_mean
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces.simulation import FAILED, NOT_FOUND, OK, PACKAGE, UNSUPPORTED, result
+from manipcli.live.interfaces.simulation import PACKAGE, result
 from manipcli.live.live_robot import LiveRobot
 from manipcli.live.name_pattern import BadPattern, matches
+from manipcli.live.names import Result
 from manipcli.live.placing import misplaced
 from manipcli.record.cdr import NS_PER_S
 from manipcli.record.json_message import definition, from_json
@@ -61,14 +62,14 @@ def _states(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Valu
 def _info(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     name = request["entity"]
     if unknown := _unknown(robot, name):
-        return result(NOT_FOUND, unknown, info=_NO_INFO)
+        return result(Result.NOT_FOUND, unknown, info=_NO_INFO)
     return result(info=_info_of(robot, name))
 
 
 def _state(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     name = request["entity"]
     if unknown := _unknown(robot, name):
-        return result(NOT_FOUND, unknown, state=_NO_STATE)
+        return result(Result.NOT_FOUND, unknown, state=_NO_STATE)
     return result(state=_state_of(robot, name))
 
 
@@ -76,14 +77,14 @@ def _set_state(robot: LiveRobot, command: Command, request: dict[str, Any]) -> V
     """Put a movable body elsewhere; an event in the log says where it was put, or why not."""
     name, state = request["entity"], request["state"]
     if unknown := _unknown(robot, name):
-        return result(NOT_FOUND, unknown)
+        return result(Result.NOT_FOUND, unknown)
     position, quat = _vector(state["pose"]["position"]), _vector(state["pose"]["orientation"], "xyzw")
     twist = np.concatenate([_vector(state["twist"][word]) for word in ("linear", "angular")])
     frame = state["header"]["frame_id"]
     if frame not in ("", "world"):
-        why, code = f"the pose is in frame '{frame[:80]}'; expected world", UNSUPPORTED
+        why, code = f"the pose is in frame '{frame[:80]}'; expected world", Result.UNSUPPORTED
     else:
-        why, code = misplaced(robot, name, position, quat, twist), FAILED
+        why, code = misplaced(robot, name, position, quat, twist), Result.FAILED
     if why:
         robot.event("refused", f"{command.op} {command.name}: '{name}': {why}", outcome="error")
         return result(code, f"'{name}': {why}")
@@ -102,11 +103,11 @@ def _unknown(robot: LiveRobot, name: str) -> str:
 def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> tuple[list[str], int, str]:
     """The names of the entities that pass all filters; a code, and why a filter is not carried out."""
     if filters["bounds"]["type"] or filters["bounds"]["points"]:
-        return [], UNSUPPORTED, "a filter by bounds is not supported"
+        return [], Result.UNSUPPORTED, "a filter by bounds is not supported"
     try:
         named = {name for name in _names(robot) if matches(filters["filter"], name)}
     except BadPattern as error:
-        return [], FAILED, str(error)
+        return [], Result.FAILED, str(error)
     categories = {each["category"] for each in filters["categories"]}
     tags, all_tags = set(filters["tags"]["tags"]), filters["tags"]["filter_mode"] == ALL_TAGS
     found = []
@@ -116,7 +117,7 @@ def _matching(robot: LiveRobot, filters: Mapping[str, Any]) -> tuple[list[str], 
         tagged = not tags or (tags <= own if all_tags else bool(tags & own))
         if name in named and tagged and (not categories or info["category"]["category"] in categories):
             found.append(name)
-    return found, OK, ""
+    return found, Result.OK, ""
 
 
 def _info_of(robot: LiveRobot, name: str) -> Values:

@@ -10,7 +10,9 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
+from manipcli.live.interfaces.controllers import node_of
 from manipcli.live.live_robot import LiveRobot
+from manipcli.live.names import title
 from manipcli.live.parameter import (
     DOUBLE,
     FIELDS,
@@ -45,16 +47,6 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoin
             yield Endpoint("service", f"/{controller.name}/{word}", kind, handle, reads=reads)
 
 
-def title(word: str) -> str:
-    """`GetParam` of `get_param`."""
-    return "".join(map(str.title, word.split("_")))
-
-
-def _node(command: Command) -> str:
-    """The controller whose service is called."""
-    return command.name.strip("/").rpartition("/")[0]
-
-
 def _few(items: list[T]) -> list[T]:
     """
     Raises:
@@ -69,7 +61,7 @@ def _list(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values
     """Names below the prefixes; depth 0: all, 1: without a dot after the prefix."""
     depth = request["depth"]
     found = []
-    for name in parameter_names(robot.manager, _node(command)):
+    for name in parameter_names(robot.manager, node_of(command)):
         for prefix in _few(request["prefixes"]) or [""]:
             below = name.removeprefix(f"{prefix}.") if prefix else name
             is_below = not prefix or name == prefix or below != name
@@ -82,7 +74,7 @@ def _list(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values
 
 def _get(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """The values; one that does not exist is not set."""
-    node = _node(command)
+    node = node_of(command)
     return {"values": [_value(parameter_of(robot.manager, node, name)) for name in _few(request["names"])]}
 
 
@@ -94,14 +86,14 @@ def _value(parameter: Parameter | None) -> Values:
 
 
 def _types(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
-    each = [parameter_of(robot.manager, _node(command), name) for name in _few(request["names"])]
+    each = [parameter_of(robot.manager, node_of(command), name) for name in _few(request["names"])]
     return {"types": [NOT_SET if parameter is None else parameter.type for parameter in each]}
 
 
 def _describe(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     found = []
     for name in _few(request["names"]):
-        parameter = known(robot.manager, _node(command), name)
+        parameter = known(robot.manager, node_of(command), name)
         values: Values = {
             "name": name, "type": parameter.type, "description": parameter.description,
             "read_only": parameter.read_only,
@@ -116,12 +108,12 @@ def _set(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """Each by itself; what is refused is an event, too."""
     every = _few(request["parameters"])
     suggest = len(every) == 1
-    return {"results": [_tried(robot, _node(command), [one], suggest=suggest) for one in every]}
+    return {"results": [_tried(robot, node_of(command), [one], suggest=suggest) for one in every]}
 
 
 def _set_atomically(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values:
     """All or none."""
-    return {"result": _tried(robot, _node(command), _few(request["parameters"]))}
+    return {"result": _tried(robot, node_of(command), _few(request["parameters"]))}
 
 
 def _tried(robot: LiveRobot, node: str, parameters: Sequence[dict[str, Any]], *, suggest: bool = True) -> Values:

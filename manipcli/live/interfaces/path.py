@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, Protocol, TypeGuard
+from typing import Any, Final
 
 from manipcli.control.controller import Controller
+from manipcli.control.roles import is_scaled
 from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.core.errors import InvalidArgument
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.interfaces.controllers import controller_of, refuse_unless_active
 from manipcli.live.live_robot import LiveRobot
+from manipcli.record import schemas
 from manipcli.task.task import Task
 
 MOST: Final = 1.0
 """Largest factor: trajectories are checked against the limits at their own speed."""
-_TRIGGER = "std_srvs/srv/Trigger"
-
-
-class Scaled(Controller, Protocol):
-    """A controller whose trajectories have a speed."""
-
-    scaling: SpeedScaling
-
-
-def is_scaled(controller: Controller) -> TypeGuard[Scaled]:
-    """Whether its trajectories have a speed."""
-    return hasattr(controller, "scaling")
 
 
 def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoint]:
@@ -37,8 +27,8 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Iterator[Endpoin
             base = f"/{controller.name}"
             yield Endpoint("topic", f"{base}/speed_scaling", "std_msgs/msg/Float64", _scale)
             yield Endpoint("topic", f"{base}/speed_scaling_input", "control_msgs/msg/SpeedScalingFactor", _scale)
-            yield Endpoint("service", f"{base}/pause", _TRIGGER, _pause)
-            yield Endpoint("service", f"{base}/resume", _TRIGGER, _resume)
+            yield Endpoint("service", f"{base}/pause", schemas.TRIGGER, _pause)
+            yield Endpoint("service", f"{base}/resume", schemas.TRIGGER, _resume)
 
 
 def _scaling(robot: LiveRobot, command: Command) -> SpeedScaling:

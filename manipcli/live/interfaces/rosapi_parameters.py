@@ -13,8 +13,8 @@ from manipcli.core.text import did_you_mean
 from manipcli.live.command import Command, Values
 from manipcli.live.endpoint import Endpoint
 from manipcli.live.fields import MAX_NAME
-from manipcli.live.interfaces.parameters import title
 from manipcli.live.live_robot import LiveRobot
+from manipcli.live.names import title
 from manipcli.live.parameter import STRING, Parameter, change, known, parameter_names
 from manipcli.task.task import Task
 

@@ -13,17 +13,12 @@ from manipcli.control.controller import Controller
 from manipcli.core.version import __version__
 from manipcli.live.command import SEND_GOAL, Answer, Command, Values
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces.controllers import ABORTED, STATUS
 from manipcli.live.live_robot import LiveRobot
+from manipcli.live.names import GoalStatus, Result
 from manipcli.live.play_state import FIRST, PAUSED, PLAYING, QUITTING, SET_STATE, STATES, STOPPED, Reset
 from manipcli.task.task import Task
 
 PACKAGE: Final = "simulation_interfaces"
-UNSUPPORTED: Final = 0
-OK: Final = 1
-NOT_FOUND: Final = 2
-FAILED: Final = 4
-"""Codes of simulation_interfaces/Result."""
 ALREADY: Final = 101
 INCORRECT: Final = 103
 """Further codes of SetSimulationState."""
@@ -56,7 +51,7 @@ def endpoints(task: Task, controllers: Sequence[Controller]) -> Sequence[Endpoin
     )
 
 
-def result(code: int = OK, text: str = "", **values: object) -> Values:
+def result(code: int = Result.OK, text: str = "", **values: object) -> Values:
     """A response with a simulation_interfaces/Result."""
     return {"result": {"result": code, "error_message": text}, **values}
 
@@ -97,7 +92,9 @@ def _set_state(robot: LiveRobot, command: Command, request: dict[str, Any]) -> V
 def _reset(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values | None:
     scope = request["scope"]
     if scope not in WHOLE:
-        return result(UNSUPPORTED, f"a reset of scope {scope} is not supported; time and state are reset together: 0")
+        return result(
+            Result.UNSUPPORTED, f"a reset of scope {scope} is not supported; time and state are reset together: 0"
+        )
     _restart(robot, command, robot.play.state)
     return None
 
@@ -116,8 +113,8 @@ def _step(robot: LiveRobot, command: Command, request: dict[str, Any]) -> Values
     elif play.steps:
         why = f"{play.steps} steps of another request remain"
     if why or not steps:
-        code = FAILED if why else OK
-        status = None if command.op != SEND_GOAL else ABORTED if why else STATUS["succeeded"]
+        code = Result.FAILED if why else Result.OK
+        status = None if command.op != SEND_GOAL else GoalStatus.ABORTED if why else GoalStatus.SUCCEEDED
         command.answer(Answer(True, result(code, why), status=status))
         return None
     play.state, play.steps = PAUSED, steps
@@ -137,17 +134,17 @@ class Steps:
     def cancel(self) -> None:
         self.robot.play.steps = 0
         self.robot.goals.remove(self)  # no tick follows that could send the result
-        self.command.answer(self._ended("canceled", "canceled"))
+        self.command.answer(self._ended(GoalStatus.CANCELED, "canceled"))
 
     def step(self, *, due: bool) -> Answer | None:
         self.done += 1
         if self.robot.play.state == PLAYING:
-            return self._ended("aborted", "the simulation was set to play")
+            return self._ended(GoalStatus.ABORTED, "the simulation was set to play")
         if self.done == self.steps:
-            return Answer(True, result(), status=STATUS["succeeded"])
+            return Answer(True, result(), status=GoalStatus.SUCCEEDED)
         if self.command.op != SEND_GOAL or not (due or self.steps <= EACH_STEP):
             return None
         return Answer(True, {"completed_steps": self.done, "remaining_steps": self.steps - self.done})
 
-    def _ended(self, status: str, why: str) -> Answer:
-        return Answer(True, result(FAILED, f"{why} after {self.done} of {self.steps} steps"), status=STATUS[status])
+    def _ended(self, status: GoalStatus, why: str) -> Answer:
+        return Answer(True, result(Result.FAILED, f"{why} after {self.done} of {self.steps} steps"), status=status)

@@ -9,14 +9,12 @@ from typing import Any, Final
 from manipcli.control.controller import Controller
 from manipcli.live.command import Answer, Command, Values
 from manipcli.live.endpoint import Endpoint
-from manipcli.live.interfaces.controllers import ABORTED, STATUS
 from manipcli.live.live_robot import LiveRobot
 from manipcli.live.live_steps import LiveSteps, StepRequest
+from manipcli.live.names import CHECK_STEP, RUN_STEP, GoalStatus
 from manipcli.task.task import Task
 
-RUN_STEP: Final = "/task/run_step"
-CHECK_STEP: Final = "/task/check_step"
-_STATUS = {"done": STATUS["succeeded"], "canceled": STATUS["canceled"]}
+_STATUS: Final = {"done": GoalStatus.SUCCEEDED, "canceled": GoalStatus.CANCELED}
 
 
 def endpoints(task: Task, controllers: Sequence[Controller]) -> Sequence[Endpoint]:
@@ -68,4 +66,4 @@ class StepGoal:
         margin, unit = end.margin or (None, "")
         values: Values = {"id": self.request.id, "outcome": end.outcome, "text": end.text}
         values |= {"margin": margin, "unit": unit}
-        return Answer(True, values, status=_STATUS.get(end.outcome, ABORTED))
+        return Answer(True, values, status=_STATUS.get(end.outcome, GoalStatus.ABORTED))

@@ -12,11 +12,10 @@ from manipcli.core.geometry import Array
 from manipcli.live import command as words
 from manipcli.live.command import Command
 from manipcli.live.offer import Offer, goal_type
-from manipcli.live.page.service_calls import compact
 from manipcli.model.configuration import position_limits
 from manipcli.model.robot import RobotModel
 from manipcli.record.channels import ControllerChannel, Recorded
-from manipcli.record.json_message import definition, from_json
+from manipcli.record.json_message import compact, definition, from_json
 
 SHARE: Final = 0.5
 """Of the velocity limits, which a motion of the page uses."""

@@ -202,7 +202,7 @@ class LivePage(LocalServer, Outlet):
         for visitor in list(self._visitors.values()):
             visitor.update(snapshot, now)
         if news or not self._messages.content:
-            self._tell()
+            self._show_events()
         due = now - self._timed >= ASKING
         if due:
             self._timed = now
@@ -224,7 +224,7 @@ class LivePage(LocalServer, Outlet):
         (before, first), (now, last) = self._clock[0], self._clock[-1]
         return (last - first) / (now - before) if now > before and last >= first else None
 
-    def _tell(self) -> None:
+    def _show_events(self) -> None:
         story = self._story
         self._messages.content = texts.messages(story.messages)
         self._steps.content = texts.steps(story.steps)

@@ -13,7 +13,6 @@ from manipcli.live.page.drive import Drive
 from manipcli.live.page.service_calls import (
     EMERGENCY_STOP,
     PAUSE,
-    PLAYING,
     RELEASE,
     STEP,
     STEP_TIME,
@@ -21,6 +20,7 @@ from manipcli.live.page.service_calls import (
     service_of,
 )
 from manipcli.live.page.snapshot import Snapshot
+from manipcli.live.play_state import PLAYING
 from manipcli.model.robot import RobotModel
 from manipcli.replay.view.view import add_layers, joint_slider
 from manipcli.replay.view.viser_scene import ViserScene

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from manipcli.live import command as words
 from manipcli.live.command import Answer, Command, nobody
+from manipcli.live.names import GoalStatus, Result
 from manipcli.live.offer import Offer, request_type
-from manipcli.record.json_message import definition, from_json
+from manipcli.live.play_state import PAUSED, PLAYING
+from manipcli.record.json_message import compact, definition, from_json
 
-EMERGENCY_STOP: Final = "/emergency_stop"
-RELEASE: Final = "/emergency_stop_release"
+EMERGENCY_STOP: Final = words.STOP
+RELEASE: Final = words.RELEASE
 SWITCH: Final = "controller_manager_msgs/srv/SwitchController"
 LIST: Final = "controller_manager_msgs/srv/ListControllers"
 GET_STATE: Final = "simulation_interfaces/srv/GetSimulationState"
 SET_STATE: Final = "simulation_interfaces/srv/SetSimulationState"
 STEP_SIMULATION: Final = "simulation_interfaces/srv/StepSimulation"
 RESET_SIMULATION: Final = "simulation_interfaces/srv/ResetSimulation"
-PLAYING: Final = 1
-PAUSED: Final = 2
-"""simulation_interfaces/SimulationState"""
 STEP_TIME: Final = 0.1
 """[s] Of the button Step."""
 PLAY, PAUSE, STEP, RESET = "Play", "Pause", "Step", "Reset"
@@ -32,9 +30,6 @@ BUTTONS: Final[Mapping[str, tuple[str, Mapping[str, Any]]]] = {
     RESET: (RESET_SIMULATION, {}),
 }
 """Buttons of the simulation: the type of a service, and the request."""
-SUCCEEDED: Final = 4
-OK: Final = 1
-"""action_msgs/GoalStatus and simulation_interfaces/Result"""
 
 
 def service_of(offer: Offer, kind: str) -> str | None:
@@ -71,16 +66,11 @@ def failure(answer: Answer) -> str | None:
     values = answer.values
     if not answer.ok:
         return answer.text or "refused"
-    if answer.status not in (None, SUCCEEDED):
+    if answer.status not in (None, GoalStatus.SUCCEEDED):
         return str(values.get("error_string") or answer.text) or None
     result = values.get("result")
-    if isinstance(result, dict) and result.get("result", OK) != OK:
+    if isinstance(result, dict) and result.get("result", Result.OK) != Result.OK:
         return str(result.get("error_message") or "refused")
     if values.get("ok") is False or values.get("success") is False:
         return str(values.get("message") or "refused")
     return None
-
-
-def compact(message: object) -> str:
-    """JSON without spaces."""
-    return json.dumps(message, separators=(",", ":"), allow_nan=False)

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from typing import Final
 
-from manipcli.live.page.service_calls import PAUSED
 from manipcli.live.page.snapshot import ACTIVE, ENDED, RESETTING, Snapshot
+from manipcli.live.play_state import PAUSED
 
 READ_ONLY: Final = "Read only: open the address with <code>?token=</code> that <code>manipcli serve</code> printed."
 STOPPED: Final = (

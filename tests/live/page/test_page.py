@@ -123,8 +123,11 @@ def test_without_the_token_there_is_nothing_to_command_with(served: Served) -> N
             if "value" in one:
                 reader.set(uuid, value=0.1)
         reader.send(type="GuiFormDirtyMessage", uuid="x")
-        before = time.monotonic()
-        assert served.live(visitor, lambda: time.monotonic() - before > 0.5) == []
+        reader.socket.send("not of the protocol")
+        with pytest.raises(ConnectionClosed):  # all that was sent before it has been read
+            reader.until(lambda: False)
+        served.ticks += 100_000
+        assert served.live(visitor, lambda: f"t = {served.ticks // 1000}." in visitor.text) == []
 
 
 def test_who_may_enter(served: Served) -> None:
@@ -171,7 +174,9 @@ def test_an_error_of_the_page_is_shown_and_the_page_goes_on(served: Served, monk
         served.live(reader, lambda: now[:-3] in reader.text)
 
 
-def test_no_state_is_wanted_while_no_browser_is_connected(served: Served) -> None:
+def test_no_state_is_wanted_while_no_browser_is_connected(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    for interval in ("IDLE", "ASKING"):
+        monkeypatch.setattr(f"manipcli.live.page.page.{interval}", 0.005)
     with Visitor(served.page.port) as reader:
         served.live(reader, served.page.watches)
     end = time.monotonic() + 10.0
@@ -180,7 +185,7 @@ def test_no_state_is_wanted_while_no_browser_is_connected(served: Served) -> Non
         time.sleep(0.01)
     while not served.commands.empty():
         served.tick()
-    time.sleep(0.6)
+    time.sleep(0.05)  # ten passes of the page
     assert served.commands.empty(), "no questions either"
 
 
