@@ -26,7 +26,7 @@ from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
 from manipcli.replay.display_sampling import SampledContacts, sampled
-from manipcli.replay.drawing import draw
+from manipcli.render.drawing import draw
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.player import player_page
 from manipcli.shapes.primitives import Mesh

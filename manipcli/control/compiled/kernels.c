@@ -1,4 +1,4 @@
-/* Kernels of the control tick: the laws of manipcli/control for all joints of a controller in one call.
+/* Kernels of the control tick, the laws of manipcli/control for all joints of a controller in one call, and of pictures.
  *
  * Each kernel computes what a law in Python computes with numpy, operation by operation and in the same order, so that
  * both give the same bits: no fused multiply-add (-ffp-contract=off), no sums over joints. The law in Python is the
@@ -354,6 +354,106 @@ static const char *wrong_rows(const Kernel *self)
     return NULL;
 }
 
+/* raster: the triangles of surfaces seen by a pinhole camera, in a depth buffer. run()
+ *
+ * Homogeneous edge functions, so that no triangle is clipped: with A, B, C in the camera's frame and a ray d = (x, y, 1),
+ * the weights of the corners are d.(BxC), d.(CxA) and d.(AxB), of one sign within the triangle, and the depth is
+ * A.(BxC) over their sum. The edge of two triangles has the same value with the other sign in the other one, so that no
+ * ray passes between them. */
+static PyObject *run_raster(Kernel *self, PyObject *const *args)
+{
+    enum { VERTICES, NORMALS, FACES, FIRST_VERTEX, FIRST_FACE, POSES, LIGHTS, SHOWN, LENS, COLUMNS, ROWS, POINTS, DEPTH,
+           FACE, SHADE };
+    const double *vertices = doubles(self, VERTICES), *normals = doubles(self, NORMALS), *poses = doubles(self, POSES);
+    const double *lights = doubles(self, LIGHTS), *lens = doubles(self, LENS);
+    const double *columns = doubles(self, COLUMNS), *rows = doubles(self, ROWS);
+    const int64_t *faces = integers(self, FACES), *first_vertex = integers(self, FIRST_VERTEX);
+    const int64_t *first_face = integers(self, FIRST_FACE);
+    const unsigned char *shown = flags(self, SHOWN);
+    double *points = doubles(self, POINTS), *depth = doubles(self, DEPTH), *shade = doubles(self, SHADE);
+    int64_t *face = integers(self, FACE);
+    const double fx = lens[0], fy = lens[1], cx = lens[2], cy = lens[3], near = lens[4], margin = lens[5];
+    Size width = length(self, COLUMNS), height = length(self, ROWS);
+    (void)args;
+    Py_BEGIN_ALLOW_THREADS;
+    for (Size k = 0; k < width * height; k++) {
+        depth[k] = INFINITY;
+        shade[k] = 0.0;
+        face[k] = -1;
+    }
+    for (Size s = 0; s < self->n; s++) {
+        const double *R = poses + 12 * s, *t = R + 9, *light = lights + 3 * s;
+        if (!shown[s]) continue;
+        for (Size k = first_vertex[s]; k < first_vertex[s + 1]; k++) {
+            const double *v = vertices + 3 * k, *normal = normals + 3 * k;
+            double *p = points + 6 * k;
+            for (Size i = 0; i < 3; i++) p[i] = ((R[3 * i] * v[0] + R[3 * i + 1] * v[1]) + R[3 * i + 2] * v[2]) + t[i];
+            p[3] = fx * (p[0] / p[2]) + cx;
+            p[4] = fy * (p[1] / p[2]) + cy;
+            p[5] = (normal[0] * light[0] + normal[1] * light[1]) + normal[2] * light[2];
+        }
+        for (Size f = first_face[s]; f < first_face[s + 1]; f++) {
+            const double *a = points + 6 * faces[3 * f], *b = points + 6 * faces[3 * f + 1];
+            const double *c = points + 6 * faces[3 * f + 2];
+            double left = 0.0, right = (double)(width - 1), top = 0.0, bottom = (double)(height - 1), sign, det;
+            double e[3][3];
+            int ahead = (a[2] > near) + (b[2] > near) + (c[2] > near);
+            if (ahead == 0) continue;
+            if (ahead == 3) { /* else the projection of the corners does not bound that of the triangle */
+                left = larger(left, ceil(smaller(smaller(a[3], b[3]), c[3]) - margin));
+                right = smaller(right, floor(larger(larger(a[3], b[3]), c[3]) + margin));
+                top = larger(top, ceil(smaller(smaller(a[4], b[4]), c[4]) - margin));
+                bottom = smaller(bottom, floor(larger(larger(a[4], b[4]), c[4]) + margin));
+            }
+            if (!(left <= right && top <= bottom)) continue;
+            for (Size i = 0; i < 3; i++) {
+                Size j = (i + 1) % 3, k = (i + 2) % 3;
+                e[0][i] = b[j] * c[k] - b[k] * c[j];
+                e[1][i] = c[j] * a[k] - c[k] * a[j];
+                e[2][i] = a[j] * b[k] - a[k] * b[j];
+            }
+            det = (a[0] * e[0][0] + a[1] * e[0][1]) + a[2] * e[0][2];
+            if (det == 0.0) continue;
+            sign = det > 0.0 ? 1.0 : -1.0; /* positive: seen from inside */
+            for (Size y = (Size)top; y <= (Size)bottom; y++)
+                for (Size x = (Size)left; x <= (Size)right; x++) {
+                    double u = sign * ((e[0][0] * columns[x] + e[0][1] * rows[y]) + e[0][2]);
+                    double v = sign * ((e[1][0] * columns[x] + e[1][1] * rows[y]) + e[1][2]);
+                    double w = sign * ((e[2][0] * columns[x] + e[2][1] * rows[y]) + e[2][2]), sum, z;
+                    Size at = y * width + x;
+                    if (!(u >= 0.0 && v >= 0.0 && w >= 0.0)) continue;
+                    sum = (u + v) + w;
+                    z = (sign * det) / sum; /* sum 0: infinite or NaN, never nearer */
+                    if (!(z > near && z < depth[at])) continue;
+                    depth[at] = z;
+                    face[at] = f;
+                    shade[at] = -sign * (((u * a[5] + v * b[5]) + w * c[5]) / sum);
+                }
+        }
+    }
+    Py_END_ALLOW_THREADS;
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_raster(const Kernel *self)
+{
+    const int64_t *vertex = integers(self, 3), *face = integers(self, 4);
+    Size n = self->n, pixels = length(self, 9) * length(self, 10);
+    if (length(self, 0) != length(self, 1) || length(self, 0) % 3 || length(self, 2) % 3) return "expected triples";
+    if (length(self, 3) != n + 1 || length(self, 4) != n + 1) return "expected a first vertex and face of each surface";
+    if (length(self, 5) != 12 * n || length(self, 8) != 6) return "vectors of another length";
+    if (length(self, 11) != 2 * length(self, 0)) return "expected six numbers per point";
+    if (length(self, 12) != pixels || length(self, 13) != pixels || length(self, 14) != pixels) return "wrong picture";
+    if (vertex[0] != 0 || face[0] != 0 || 3 * vertex[n] != length(self, 0) || 3 * face[n] != length(self, 2))
+        return "surfaces do not cover the vertices and faces";
+    for (Size s = 0; s < n; s++) {
+        if (vertex[s] > vertex[s + 1] || face[s] > face[s + 1]) return "surfaces out of order";
+        for (Size k = 3 * face[s]; k < 3 * face[s + 1]; k++)
+            if (integers(self, 2)[k] < vertex[s] || integers(self, 2)[k] >= vertex[s + 1]) return "a wrong vertex";
+    }
+    return NULL;
+}
+
 static const Law LAWS[] = {
     {"errors", "d2d1d1D2", 1, run_errors, NULL},
     {"pid", "d2d2d1d1d1d1d1d1b1d1b1d1d1D1D1d1d1D1b0", 2, run_pid, wrong_pid},
@@ -363,6 +463,7 @@ static const Law LAWS[] = {
     {"window", "d1d1d1d1d1d0d0D0B0", 0, run_window, wrong_window},
     {"actuation", "d0d0i1d1d1d1d1d1d1d2d1d0B1I1D0b0", 0, run_actuation, wrong_actuation},
     {"rows", "|D0d0", 1, run_rows, wrong_rows},
+    {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0", 0, run_raster, wrong_raster},
     {NULL, NULL, 0, NULL, NULL},
 };
 

@@ -16,9 +16,9 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import listed
 from manipcli.description.elements import Inertial, Link
 from manipcli.model.robot import RobotModel
-from manipcli.replay.mesh_surfaces import mesh_surfaces
-from manipcli.replay.placing import Poses
-from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+from manipcli.render.mesh_surfaces import mesh_surfaces
+from manipcli.render.placing import Poses
+from manipcli.render.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere, drawn_once
