@@ -82,6 +82,13 @@ class Kinematics:
         X = self._pin.updateFramePlacement(self._model, self._data, self._frames[link])
         return Transform(R=frozen(X.rotation), p=frozen(X.translation))
 
+    def link_poses(self, q: Array) -> tuple[Array, Array]:
+        """Poses of all links in the world at `q`, in the order of `robot.links`: rotations (l, 3, 3), positions (l, 3)."""
+        self._pin.framesForwardKinematics(self._model, self._data, q)
+        poses = self._data.oMf
+        found = [poses[frame] for frame in self._frames.values()]
+        return np.array([X.rotation for X in found]), np.array([X.translation for X in found])
+
     def jacobian(self, q: Array, link: str, offset: Transform | None = None) -> Array:
         """J_WT (6, n): velocity of frame T (linear, then angular), in world axes, per joint velocity.
 

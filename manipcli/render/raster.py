@@ -13,14 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.compiled import bind
-from manipcli.core.geometry import Array, matrix_from_quat
+from manipcli.core.geometry import Array
 from manipcli.render.lens import Lens
 from manipcli.render.surface import Surface
 
 Indices = npt.NDArray[np.int64]
 
-NEAREST = 1e-3
-"""Nothing nearer than this is seen [m]."""
 MARGIN = 1e-6
 """Of the bounding boxes of triangles [pixel], for rounding; the edges decide."""
 CHUNK = 1 << 20
@@ -35,11 +33,13 @@ class Fragments:
         depth: (h, w) along z of the optical frame [m]; infinite where nothing is.
         face: (h, w) index of the triangle in the order of the surfaces; -1 where nothing is.
         shade: (h, w) cosine between the normal and the light; 0 where nothing is.
+        slope: (h, w) cosine between the normal of the triangle and the ray, times the length of the ray at z = 1.
     """
 
     depth: Array
     face: Indices
     shade: Array
+    slope: Array
 
 
 class Raster:
@@ -48,9 +48,10 @@ class Raster:
     Args:
         surfaces: each in a frame of its own.
         lens: of the camera.
+        near: what is nearer along z is not seen [m]; positive.
     """
 
-    def __init__(self, surfaces: Sequence[Surface], lens: Lens) -> None:
+    def __init__(self, surfaces: Sequence[Surface], lens: Lens, near: float = 1e-3) -> None:
         count = len(surfaces)
         self.first_face = _firsts([len(each.faces) for each in surfaces])
         self._first_vertex = _firsts([len(each.vertices) for each in surfaces])
@@ -58,30 +59,29 @@ class Raster:
         self._normals = _joined([each.normals for each in surfaces], np.float64)
         offset = [each.faces + first for each, first in zip(surfaces, self._first_vertex, strict=False)]
         self._faces = _joined(offset, np.int64)
-        self._centre, self._radius = _balls(surfaces)
-        self._lens = lens
+        self._centre, self._radius = bounding_balls(surfaces)
+        self._lens, self._near = lens, near
         # Columns and rows of a rotation matrix and a translation per surface: of its frame in the optical frame.
         self._poses, self._lights = np.zeros((count, 12)), np.zeros((count, 3))
         self._shown = np.zeros(count, dtype=np.bool_)
         shape = lens.height, lens.width
-        self._seen = Fragments(np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape))
-        settings = np.array([lens.fx, lens.fy, lens.cx, lens.cy, NEAREST, MARGIN])
+        self._seen = Fragments(np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape))
+        settings = np.array([lens.fx, lens.fy, lens.cx, lens.cy, near, MARGIN])
         self._law = (
             *(self._vertices, self._normals, self._faces, self._first_vertex, self.first_face),
             *(self._poses, self._lights, self._shown, settings, lens.columns, lens.rows),
-            *(np.zeros((len(self._vertices), 6)), self._seen.depth, self._seen.face, self._seen.shade),
+            *(np.zeros((len(self._vertices), 6)), self._seen.depth, self._seen.face, self._seen.shade, self._seen.slope),
         )
         self._run = bind("raster", count, *self._law)
 
-    def see(self, position: Array, quat_xyzw: Array, light: Array) -> Fragments:
+    def see(self, rotation: Array, position: Array, light: Array) -> Fragments:
         """The picture of the surfaces at these poses.
 
         Args:
-            position: (s, 3) of each surface's frame in the optical frame [m].
-            quat_xyzw: (s, 4).
+            rotation: (s, 3, 3) of each surface's frame in the optical frame.
+            position: (s, 3) [m].
             light: (3,) unit vector towards the light, in the optical frame.
         """
-        rotation = matrix_from_quat(quat_xyzw)
         self._poses[:, :9] = rotation.reshape(-1, 9)
         self._poses[:, 9:] = position
         self._lights[:] = np.einsum("sij,i->sj", rotation, light)
@@ -96,7 +96,7 @@ class Raster:
     def _in_view(self, centre: Array) -> npt.NDArray[np.bool_]:
         """(s) whether the ball around each surface, at `centre` (s, 3) in the optical frame, meets the view."""
         lens, (x, y, z) = self._lens, centre.T
-        found = z + self._radius > NEAREST
+        found = z + self._radius > self._near
         for across, first, last in (
             (x, (-0.5 - lens.cx) / lens.fx, (lens.width - 0.5 - lens.cx) / lens.fx),
             (y, (-0.5 - lens.cy) / lens.fy, (lens.height - 0.5 - lens.cy) / lens.fy),
@@ -114,7 +114,7 @@ def _joined(arrays: list[npt.NDArray[np.generic]], kind: type[np.generic]) -> np
     return np.ascontiguousarray(np.concatenate([np.zeros((0, 3)), *arrays]), dtype=kind)
 
 
-def _balls(surfaces: Sequence[Surface]) -> tuple[Array, Array]:
+def bounding_balls(surfaces: Sequence[Surface]) -> tuple[Array, Array]:
     """Centres (s, 3) and radii (s) of balls around the surfaces, in their frames."""
     centre, radius = np.zeros((len(surfaces), 3)), np.zeros(len(surfaces))
     for k, each in enumerate(surfaces):
@@ -140,12 +140,14 @@ def _raster(
     depth: Array,
     face: Indices,
     shade: Array,
+    slope: Array,
 ) -> None:
-    """The law: fills `depth`, `face` and `shade`; of equally near triangles, the first one is seen."""
+    """The law: fills the last four arrays; of equally near triangles, the first one is seen."""
     fx, fy, cx, cy, near, margin = lens
     depth.fill(np.inf)
     face.fill(-1)
     shade.fill(0.0)
+    slope.fill(0.0)
     of_vertex = np.repeat(np.arange(len(shown)), np.diff(first_vertex))
     R, light = poses[of_vertex], lights[of_vertex]
     x, y, z = vertices.T
@@ -170,6 +172,8 @@ def _raster(
     a, b, c = (p[corners[:, k]] for k in range(3))
     edges = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
     det = (a[:, 0] * edges[:, 0, 0] + a[:, 1] * edges[:, 0, 1]) + a[:, 2] * edges[:, 0, 2]
+    normal = (edges[:, 0] + edges[:, 1]) + edges[:, 2]
+    length = np.sqrt((normal[:, 0] * normal[:, 0] + normal[:, 1] * normal[:, 1]) + normal[:, 2] * normal[:, 2])
     wide = right - left + 1
     area = np.where(det == 0.0, 0, wide * (bottom - top + 1))
 
@@ -194,6 +198,7 @@ def _raster(
         face.reshape(-1)[at] = index[i]
         lit = (u[found] * bright[corners[i, 0]] + v[found] * bright[corners[i, 1]]) + w[found] * bright[corners[i, 2]]
         shade.reshape(-1)[at] = -sign[found] * (lit / total[found])
+        slope.reshape(-1)[at] = total[found] / length[i]
 
     first = 0
     while first < len(area):

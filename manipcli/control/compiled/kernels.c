@@ -363,7 +363,7 @@ static const char *wrong_rows(const Kernel *self)
 static PyObject *run_raster(Kernel *self, PyObject *const *args)
 {
     enum { VERTICES, NORMALS, FACES, FIRST_VERTEX, FIRST_FACE, POSES, LIGHTS, SHOWN, LENS, COLUMNS, ROWS, POINTS, DEPTH,
-           FACE, SHADE };
+           FACE, SHADE, SLOPE };
     const double *vertices = doubles(self, VERTICES), *normals = doubles(self, NORMALS), *poses = doubles(self, POSES);
     const double *lights = doubles(self, LIGHTS), *lens = doubles(self, LENS);
     const double *columns = doubles(self, COLUMNS), *rows = doubles(self, ROWS);
@@ -371,6 +371,7 @@ static PyObject *run_raster(Kernel *self, PyObject *const *args)
     const int64_t *first_face = integers(self, FIRST_FACE);
     const unsigned char *shown = flags(self, SHOWN);
     double *points = doubles(self, POINTS), *depth = doubles(self, DEPTH), *shade = doubles(self, SHADE);
+    double *slope = doubles(self, SLOPE);
     int64_t *face = integers(self, FACE);
     const double fx = lens[0], fy = lens[1], cx = lens[2], cy = lens[3], near = lens[4], margin = lens[5];
     Size width = length(self, COLUMNS), height = length(self, ROWS);
@@ -378,7 +379,7 @@ static PyObject *run_raster(Kernel *self, PyObject *const *args)
     Py_BEGIN_ALLOW_THREADS;
     for (Size k = 0; k < width * height; k++) {
         depth[k] = INFINITY;
-        shade[k] = 0.0;
+        shade[k] = slope[k] = 0.0;
         face[k] = -1;
     }
     for (Size s = 0; s < self->n; s++) {
@@ -396,7 +397,7 @@ static PyObject *run_raster(Kernel *self, PyObject *const *args)
             const double *a = points + 6 * faces[3 * f], *b = points + 6 * faces[3 * f + 1];
             const double *c = points + 6 * faces[3 * f + 2];
             double left = 0.0, right = (double)(width - 1), top = 0.0, bottom = (double)(height - 1), sign, det;
-            double e[3][3];
+            double e[3][3], n[3], long_n;
             int ahead = (a[2] > near) + (b[2] > near) + (c[2] > near);
             if (ahead == 0) continue;
             if (ahead == 3) { /* else the projection of the corners does not bound that of the triangle */
@@ -415,6 +416,8 @@ static PyObject *run_raster(Kernel *self, PyObject *const *args)
             det = (a[0] * e[0][0] + a[1] * e[0][1]) + a[2] * e[0][2];
             if (det == 0.0) continue;
             sign = det > 0.0 ? 1.0 : -1.0; /* positive: seen from inside */
+            for (Size i = 0; i < 3; i++) n[i] = (e[0][i] + e[1][i]) + e[2][i];
+            long_n = sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
             for (Size y = (Size)top; y <= (Size)bottom; y++)
                 for (Size x = (Size)left; x <= (Size)right; x++) {
                     double u = sign * ((e[0][0] * columns[x] + e[0][1] * rows[y]) + e[0][2]);
@@ -428,6 +431,7 @@ static PyObject *run_raster(Kernel *self, PyObject *const *args)
                     depth[at] = z;
                     face[at] = f;
                     shade[at] = -sign * (((u * a[5] + v * b[5]) + w * c[5]) / sum);
+                    slope[at] = sum / long_n;
                 }
         }
     }
@@ -443,7 +447,8 @@ static const char *wrong_raster(const Kernel *self)
     if (length(self, 3) != n + 1 || length(self, 4) != n + 1) return "expected a first vertex and face of each surface";
     if (length(self, 5) != 12 * n || length(self, 8) != 6) return "vectors of another length";
     if (length(self, 11) != 2 * length(self, 0)) return "expected six numbers per point";
-    if (length(self, 12) != pixels || length(self, 13) != pixels || length(self, 14) != pixels) return "wrong picture";
+    if (length(self, 12) != pixels || length(self, 13) != pixels || length(self, 14) != pixels || length(self, 15) != pixels)
+        return "wrong picture";
     if (vertex[0] != 0 || face[0] != 0 || 3 * vertex[n] != length(self, 0) || 3 * face[n] != length(self, 2))
         return "surfaces do not cover the vertices and faces";
     for (Size s = 0; s < n; s++) {
@@ -463,7 +468,7 @@ static const Law LAWS[] = {
     {"window", "d1d1d1d1d1d0d0D0B0", 0, run_window, wrong_window},
     {"actuation", "d0d0i1d1d1d1d1d1d1d2d1d0B1I1D0b0", 0, run_actuation, wrong_actuation},
     {"rows", "|D0d0", 1, run_rows, wrong_rows},
-    {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0", 0, run_raster, wrong_raster},
+    {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0D0", 0, run_raster, wrong_raster},
     {NULL, NULL, 0, NULL, NULL},
 };
 
