@@ -16,8 +16,7 @@ from manipcli.control.compiled import bind
 from manipcli.core.geometry import Array
 from manipcli.render.lens import Lens
 from manipcli.render.surface import Surface
-
-Indices = npt.NDArray[np.int64]
+from manipcli.render.triangles import Indices, Triangles
 
 MARGIN = 1e-6
 """Of the bounding boxes of triangles [pixel], for rounding; the edges decide."""
@@ -53,13 +52,8 @@ class Raster:
 
     def __init__(self, surfaces: Sequence[Surface], lens: Lens, near: float = 1e-3) -> None:
         count = len(surfaces)
-        self.first_face = _firsts([len(each.faces) for each in surfaces])
-        self._first_vertex = _firsts([len(each.vertices) for each in surfaces])
-        self._vertices = _joined([each.vertices for each in surfaces], np.float64)
-        self._normals = _joined([each.normals for each in surfaces], np.float64)
-        offset = [each.faces + first for each, first in zip(surfaces, self._first_vertex, strict=False)]
-        self._faces = _joined(offset, np.int64)
-        self._centre, self._radius = bounding_balls(surfaces)
+        self._triangles = triangles = Triangles.of(surfaces)
+        self.first_face = triangles.first_face
         self._lens, self._near = lens, near
         # Columns and rows of a rotation matrix and a translation per surface: of its frame in the optical frame.
         self._poses, self._lights = np.zeros((count, 12)), np.zeros((count, 3))
@@ -68,9 +62,15 @@ class Raster:
         self._seen = Fragments(np.zeros(shape), np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape))
         settings = np.array([lens.fx, lens.fy, lens.cx, lens.cy, near, MARGIN])
         self._law = (
-            *(self._vertices, self._normals, self._faces, self._first_vertex, self.first_face),
+            *(triangles.vertices, triangles.normals, triangles.faces, triangles.first_vertex, triangles.first_face),
             *(self._poses, self._lights, self._shown, settings, lens.columns, lens.rows),
-            *(np.zeros((len(self._vertices), 6)), self._seen.depth, self._seen.face, self._seen.shade, self._seen.slope),
+            *(
+                np.zeros((len(triangles.vertices), 6)),
+                self._seen.depth,
+                self._seen.face,
+                self._seen.shade,
+                self._seen.slope,
+            ),
         )
         self._run = bind("raster", count, *self._law)
 
@@ -85,7 +85,7 @@ class Raster:
         self._poses[:, :9] = rotation.reshape(-1, 9)
         self._poses[:, 9:] = position
         self._lights[:] = np.einsum("sij,i->sj", rotation, light)
-        self._shown[:] = self._in_view(np.einsum("sij,sj->si", rotation, self._centre) + position)
+        self._shown[:] = self._in_view(*self._triangles.balls(rotation, position))
         if self._run is not None:
             self._run()
         else:
@@ -93,35 +93,17 @@ class Raster:
                 _raster(*self._law)
         return self._seen
 
-    def _in_view(self, centre: Array) -> npt.NDArray[np.bool_]:
-        """(s) whether the ball around each surface, at `centre` (s, 3) in the optical frame, meets the view."""
+    def _in_view(self, centre: Array, radius: Array) -> npt.NDArray[np.bool_]:
+        """(s) whether balls at `centre` (s, 3) in the optical frame meet the view."""
         lens, (x, y, z) = self._lens, centre.T
-        found = z + self._radius > self._near
+        found = z + radius > self._near
         for across, first, last in (
             (x, (-0.5 - lens.cx) / lens.fx, (lens.width - 0.5 - lens.cx) / lens.fx),
             (y, (-0.5 - lens.cy) / lens.fy, (lens.height - 0.5 - lens.cy) / lens.fy),
         ):
-            found &= across - first * z > -self._radius * np.hypot(1.0, first)
-            found &= across - last * z < self._radius * np.hypot(1.0, last)
+            found &= across - first * z > -radius * np.hypot(1.0, first)
+            found &= across - last * z < radius * np.hypot(1.0, last)
         return found
-
-
-def _firsts(counts: list[int]) -> Indices:
-    return np.cumsum([0, *counts], dtype=np.int64)
-
-
-def _joined(arrays: list[npt.NDArray[np.generic]], kind: type[np.generic]) -> npt.NDArray[np.generic]:
-    return np.ascontiguousarray(np.concatenate([np.zeros((0, 3)), *arrays]), dtype=kind)
-
-
-def bounding_balls(surfaces: Sequence[Surface]) -> tuple[Array, Array]:
-    """Centres (s, 3) and radii (s) of balls around the surfaces, in their frames."""
-    centre, radius = np.zeros((len(surfaces), 3)), np.zeros(len(surfaces))
-    for k, each in enumerate(surfaces):
-        if len(each.vertices):
-            centre[k] = (each.vertices.min(axis=0) + each.vertices.max(axis=0)) / 2.0
-            radius[k] = np.linalg.norm(each.vertices - centre[k], axis=1).max()
-    return centre, radius
 
 
 def _raster(

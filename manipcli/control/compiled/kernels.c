@@ -439,24 +439,115 @@ static PyObject *run_raster(Kernel *self, PyObject *const *args)
     Py_RETURN_NONE;
 }
 
-static const char *wrong_raster(const Kernel *self)
+/* Whether the surfaces cover the vertices and faces, which are arrays `vertices`, `faces` and the two of firsts. */
+static const char *wrong_surfaces(const Kernel *self, Size vertices, Size faces, Size firsts)
 {
-    const int64_t *vertex = integers(self, 3), *face = integers(self, 4);
-    Size n = self->n, pixels = length(self, 9) * length(self, 10);
-    if (length(self, 0) != length(self, 1) || length(self, 0) % 3 || length(self, 2) % 3) return "expected triples";
-    if (length(self, 3) != n + 1 || length(self, 4) != n + 1) return "expected a first vertex and face of each surface";
-    if (length(self, 5) != 12 * n || length(self, 8) != 6) return "vectors of another length";
-    if (length(self, 11) != 2 * length(self, 0)) return "expected six numbers per point";
-    if (length(self, 12) != pixels || length(self, 13) != pixels || length(self, 14) != pixels || length(self, 15) != pixels)
-        return "wrong picture";
-    if (vertex[0] != 0 || face[0] != 0 || 3 * vertex[n] != length(self, 0) || 3 * face[n] != length(self, 2))
+    const int64_t *corner = integers(self, faces), *vertex = integers(self, firsts), *face = integers(self, firsts + 1);
+    Size n = self->n;
+    if (length(self, vertices) % 3 || length(self, faces) % 3) return "expected triples";
+    if (length(self, firsts) != n + 1 || length(self, firsts + 1) != n + 1) return "expected the first of each surface";
+    if (vertex[0] != 0 || face[0] != 0 || 3 * vertex[n] != length(self, vertices) || 3 * face[n] != length(self, faces))
         return "surfaces do not cover the vertices and faces";
     for (Size s = 0; s < n; s++) {
         if (vertex[s] > vertex[s + 1] || face[s] > face[s + 1]) return "surfaces out of order";
         for (Size k = 3 * face[s]; k < 3 * face[s + 1]; k++)
-            if (integers(self, 2)[k] < vertex[s] || integers(self, 2)[k] >= vertex[s + 1]) return "a wrong vertex";
+            if (corner[k] < vertex[s] || corner[k] >= vertex[s + 1]) return "a wrong vertex";
     }
     return NULL;
+}
+
+static const char *wrong_raster(const Kernel *self)
+{
+    Size pixels = length(self, 9) * length(self, 10);
+    if (length(self, 0) != length(self, 1) || length(self, 5) != 12 * self->n || length(self, 8) != 6)
+        return "vectors of another length";
+    if (length(self, 11) != 2 * length(self, 0)) return "expected six numbers per point";
+    for (Size k = 12; k < 16; k++)
+        if (length(self, k) != pixels) return "wrong picture";
+    return wrong_surfaces(self, 0, 2, 3);
+}
+
+/* scan: distances along rays in the plane z = 0 of a frame to the segments in which it cuts triangles. run()
+ *
+ * A ray through an end of a segment meets one of the two segments there: sides are half open. Angles only bound the rays
+ * that are tried. */
+static PyObject *run_scan(Kernel *self, PyObject *const *args)
+{
+    enum { VERTICES, FACES, FIRST_VERTEX, FIRST_FACE, POSES, SHOWN, ANGLES, RAYS, POINTS, DISTANCES };
+    const double *vertices = doubles(self, VERTICES), *poses = doubles(self, POSES), *angles = doubles(self, ANGLES);
+    const double *rays = doubles(self, RAYS);
+    const int64_t *faces = integers(self, FACES), *first_vertex = integers(self, FIRST_VERTEX);
+    const int64_t *first_face = integers(self, FIRST_FACE);
+    const unsigned char *shown = flags(self, SHOWN);
+    double *points = doubles(self, POINTS), *distances = doubles(self, DISTANCES);
+    const double turn = 6.283185307179586;
+    Size n = length(self, ANGLES);
+    double step = n > 1 ? (angles[n - 1] - angles[0]) / (double)(n - 1) : 0.0;
+    (void)args;
+    for (Size k = 0; k < n; k++) distances[k] = INFINITY;
+    for (Size s = 0; s < self->n; s++) {
+        const double *R = poses + 12 * s, *t = R + 9;
+        if (!shown[s]) continue;
+        for (Size k = first_vertex[s]; k < first_vertex[s + 1]; k++) {
+            const double *v = vertices + 3 * k;
+            for (Size i = 0; i < 3; i++)
+                points[3 * k + i] = ((R[3 * i] * v[0] + R[3 * i + 1] * v[1]) + R[3 * i + 2] * v[2]) + t[i];
+        }
+        for (Size f = first_face[s]; f < first_face[s + 1]; f++) {
+            const double *corner[3] = {points + 3 * faces[3 * f], points + 3 * faces[3 * f + 1], points + 3 * faces[3 * f + 2]};
+            int above[3] = {corner[0][2] >= 0.0, corner[1][2] >= 0.0, corner[2][2] >= 0.0};
+            int count = above[0] + above[1] + above[2], alone = 0;
+            double end[2][2], way[2], across, low, high;
+            if (count == 0 || count == 3) continue;
+            while (above[alone] != (count == 1)) alone++;
+            for (int i = 0; i < 2; i++) {
+                const double *p = corner[alone], *q = corner[(alone + 1 + i) % 3];
+                double share = p[2] / (p[2] - q[2]);
+                end[i][0] = p[0] + share * (q[0] - p[0]);
+                end[i][1] = p[1] + share * (q[1] - p[1]);
+            }
+            way[0] = end[1][0] - end[0][0];
+            way[1] = end[1][1] - end[0][1];
+            across = end[0][0] * way[1] - end[0][1] * way[0];
+            low = atan2(end[0][1], end[0][0]);
+            high = atan2(end[1][1], end[1][0]);
+            if (low > high) {
+                double swapped = low;
+                low = high;
+                high = swapped;
+            }
+            if (high - low > turn / 2.0) {
+                double swapped = low + turn;
+                low = high;
+                high = swapped;
+            }
+            for (int shift = -2; shift <= 2; shift++) {
+                Size from = 0, to = n - 1;
+                if (step > 0.0) {
+                    double a = floor((low + shift * turn - angles[0]) / step) - 1.0;
+                    double b = ceil((high + shift * turn - angles[0]) / step) + 1.0;
+                    if (b < 0.0 || a > (double)(n - 1)) continue;
+                    if (a > 0.0) from = (Size)a;
+                    if (b < (double)(n - 1)) to = (Size)b;
+                } else if (shift != 0) continue;
+                for (Size k = from; k <= to; k++) {
+                    const double *d = rays + 2 * k;
+                    double one = d[0] * end[0][1] - d[1] * end[0][0], two = d[0] * end[1][1] - d[1] * end[1][0], r;
+                    if ((one >= 0.0) == (two >= 0.0)) continue;
+                    r = across / (d[0] * way[1] - d[1] * way[0]);
+                    if (r > 0.0 && r < distances[k]) distances[k] = r;
+                }
+            }
+        }
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_scan(const Kernel *self)
+{
+    if (length(self, 8) != length(self, 0) || length(self, 4) != 12 * self->n) return "vectors of another length";
+    if (length(self, 6) == 0 || length(self, 7) != 2 * length(self, 6) || length(self, 9) != length(self, 6)) return "wrong rays";
+    return wrong_surfaces(self, 0, 1, 2);
 }
 
 static const Law LAWS[] = {
@@ -468,6 +559,7 @@ static const Law LAWS[] = {
     {"window", "d1d1d1d1d1d0d0D0B0", 0, run_window, wrong_window},
     {"actuation", "d0d0i1d1d1d1d1d1d1d2d1d0B1I1D0b0", 0, run_actuation, wrong_actuation},
     {"rows", "|D0d0", 1, run_rows, wrong_rows},
+    {"scan", "d0i0i0i0d0b1d0d0D0D0", 0, run_scan, wrong_scan},
     {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0D0", 0, run_raster, wrong_raster},
     {NULL, NULL, 0, NULL, NULL},
 };
