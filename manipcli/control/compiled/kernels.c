@@ -354,6 +354,48 @@ static const char *wrong_rows(const Kernel *self)
     return NULL;
 }
 
+/* sensor: SignalChain.step without the draw of its noise. run(tick) -> whether a measurement arrives. */
+static PyObject *run_sensor(Kernel *self, PyObject *const *args)
+{
+    enum { TRUTH, LOW, NOISE, LOST, QUANTUM, LEAST, MOST, RING, RING_LOST, READING, BLEND, TIMES };
+    const double *truth = doubles(self, TRUTH), *quantum = doubles(self, QUANTUM);
+    const double *least = doubles(self, LEAST), *most = doubles(self, MOST);
+    double *low = doubles(self, LOW), blend = *doubles(self, BLEND);
+    int64_t every = integers(self, TIMES)[0], delay = integers(self, TIMES)[1];
+    Size n = self->n, block = length(self, LOST), slots = length(self, RING_LOST);
+    unsigned char *ring_lost = flags(self, RING_LOST);
+    int64_t tick = PyLong_AsLongLong(args[0]);
+    if (tick == -1 && PyErr_Occurred()) return NULL;
+    if (tick < 0) {
+        PyErr_SetString(PyExc_IndexError, "no such tick");
+        return NULL;
+    }
+    for (Size j = 0; j < n; j++) low[j] = blend == 1.0 ? truth[j] : low[j] + blend * (truth[j] - low[j]);
+    if (tick % every == 0) {
+        int64_t k = tick / every;
+        const double *noise = doubles(self, NOISE) + k % block * n;
+        double *slot = doubles(self, RING) + k % slots * n;
+        for (Size j = 0; j < n; j++) {
+            double value = low[j] + noise[j];
+            if (quantum[j] > 0.0) value = rint(value / quantum[j]) * quantum[j];
+            slot[j] = smaller(larger(value, least[j]), most[j]);
+        }
+        ring_lost[k % slots] = flags(self, LOST)[k % block];
+    }
+    int64_t due = tick - delay;
+    if (due < 0 || due % every || ring_lost[due / every % slots]) Py_RETURN_FALSE;
+    memcpy(doubles(self, READING), doubles(self, RING) + due / every % slots * n, n * sizeof(double));
+    Py_RETURN_TRUE;
+}
+
+static const char *wrong_sensor(const Kernel *self)
+{
+    if (length(self, 3) == 0 || length(self, 2) != self->n * length(self, 3)) return "noise of another size";
+    if (length(self, 8) == 0 || length(self, 7) != self->n * length(self, 8)) return "measurements of another size";
+    if (length(self, 10) != 1 || length(self, 11) != 2) return "expected 1 factor and 2 times";
+    return integers(self, 11)[0] > 0 && integers(self, 11)[1] >= 0 ? NULL : "times below 0";
+}
+
 static const Law LAWS[] = {
     {"errors", "d2d1d1D2", 1, run_errors, NULL},
     {"pid", "d2d2d1d1d1d1d1d1b1d1b1d1d1D1D1d1d1D1b0", 2, run_pid, wrong_pid},
@@ -363,6 +405,7 @@ static const Law LAWS[] = {
     {"window", "d1d1d1d1d1d0d0D0B0", 0, run_window, wrong_window},
     {"actuation", "d0d0i1d1d1d1d1d1d1d2d1d0B1I1D0b0", 0, run_actuation, wrong_actuation},
     {"rows", "|D0d0", 1, run_rows, wrong_rows},
+    {"sensor", "d1D1d0b0d1d1d1D0B0D1d0i0", 1, run_sensor, wrong_sensor},
     {NULL, NULL, 0, NULL, NULL},
 };
 
