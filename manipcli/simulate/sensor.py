@@ -21,7 +21,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import Engine
-from manipcli.simulate.mount import Mount
+from manipcli.simulate.mount import LastTick, Mount
 from manipcli.spec.sensors import Noise, SensorSpec
 
 S = TypeVar("S", bound=SensorSpec)
@@ -53,6 +53,7 @@ class Topic:
         type: ROS type, `sensor_msgs/msg/Imu`, which `record/schemas.py` has.
         filled: paths of the fields that take the numbers of a reading, in their order: numbers, arrays of numbers or
             messages of numbers (`wrench`, `linear_acceleration`, `ranges`). Empty for the messages of an `Exposure`.
+        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves.
         constant: path -> value of fields that never change, and of arrays in `filled` (which sets their lengths).
         suffix: of the topic `/sensors/NAME`: `/image_raw`.
         frame: suffix of the frame in the header, one of `frames` of the member: `_optical`.
@@ -60,6 +61,7 @@ class Topic:
 
     type: str
     filled: tuple[str, ...] = ()
+    derive: Callable[[Array], Array] | None = None
     constant: Mapping[str, object] = field(default_factory=dict)
     suffix: str = ""
     frame: str = ""
@@ -81,9 +83,9 @@ class Probe(Protocol):
     """Reads the truth of a sensor of numbers."""
 
     def read(self, state: WorldState) -> Array:
-        """The true numbers (width), those of all quantities in their order, now; may be the same array each time.
+        """The true numbers (width), those of all quantities in their order, now; always the same array.
 
-        It is called at every control tick if the sensor has a filter or `every_tick`, else at its own rate.
+        It is called at every control tick if the sensor has a filter, else at its own rate.
         """
         ...
 
@@ -106,14 +108,22 @@ class SensorContext:
     Attributes:
         engine, robot, scene: the true ones; joint vectors follow `robot.moving_joints`; `scene.gravity` (3,) [m/s2].
         period: [s] of a control tick.
-        mount: where it is.
+        before: velocities one tick ago, for members that `remember`.
+        mount: where it is; None for a sensor without a place of its own.
     """
 
     engine: Engine
     robot: RobotModel
     scene: Scene
     period: float
-    mount: Mount
+    before: LastTick
+    mount: Mount | None
+
+    @property
+    def place(self) -> Mount:
+        """`mount` of a member whose spec is a `MountedSpec`."""
+        assert self.mount is not None
+        return self.mount
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +139,7 @@ class SensorMember(Generic[S]):
         open: (spec, context) -> a probe, or an exposure.
         check: (spec, robot, scene) -> problems, other than those of link, frame, rate and delay.
         frames: (spec) -> suffix -> pose in S of further frames, `NAME` + suffix in the log.
-        every_tick: the probe is read at every tick although it has no filter.
-        body_velocities: the probe reads velocities of bodies, at every tick.
+        remembers: the probe reads `SensorContext.before`, and on a body its velocities at every tick.
         needs_link: it must be on a link, not on a frame of the scene.
     """
 
@@ -141,8 +150,7 @@ class SensorMember(Generic[S]):
     open: Callable[[S, SensorContext], Probe | Exposure]
     check: Callable[[S, RobotModel, Scene], Iterable[Problem]] = lambda spec, robot, scene: ()
     frames: Callable[[S], Mapping[str, Transform]] = lambda spec: {}
-    every_tick: bool = False
-    body_velocities: bool = False
+    remembers: bool = False
     needs_link: bool = False
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Final, Generic, TypeVar
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from manipcli.core import units
 from manipcli.core.text import escape
@@ -22,6 +22,7 @@ from manipcli.spec.quantity import (
     JointEffort,
     JointValue,
     JointVelocity,
+    Length,
     Share,
     Time,
     Torque,
@@ -85,6 +86,24 @@ class AngularVelocityNoise(Noise[AngularVelocity]):
 
 class AccelerationNoise(Noise[Acceleration]):
     """Noise of an acceleration [m/s^2]."""
+
+
+class LengthNoise(Noise[Length]):
+    """Noise of a distance [m]."""
+
+
+class LengthLimits(Model):
+    """Distances that can be measured."""
+
+    least: Annotated[Length, Field(ge=0)] = Field(0.0, description="Smallest distance [m]. Default 0.")
+    most: Annotated[Length, Field(gt=0, le=1000)] = Field(100.0, description="Largest distance [m]. Default 100 m.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> LengthLimits:
+        if self.least >= self.most:
+            message = f"'least' ({self.least:g} m) is not below 'most' ({self.most:g} m)"
+            raise problem("range", message, at=("least",))
+        return self
 
 
 class SensorNoise(Model):

@@ -21,7 +21,7 @@ from manipcli.task.second_chances import every_finding
 from manipcli.task.task import Task
 from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
-from manipcli.task.vocabulary import controllers_spec, task_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
 
 
 class FileOptions(TypedDict, total=False):
@@ -129,7 +129,7 @@ def _as_written(
     find = finder(path, package_path=package_path, allow_outside=allow_outside)
     file = load_task_file(path, model=task_spec(), overrides=overrides, seed=seed, find=find)
     robot_path, controllers_path = named_file(file, path, "robot"), named_file(file, path, "controllers")
-    robot_file = load_robot(robot_path, overrides=overrides)
+    robot_file = load_robot(robot_path, overrides=overrides, model=robot_spec())
     robot, notes = build_robot(
         robot_file.spec,
         file=robot_path,

@@ -29,7 +29,7 @@ from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
 from manipcli.task.task_files import finder
 from manipcli.task.vary import bind
-from manipcli.task.vocabulary import controllers_spec, task_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
 
 T = TypeVar("T")
 
@@ -142,8 +142,8 @@ class _Robot:
     ) -> _Robot:
         if path is None:
             return cls(None, None)
-        file = errors.of(lambda: load.load_robot(path, overrides=overrides))
-        partial = file or load.salvage_robot_file(path, overrides=overrides)
+        file = errors.of(lambda: load.load_robot(path, overrides=overrides, model=robot_spec()))
+        partial = file or load.salvage_robot_file(path, overrides=overrides, model=robot_spec())
         if partial is None:
             return cls(None, None)
         building = _Errors()

@@ -548,6 +548,46 @@ static const char *wrong_scan(const Kernel *self)
     if (length(self, 8) != length(self, 0) || length(self, 4) != 12 * self->n) return "vectors of another length";
     if (length(self, 6) == 0 || length(self, 7) != 2 * length(self, 6) || length(self, 9) != length(self, 6)) return "wrong rays";
     return wrong_surfaces(self, 0, 1, 2);
+/* sensor: SignalChain.step without the draw of its noise. run(tick) -> whether a measurement arrives. */
+static PyObject *run_sensor(Kernel *self, PyObject *const *args)
+{
+    enum { TRUTH, LOW, NOISE, LOST, QUANTUM, LEAST, MOST, RING, RING_LOST, READING, BLEND, TIMES };
+    const double *truth = doubles(self, TRUTH), *quantum = doubles(self, QUANTUM);
+    const double *least = doubles(self, LEAST), *most = doubles(self, MOST);
+    double *low = doubles(self, LOW), blend = *doubles(self, BLEND);
+    int64_t every = integers(self, TIMES)[0], delay = integers(self, TIMES)[1];
+    Size n = self->n, block = length(self, LOST), slots = length(self, RING_LOST);
+    unsigned char *ring_lost = flags(self, RING_LOST);
+    int64_t tick = PyLong_AsLongLong(args[0]);
+    if (tick == -1 && PyErr_Occurred()) return NULL;
+    if (tick < 0) {
+        PyErr_SetString(PyExc_IndexError, "no such tick");
+        return NULL;
+    }
+    for (Size j = 0; j < n; j++) low[j] = blend == 1.0 ? truth[j] : low[j] + blend * (truth[j] - low[j]);
+    if (tick % every == 0) {
+        int64_t k = tick / every;
+        const double *noise = doubles(self, NOISE) + k % block * n;
+        double *slot = doubles(self, RING) + k % slots * n;
+        for (Size j = 0; j < n; j++) {
+            double value = low[j] + noise[j];
+            if (quantum[j] > 0.0) value = rint(value / quantum[j]) * quantum[j];
+            slot[j] = smaller(larger(value, least[j]), most[j]);
+        }
+        ring_lost[k % slots] = flags(self, LOST)[k % block];
+    }
+    int64_t due = tick - delay;
+    if (due < 0 || due % every || ring_lost[due / every % slots]) Py_RETURN_FALSE;
+    memcpy(doubles(self, READING), doubles(self, RING) + due / every % slots * n, n * sizeof(double));
+    Py_RETURN_TRUE;
+}
+
+static const char *wrong_sensor(const Kernel *self)
+{
+    if (length(self, 3) == 0 || length(self, 2) != self->n * length(self, 3)) return "noise of another size";
+    if (length(self, 8) == 0 || length(self, 7) != self->n * length(self, 8)) return "measurements of another size";
+    if (length(self, 10) != 1 || length(self, 11) != 2) return "expected 1 factor and 2 times";
+    return integers(self, 11)[0] > 0 && integers(self, 11)[1] >= 0 ? NULL : "times below 0";
 }
 
 static const Law LAWS[] = {
@@ -561,6 +601,7 @@ static const Law LAWS[] = {
     {"rows", "|D0d0", 1, run_rows, wrong_rows},
     {"scan", "d0i0i0i0d0b1d0d0D0D0", 0, run_scan, wrong_scan},
     {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0D0", 0, run_raster, wrong_raster},
+    {"sensor", "d1D1d0b0d1d1d1D0B0D1d0i0", 1, run_sensor, wrong_sensor},
     {NULL, NULL, 0, NULL, NULL},
 };
 
