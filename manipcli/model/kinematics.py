@@ -83,7 +83,7 @@ class Kinematics:
         return Transform(R=frozen(X.rotation), p=frozen(X.translation))
 
     def link_poses(self, q: Array) -> tuple[Array, Array]:
-        """Poses of all links in the world at `q`, in the order of `robot.links`: rotations (l, 3, 3), positions (l, 3)."""
+        """Poses of all links in the world at `q`, by `robot.links`: rotations (l, 3, 3) and positions (l, 3) [m]."""
         self._pin.framesForwardKinematics(self._model, self._data, q)
         poses = self._data.oMf
         found = [poses[frame] for frame in self._frames.values()]

@@ -10,8 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.core.geometry import Array
+
+Depth = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,18 +43,18 @@ class Lens:
     @property
     def columns(self) -> Array:
         """(width) x of the ray through the pixels of each column, at z = 1."""
-        found: Array = (np.arange(self.width) - self.cx) / self.fx
+        found: Array = (np.arange(self.width, dtype=np.float64) - self.cx) / self.fx
         return found
 
     @property
     def rows(self) -> Array:
         """(height) y of the ray through the pixels of each row, at z = 1."""
-        found: Array = (np.arange(self.height) - self.cy) / self.fy
+        found: Array = (np.arange(self.height, dtype=np.float64) - self.cy) / self.fy
         return found
 
-    def points(self, depth: Array) -> Array:
+    def points(self, depth: Depth) -> Depth:
         """(height, width, 3) points in the optical frame [m] at these depths (height, width) along z."""
-        cloud = np.empty((*depth.shape, 3), dtype=depth.dtype)
+        cloud: Depth = np.empty((*depth.shape, 3), dtype=depth.dtype)
         np.multiply(depth, self.columns.astype(depth.dtype), out=cloud[..., 0])
         np.multiply(depth, self.rows.astype(depth.dtype)[:, None], out=cloud[..., 1])
         cloud[..., 2] = depth

@@ -96,7 +96,7 @@ class Raster:
     def _in_view(self, centre: Array, radius: Array) -> npt.NDArray[np.bool_]:
         """(s) whether balls at `centre` (s, 3) in the optical frame meet the view."""
         lens, (x, y, z) = self._lens, centre.T
-        found = z + radius > self._near
+        found: npt.NDArray[np.bool_] = z + radius > self._near
         for across, first, last in (
             (x, (-0.5 - lens.cx) / lens.fx, (lens.width - 0.5 - lens.cx) / lens.fx),
             (y, (-0.5 - lens.cy) / lens.fy, (lens.height - 0.5 - lens.cy) / lens.fy),

@@ -51,3 +51,14 @@ class Stage:
             R[self._movable], p[self._movable] = matrix_from_quat(state.body_quat_xyzw), state.body_position
         turned = X_WS.R.T
         return (turned @ R)[self.part_of], ((p - X_WS.p) @ X_WS.R)[self.part_of]
+
+
+_last: tuple[RobotModel, Scene, Stage] | None = None
+
+
+def stage_of(robot: RobotModel, scene: Scene) -> Stage:
+    """The stage of these objects; the last one is kept, so that all sensors of a run share it."""
+    global _last
+    if _last is None or _last[0] is not robot or _last[1] is not scene:
+        _last = (robot, scene, Stage(robot, scene))
+    return _last[2]

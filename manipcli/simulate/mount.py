@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.geometry import Array, Transform, matrix_from_quat
+from manipcli.core.geometry import Transform, matrix_from_quat
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState

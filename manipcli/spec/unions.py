@@ -77,9 +77,7 @@ def task_model(
 ) -> type[TaskSpec]:
     """`TaskSpec` with the steps, conditions, engines, path planners and sensors of the seams; the same class for the
     same members."""
-    return _task_model(
-        _members(steps), _members(conditions), _members(engines), _members(planners), _members(sensors)
-    )
+    return _task_model(_members(steps), _members(conditions), _members(engines), _members(planners), _members(sensors))
 
 
 Members = tuple[tuple[str, type[Model]], ...]

@@ -1,7 +1,7 @@
 """Registry of sensors."""
 
 from manipcli.core.registry import Seam
-from manipcli.simulate.sensor import SensorMember
-from manipcli.simulate.sensors import wrench
+from manipcli.simulate.sensor import AnySensor
+from manipcli.simulate.sensors import camera, range
 
-SENSORS: Seam[SensorMember] = Seam(kind="sensor", members=(wrench.MEMBER,))
+SENSORS: Seam[AnySensor] = Seam(kind="sensor", members=(range.MEMBER, camera.MEMBER))
