@@ -254,9 +254,7 @@ def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
             first.setdefault(own.value, f"{key}[{k}]")
 
 
-def load_robot(
-    path: Path, *, overrides: Sequence[str] = (), model: type[RobotSpec] = RobotSpec
-) -> Located[RobotSpec]:
+def load_robot(path: Path, *, overrides: Sequence[str] = (), model: type[RobotSpec] = RobotSpec) -> Located[RobotSpec]:
     """Loads a robot file; uses the overrides that begin with `robot.`.
 
     Args:

@@ -77,9 +77,7 @@ def task_model(
 ) -> type[TaskSpec]:
     """`TaskSpec` with the steps, conditions, engines, path planners and sensors of the seams; the same class for the
     same members."""
-    return _task_model(
-        _members(steps), _members(conditions), _members(engines), _members(planners), _members(sensors)
-    )
+    return _task_model(_members(steps), _members(conditions), _members(engines), _members(planners), _members(sensors))
 
 
 Members = tuple[tuple[str, type[Model]], ...]
@@ -114,7 +112,7 @@ def _task_model(
                 planners[0][1](), description=TaskSpec.model_fields["planner"].description
             ),
         ),
-        sensors=(_sensors(sensors), TaskSpec.model_fields["sensors"]),
+        sensors=(_sensors(sensors), TaskSpec.model_fields["sensors"]),  # type: ignore[arg-type]
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         blocks=(tuple[block, ...], TaskSpec.model_fields["blocks"]),
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
@@ -188,7 +186,7 @@ def _robot_model(members: Members) -> type[RobotSpec]:
     field = (_sensors(members), RobotSpec.model_fields["sensors"])
     return cast(
         type[RobotSpec],
-        create_model("RobotSpec", __base__=RobotSpec, __doc__=RobotSpec.__doc__, sensors=field),  # type: ignore[call-overload]
+        create_model("RobotSpec", __base__=RobotSpec, __doc__=RobotSpec.__doc__, sensors=field),  # type: ignore[arg-type]
     )
 
 
