@@ -20,6 +20,8 @@ from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     import pinocchio
 
 
@@ -130,6 +132,10 @@ class Kinematics:
         linear: Array = V.linear
         return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
 
+    def place(self, link: str, X_LS: Transform) -> MovingPlace:
+        """A frame S at `X_LS` in a link, whose motion is computed often."""
+        return MovingPlace(self._pin, self._model, self._data, self._frames[link], X_LS)
+
     def carrying(self, link: str, loads: Iterable[tuple[float, Transform, Array]]) -> Kinematics:
         """The same robot with rigid `loads` on a link: mass [kg], X_LI of its inertial frame, inertia (3, 3) in I."""
         other = copy(self)
@@ -155,3 +161,31 @@ class Kinematics:
         """M(q) (n, n), symmetric."""
         upper = np.triu(self._pin.crba(self._model, self._data, q))
         return np.asarray(upper + np.triu(upper, 1).T)
+
+
+class MovingPlace:
+    """The motion of a frame S that is fixed in a link."""
+
+    def __init__(
+        self, pin: ModuleType, model: pinocchio.Model, data: pinocchio.Data, frame: int, X_LS: Transform
+    ) -> None:
+        self._forward, self._model, self._data = pin.forwardKinematics, model, data
+        self._joint = model.frames[frame].parentJoint
+        placement = model.frames[frame].placement * pin.SE3(np.array(X_LS.R), np.array(X_LS.p))
+        self._R, self._p = placement.rotation.T.copy(), placement.translation.copy()
+
+    def motion(self, q: Array, v: Array, a: Array, gravity: Array, out: Array) -> None:
+        """Write into `out` (6) the angular velocity [rad/s] of S and its acceleration less gravity [m/s2], in S.
+
+        Args:
+            q, v, a: (n) positions, velocities and accelerations of the joints.
+            gravity: (3) [m/s2] in the world.
+            out: see above.
+        """
+        data, j = self._data, self._joint
+        self._forward(self._model, data, q, v, a)
+        speed, rate = data.v[j], data.a[j]  # of the joint's frame J, in J; `rate` is the spatial acceleration
+        w, R_WJ = speed.angular, data.oMi[j].rotation
+        linear = rate.linear + cross(w, speed.linear) + cross(rate.angular, self._p) + cross(w, cross(w, self._p))
+        out[:3] = self._R @ w
+        out[3:] = self._R @ (linear - gravity @ R_WJ)

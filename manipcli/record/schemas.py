@@ -64,6 +64,24 @@ DEFINITIONS: dict[str, str] = {
     "sensor_msgs/JointState": (
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
     ),
+    "sensor_msgs/Imu": (
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+        "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+        "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"
+    ),
+    "manipcli_msgs/ContactSwitch": (
+        "# A switch that is closed by contact.\nstd_msgs/Header header\n"
+        "# Whether `force` is at least `threshold`.\nbool closed\n"
+        "# Measured sum of the normal forces on the link or body, and the threshold [N].\n"
+        "float64 force\nfloat64 threshold\n"
+    ),
+    "manipcli_msgs/Taxels": (
+        "# A grid of taxels in the plane z = 0 of the frame in the header, its middle at the origin; +z points out of\n"
+        "# the surface.\nstd_msgs/Header header\n"
+        "# Cells along y and along x.\nuint32 rows\nuint32 columns\n"
+        "# Size of a cell along x and along y [m].\nfloat64 width\nfloat64 height\n"
+        "# Normal force on each cell [N], row by row from the lowest y, each from the lowest x.\nfloat64[] force\n"
+    ),
     "sensor_msgs/CompressedImage": "std_msgs/Header header\nstring format\nuint8[] data\n",
     "sensor_msgs/Image": (
         "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\n"

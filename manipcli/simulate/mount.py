@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Transform, matrix_from_quat
+from manipcli.model.grasp import LINK
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -47,6 +48,11 @@ class Mount:
         if self.on_link or not self.parent or self.scene.body(self.parent).fixed:
             return -1
         return self.scene.movable.index(self.scene.body(self.parent))
+
+    @property
+    def part(self) -> str:
+        """Name of the parent in contacts."""
+        return f"{LINK}{self.parent}" if self.on_link else self.parent
 
     def pose(self, state: WorldState) -> Transform:
         """X_WS now."""

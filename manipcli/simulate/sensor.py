@@ -45,6 +45,12 @@ class Quantity:
     most: float = np.inf
 
 
+def limited(name: str, width: int, noise: Noise[float], limit: float | None) -> Quantity:
+    """A quantity whose readings are between -limit and limit; None: unlimited."""
+    most = np.inf if limit is None else limit
+    return Quantity(name, width, noise, -most, most)
+
+
 @dataclass(frozen=True, slots=True)
 class Topic:
     """Messages of a sensor: all numbers of its reading in one message of constant size, or a picture.
@@ -53,18 +59,18 @@ class Topic:
         type: ROS type, `sensor_msgs/msg/Imu`, which `record/schemas.py` has.
         filled: paths of the fields that take the numbers of a reading, in their order: numbers, arrays of numbers or
             messages of numbers (`wrench`, `linear_acceleration`, `ranges`). Empty for the messages of an `Exposure`.
-        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves.
         constant: path -> value of fields that never change, and of arrays in `filled` (which sets their lengths).
         suffix: of the topic `/sensors/NAME`: `/image_raw`.
         frame: suffix of the frame in the header, one of `frames` of the member: `_optical`.
+        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves.
     """
 
     type: str
     filled: tuple[str, ...] = ()
-    derive: Callable[[Array], Array] | None = None
     constant: Mapping[str, object] = field(default_factory=dict)
     suffix: str = ""
     frame: str = ""
+    derive: Callable[[Array], Array] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +145,8 @@ class SensorMember(Generic[S]):
         open: (spec, context) -> a probe, or an exposure.
         check: (spec, robot, scene) -> problems, other than those of link, frame, rate and delay.
         frames: (spec) -> suffix -> pose in S of further frames, `NAME` + suffix in the log.
+        joints: (spec, robot) -> the joints that it measures for the controllers; its quantities are then `position`,
+            `velocity` and `effort` of these.
         remembers: the probe reads `SensorContext.before`, and on a body its velocities at every tick.
         needs_link: it must be on a link, not on a frame of the scene.
     """
@@ -150,6 +158,7 @@ class SensorMember(Generic[S]):
     open: Callable[[S, SensorContext], Probe | Exposure]
     check: Callable[[S, RobotModel, Scene], Iterable[Problem]] = lambda spec, robot, scene: ()
     frames: Callable[[S], Mapping[str, Transform]] = lambda spec: {}
+    joints: Callable[[S, RobotModel], tuple[str, ...]] | None = None
     remembers: bool = False
     needs_link: bool = False
 

@@ -8,7 +8,7 @@ union by `type`.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Final, Generic, TypeVar
+from typing import Annotated, Any, Final, Generic, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -45,18 +45,21 @@ def _names_a_topic(name: str) -> str:
 SensorName = Annotated[str, AfterValidator(_names_a_topic)]
 
 
+_ZERO: Any = 0.0  # of any quantity
+
+
 class Noise(Model, Generic[Q]):
     """Noise of one quantity, in its unit."""
 
-    white: Annotated[Q, Field(ge=0)] = Field(0.0, description="Standard deviation of each measurement. Default 0.")
+    white: Annotated[Q, Field(ge=0)] = Field(_ZERO, description="Standard deviation of each measurement. Default 0.")
     bias: Annotated[Q, Field(ge=0)] = Field(
-        0.0, description="Standard deviation of the offset that is drawn once per run. Default 0."
+        _ZERO, description="Standard deviation of the offset that is drawn once per run. Default 0."
     )
     walk: Annotated[Q, Field(ge=0)] = Field(
-        0.0, description="Standard deviation of the drift of the offset (a random walk) after 1 s. Default 0."
+        _ZERO, description="Standard deviation of the drift of the offset (a random walk) after 1 s. Default 0."
     )
     quantisation: Annotated[Q, Field(ge=0)] = Field(
-        0.0, description="Step to whose multiples measurements are rounded. Default 0: not rounded."
+        _ZERO, description="Step to whose multiples measurements are rounded. Default 0: not rounded."
     )
 
 

@@ -112,7 +112,7 @@ def _task_model(
                 planners[0][1](), description=TaskSpec.model_fields["planner"].description
             ),
         ),
-        sensors=(_sensors(sensors), TaskSpec.model_fields["sensors"]),
+        sensors=(_sensors(sensors), TaskSpec.model_fields["sensors"]),  # type: ignore[arg-type]
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         blocks=(tuple[block, ...], TaskSpec.model_fields["blocks"]),
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
@@ -186,7 +186,7 @@ def _robot_model(members: Members) -> type[RobotSpec]:
     field = (_sensors(members), RobotSpec.model_fields["sensors"])
     return cast(
         type[RobotSpec],
-        create_model("RobotSpec", __base__=RobotSpec, __doc__=RobotSpec.__doc__, sensors=field),  # type: ignore[call-overload]
+        create_model("RobotSpec", __base__=RobotSpec, __doc__=RobotSpec.__doc__, sensors=field),  # type: ignore[arg-type]
     )
 
 
