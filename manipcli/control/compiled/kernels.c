@@ -548,6 +548,8 @@ static const char *wrong_scan(const Kernel *self)
     if (length(self, 8) != length(self, 0) || length(self, 4) != 12 * self->n) return "vectors of another length";
     if (length(self, 6) == 0 || length(self, 7) != 2 * length(self, 6) || length(self, 9) != length(self, 6)) return "wrong rays";
     return wrong_surfaces(self, 0, 1, 2);
+}
+
 /* sensor: SignalChain.step without the draw of its noise. run(tick) -> whether a measurement arrives. */
 static PyObject *run_sensor(Kernel *self, PyObject *const *args)
 {
