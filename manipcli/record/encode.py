@@ -28,7 +28,8 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """A message, the offset of the stamp of its header (-1: it has none), and the runs of numbers in `filled` fields."""
+    """A message, the offset of the stamp of its header (-1: it has none), and the runs of numbers in its `filled`
+    fields."""
 
     data: bytes
     stamp: int
@@ -104,7 +105,7 @@ class _Writer:
         for field in message.fields:
             path = above + field.name
             outer = self._active
-            self._active = self.found[path] if path in self.found else outer
+            self._active = self.found.get(path, outer)
             if not above and field.name == "header":
                 self.stamp = self.cdr.header(self._ns, self._frame)
             else:

@@ -3,8 +3,8 @@
     truth -> low pass -> at every n-th tick: + offset + white noise -> quantisation -> limits -> dropout -> delay
 
 The low pass of first order is discretised exactly for an input that is constant over a tick: its gain at f is
-1 / sqrt(1 + (f / cut-off)^2) well below the control rate. The offset is drawn once and then walks; the walk grows by the
-same variance with every measurement, whether it arrives or not.
+1 / sqrt(1 + (f / cut-off)^2) well below the control rate. The offset is drawn once and then walks; its variance grows
+with the time, whether measurements arrive or not.
 """
 
 from __future__ import annotations

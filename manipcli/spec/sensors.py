@@ -1,8 +1,8 @@
 """Specs that sensors have in common: rate, delay and noise.
 
-A member of `simulate/sensors/` derives its spec from `SensorSpec` or from the classes of `mounted_sensor.py`, its block
-`noise` from `SensorNoise` and its block `limits` from `Model`, each with a field for every quantity; `unions` builds the
-union by `type`.
+A member of `simulate/sensors/` derives its spec from the classes of `mounted_sensor.py`, its block `noise` from
+`SensorNoise` and its block `limits` from `Model`, each with a field for every quantity; `unions` builds the union by
+`type`.
 """
 
 from __future__ import annotations

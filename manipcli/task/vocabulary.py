@@ -42,8 +42,8 @@ def _about_engine(member: EngineMember) -> str:
 
 
 def meanings(kind: str) -> Mapping[str, str]:
-    """One-line description of each word of a kind (`steps`, `conditions`, `expectations`, `engines`, `sensors`); empty for other
-    kinds."""
+    """One-line description of each word of a kind (`steps`, `conditions`, `expectations`, `engines`, `sensors`); empty
+    for other kinds."""
     conditions = {member.name: about(member.spec) for member in CONDITIONS} | COMBINATIONS
     descriptions = {
         "steps": {member.name: about(member.spec) for member in STEPS} | {**WORDS},

@@ -56,18 +56,17 @@ class OnLink:
 
     def __init__(self, context: SensorContext) -> None:
         mount = context.place
-        self._place = mount.kinematics.place(mount.parent, mount.X_PS)
+        self._place = mount.kinematics.place(mount.parent, mount.X_PS, context.scene.gravity)
         self._before = context.before.velocity
         self._period = context.period
         self._acceleration = np.zeros_like(self._before)
-        self._gravity = np.asarray(context.scene.gravity)
         self._read = np.zeros(6)
 
     def read(self, state: WorldState) -> Array:
         acceleration = self._acceleration
         np.subtract(state.velocity, self._before, out=acceleration)
         acceleration /= self._period
-        self._place.motion(state.position, state.velocity, acceleration, self._gravity, self._read)
+        self._place.motion(state.position, state.velocity, acceleration, self._read)
         return self._read
 
 
