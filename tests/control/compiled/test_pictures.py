@@ -23,7 +23,9 @@ SURFACES = [
 
 
 def _poses(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    placed = [Transform.of(xyz=rng.uniform((-0.6, -0.6, -0.1), (0.6, 0.6, 1.1)), rpy=rng.uniform(-3, 3, 3)) for _ in SURFACES]
+    placed = [
+        Transform.of(xyz=rng.uniform((-0.6, -0.6, -0.1), (0.6, 0.6, 1.1)), rpy=rng.uniform(-3, 3, 3)) for _ in SURFACES
+    ]
     return np.array([X.R for X in placed]), np.array([X.p for X in placed])
 
 
