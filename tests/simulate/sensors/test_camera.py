@@ -17,9 +17,10 @@ from manipcli.core.geometry import Transform
 TASK = """\
 task: seen
 robot: robot.yaml
+controllers: controllers.yaml
 simulation: {engine: kinematic, control_period: 10 ms, settle: 0 s}
 scene:
-  box: {box: {size: [0.4, 0.6, 0.3]}, pose: {xyz: [2, 0.1, 0.1], rpy: [0, 0, 20 deg]}, fixed: true}
+  box: {box: {size: [0.4, 0.6, 0.3]}, pose: {xyz: [2, 0.1, 0.2], rpy: [0, 0, 20 deg]}, fixed: true}
 sensors:
   eye:
     type: camera
@@ -35,7 +36,7 @@ sensors:
 steps: [wait: 0.1 s]
 """
 NOISE = "noise: {depth: {white: 1 mm, quadratic: 2e-3, grazing: 1e-4, lateral: 0.5, bias: 1 mm}, dropout: 5 %}"
-X_WB = Transform.of(xyz=(2.0, 0.1, 0.1), rpy=(0.0, 0.0, np.radians(20.0)))
+X_WB = Transform.of(xyz=(2.0, 0.1, 0.2), rpy=(0.0, 0.0, np.radians(20.0)))
 SIZE = np.array([0.4, 0.6, 0.3])
 Messages = dict[str, list[tuple[int, Any]]]
 
@@ -67,6 +68,7 @@ def on_box(origin: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 def write(folder: Path, text: str) -> None:
     (folder / "task.yaml").write_text(text)
+    (folder / "controllers.yaml").write_text("controllers: {hinge: {type: joint_trajectory, joints: [hinge], command_interface: position}}")
 
 
 def pixels(message: Any, kind: str, count: int = 1) -> np.ndarray:
