@@ -35,6 +35,7 @@ sensors:
   beam: {type: range, at: {xyz: [0.4, 0, 0.15]}, rate: 20 Hz, limits: {least: 3 cm, most: 1 m}}
 steps: [wait: 0.1 s]
 """
+CONTROLLERS = "controllers: {hinge: {type: joint_trajectory, joints: [hinge], command_interface: position}}"
 NOISE = "noise: {depth: {white: 1 mm, quadratic: 2e-3, grazing: 1e-4, lateral: 0.5, bias: 1 mm}, dropout: 5 %}"
 X_WB = Transform.of(xyz=(2.0, 0.1, 0.2), rpy=(0.0, 0.0, np.radians(20.0)))
 SIZE = np.array([0.4, 0.6, 0.3])
@@ -68,7 +69,7 @@ def on_box(origin: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 def write(folder: Path, text: str) -> None:
     (folder / "task.yaml").write_text(text)
-    (folder / "controllers.yaml").write_text("controllers: {hinge: {type: joint_trajectory, joints: [hinge], command_interface: position}}")
+    (folder / "controllers.yaml").write_text(CONTROLLERS)
 
 
 def pixels(message: Any, kind: str, count: int = 1) -> np.ndarray:
