@@ -9,8 +9,8 @@
 
 Topics in /sensors/NAME: `image_raw` (rgb8), `depth` (16UC1 in mm, 0: not measured), `segmentation` with `labels`,
 `points`, and `camera_info`, all in the optical frame `NAME_optical` (z forward, x right, y down, REP 103). Pictures are
-rendered from the visual shapes of robot and scene, exact in depth along every ray, the same with every engine. A picture
-is rendered when it arrives; ticks without a picture cost nothing.
+of the visual shapes of robot and scene, exact in depth along every ray, the same with every engine. A picture is
+rendered when it arrives; ticks without a picture cost nothing.
 """
 
 from __future__ import annotations
