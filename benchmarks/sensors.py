@@ -19,7 +19,8 @@ from manipcli.simulate.session import Session
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
-NOISE: Final = "white: 0.01, bias: 0.01, walk: 0.001, quantisation: 0.001"
+NOISE: Final = "white: 1e-6, bias: 1e-6, walk: 1e-6, quantisation: 1e-7"
+"""Small, so that the robot moves as without sensors."""
 JOINT: Final = f"joints_: {{type: joint, delay: 1 ms, noise: {{position: {{{NOISE}}}, velocity: {{{NOISE}}}}}}}"
 WRENCH: Final = f"wrist_: {{type: force_torque, link: palm, filter: 200 Hz, noise: {{force: {{{NOISE}}}}}}}"
 IMU: Final = f"imu_: {{type: imu, link: palm, filter: 200 Hz, noise: {{angular_velocity: {{{NOISE}}}}}}}"

@@ -57,7 +57,9 @@ def refuse(findings: Sequence[Diagnostic]) -> None:
 
 def robot_sensor_findings(file: Located[RobotSpec], robot: RobotModel) -> tuple[Diagnostic, ...]:
     """All errors about the sensors of a robot file, which need no task."""
-    return tuple(finding for own in _of_robot(file) for finding in _of_one(own, robot, None))
+    sensors = _of_robot(file)
+    found = [finding for own in sensors for finding in _of_one(own, robot, None)]
+    return (*found, *_names(sensors, None, robot, None), *_measured_twice(sensors, robot))
 
 
 def sensor_findings(
@@ -136,12 +138,12 @@ def _near_rates(ticks: float, period: float) -> list[str]:
 
 
 def _names(
-    sensors: list[_Named], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
+    sensors: list[_Named], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene | None
 ) -> Iterator[Diagnostic]:
     """Names that another sensor, a frame or a topic of a controller has already."""
     taken = {link.name: "a link of the robot" for link in robot.links}
-    taken |= {body.name: "a body of the scene" for body in scene.bodies}
-    taken |= {frame.name: "a frame of the scene" for frame in scene.frames} | {"world": "the world"}
+    taken |= {body.name: "a body of the scene" for body in (scene.bodies if scene else ())}
+    taken |= {frame.name: "a frame of the scene" for frame in (scene.frames if scene else ())} | {"world": "the world"}
     beside = controllers is not None and LOG_FOLDER in controllers.spec.controllers
     seen: dict[str, str] = {}
     for own in sensors:
