@@ -1,4 +1,4 @@
-"""Writes what docs/task.md, docs/robot.md and docs/controllers.md have from the code: tables and controllers.
+"""Writes what docs/task.md, robot.md, controllers.md and sensors.md have from the code: tables and controllers.
 
 A table of fields is below a line `<!-- fields of BLOCK -->`; the blocks are models in `manipcli/spec/`. The sections of
 controllers are between `<!-- begin of controllers -->` and `<!-- end of controllers -->`: each is the docstring of the
@@ -24,13 +24,30 @@ from manipcli.control.controller import ControllerMember
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.plan.path_planners import PATH_PLANNERS
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec import agree, baseline, clearance, controllers, inertials, plan, reactions, robot, task, vary
+from manipcli.simulate.sensors import SENSORS
+from manipcli.spec import (
+    agree,
+    baseline,
+    clearance,
+    controllers,
+    inertials,
+    mounted_sensor,
+    plan,
+    reactions,
+    robot,
+    sensors,
+    task,
+    vary,
+)
 from manipcli.spec.base import about
 from manipcli.spec.controllers import ControllerSpec, GainsSpec
 from manipcli.task.vocabulary import task_spec
 
-PAGES: Final = tuple(Path(__file__).with_name(name) for name in ("task.md", "robot.md", "controllers.md"))
-_MODULES: Final = (task, clearance, robot, controllers, reactions, vary, baseline, agree, plan, inertials)
+PAGES: Final = tuple(Path(__file__).with_name(name) for name in ("task.md", "robot.md", "controllers.md", "sensors.md"))
+_MODULES: Final = (
+    *(task, clearance, robot, controllers, reactions, vary, baseline, agree, plan, inertials),
+    *(sensors, mounted_sensor),
+)
 _TABLE: Final = re.compile(r"(<!-- fields of (\w+) -->\n)(?:\|.*\n)*")
 _TYPES: Final = re.compile(r"(<!-- types of controllers -->\n)(?:\|.*\n)*")
 _SECTIONS: Final = re.compile(r"(<!-- begin of controllers -->\n).*(<!-- end of controllers -->)", re.DOTALL)
@@ -38,14 +55,20 @@ _SECTIONS: Final = re.compile(r"(<!-- begin of controllers -->\n).*(<!-- end of 
 
 def renewed(page: str) -> str:
     """The text of a page with its tables and sections as the code has them."""
-    page = _TABLE.sub(lambda found: f"{found[1]}{table(_model(found[2]))}\n", page)
+    page = _TABLE.sub(lambda found: f"{found[1]}{_fields(_model(found[2]))}\n", page)
     page = _TYPES.sub(lambda found: f"{found[1]}{_types()}\n", page)
     sections = "\n\n".join(part for member in CONTROLLERS for part in _section(member))
     return _SECTIONS.sub(lambda found: f"{found[1]}\n{sections}\n\n{found[2]}", page)
 
 
+def _fields(model: type[BaseModel]) -> str:
+    """The fields of a model; of a sensor without those that all have."""
+    sensor = model in [member.spec for member in SENSORS]
+    return table(model, beside=mounted_sensor.MountedFilteredSpec) if sensor else table(model)
+
+
 def _model(name: str) -> type[BaseModel]:
-    engines = {member.spec.__name__: member.spec for member in (*ENGINES, *PATH_PLANNERS)}
+    engines = {member.spec.__name__: member.spec for member in (*ENGINES, *PATH_PLANNERS, *SENSORS)}
     simulation = task_spec().model_fields["simulation"].default
     if name in engines or name == type(simulation).__name__:
         return engines.get(name, type(simulation))

@@ -103,17 +103,17 @@ class ControllerOutput:
 
 @dataclass(frozen=True, slots=True)
 class SensorRequest:
-    """A sensor that a controller reads.
+    """A wrench (6) that a controller reads: force [N] and torque [N m].
 
     Attributes:
-        type: its type, from `simulate/sensors/`.
-        joint: the sensor is between its links.
-        frame: the link whose frame it measures in.
+        frame: the link or sensor whose frame it is measured in.
+        joint: the truth between its links; "" with `sensor`.
+        sensor: name of the sensor of the robot or task that measures it; "": the truth.
     """
 
-    type: str
-    joint: str
     frame: str
+    joint: str = ""
+    sensor: str = ""
 
 
 class Controller(Protocol):

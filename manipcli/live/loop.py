@@ -24,7 +24,7 @@ from manipcli.live.pace import Pace, Share
 from manipcli.live.play_state import Reset
 from manipcli.live.source import Source
 from manipcli.record.write.recorder import Recorder
-from manipcli.run.execute import SimulationEnd, live_world, open_session, record_saturations
+from manipcli.run.execute import SimulationEnd, live_world, open_session, record_saturations, record_sensors
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import SILENT, Observer, Progress
 from manipcli.simulate.quiet import original_stdout
@@ -150,6 +150,7 @@ def simulate_live(
             observer = Observer(recorder, live, progress if runs else SILENT, session.period)
             outside.feed.observer = observer
             session.restart_clock(outside.feed)
+            record_sensors(session, recorder)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             steps = LiveSteps(task, plan, session, recorder, live, observer, progress, outside.pace)

@@ -27,7 +27,6 @@ from manipcli.report.logs.graph import Edge, Graph, Node
 from manipcli.run.run_log import action_of, recorded
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.recording import JUDGED
 from manipcli.spec.task import TaskSpec
@@ -45,7 +44,7 @@ PRODUCERS: Final[Mapping[str, str]] = {
     channels.ACTUATOR_STATES: "drives",
 }
 """Publishing node of the topics that no controller publishes."""
-BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, *SENSORS.names)
+BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, "wrench", "sensors")
 MOST_NAMES: Final = 4
 
 
@@ -206,8 +205,8 @@ class _Builder:
         for controller in self._controllers:
             idle = not self._file.controllers[controller.name].active
             for request in controller.sensors:
-                sensor = f"{request.type} {controller.name}"
-                self._add(Node(sensor, "sensor", f"{request.type} at {request.joint}"))
+                sensor = f"wrench {controller.name}"
+                self._add(Node(sensor, "sensor", request.sensor or f"wrench at {request.joint}"))
                 self._join("engine", sensor)
                 self._join(sensor, controller.name, idle=idle, back=True)
             if controller.joints:

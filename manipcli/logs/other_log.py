@@ -28,7 +28,7 @@ from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
 from manipcli.record.foreign.snapshot import joint_state, transforms
 from manipcli.record.foreign.topics import Topics, open_topics
 from manipcli.record.read.chunk import singly
-from manipcli.replay.drawing import WORLD
+from manipcli.render.drawing import WORLD
 from manipcli.replay.playback import Playback
 from manipcli.scene.scene import Body, Scene
 

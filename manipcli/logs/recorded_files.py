@@ -18,7 +18,7 @@ from manipcli.spec.load import load_controllers_text, load_robot_text, load_task
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
-from manipcli.task.vocabulary import controllers_spec, task_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
 
 
 def recorded_task_file(recording: Recording, path: Path) -> Located[TaskSpec]:
@@ -28,7 +28,7 @@ def recorded_task_file(recording: Recording, path: Path) -> Located[TaskSpec]:
 
 def recorded_robot_file(recording: Recording, path: Path) -> Located[RobotSpec]:
     """The resolved robot file of a log."""
-    return load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}")
+    return load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}", model=robot_spec())
 
 
 def recorded_controllers_file(recording: Recording, path: Path) -> Located[ControllersSpec]:

@@ -28,7 +28,7 @@ from manipcli.task.plan_task import Plan
 from manipcli.task.robot_file import read_robot
 from manipcli.task.task import Task
 from manipcli.task.task_names import task_names
-from manipcli.task.vocabulary import controllers_spec, task_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
 
 
 def check_files(
@@ -130,7 +130,7 @@ def schema(
         names = task_names(task, package_path=package_path, allow_outside=allow_outside)
     texts: dict[load.FileKind, Callable[[], str]] = {
         "task": lambda: task_schema(task_spec(), names),
-        "robot": robot_schema,
+        "robot": lambda: robot_schema(robot_spec()),
         "controllers": lambda: controllers_schema(controllers_spec()),
     }
     parsed: Mapping[str, Plain] = json.loads(texts[kind]())

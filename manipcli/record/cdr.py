@@ -66,6 +66,13 @@ class CdrWriter:
             self._data += b"\x00" * (-(len(self._data) - 4) % 8)
             self._data += values.astype("<f8").tobytes()
 
+    def numbers(self, data: bytes, size: int) -> int:
+        """Consecutive numbers of `size` bytes each, without a length; at least one."""
+        self._data += b"\x00" * (-(len(self._data) - 4) % size)
+        offset = len(self._data)
+        self._data += data
+        return offset
+
     def octets(self, data: bytes) -> None:
         """A uint8[N] of fixed length."""
         self._data += data

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
+from manipcli.core.geometry import Array
 from manipcli.record import schemas
 from manipcli.spec.controllers import Interface
 
@@ -19,6 +20,8 @@ EVENTS = "/task/events"
 ROSOUT = "/rosout"
 MARKERS = "/markers"
 LIVE_COMMANDS = "/live/commands"
+SENSORS = "/sensors"
+"""Above the topics of sensors."""
 
 # A quality of service profile as rosbag2 stores it: the last message is kept for late subscribers.
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
@@ -96,6 +99,37 @@ class SensorChannel:
         return f"/{self.name}/{self.sensor}"
 
 
+@dataclass(frozen=True, slots=True)
+class MeasuredChannel:
+    """A topic of a sensor.
+
+    Attributes:
+        topic: its name.
+        message: ROS type, of `record/schemas.py`.
+        frame: in the header.
+        filled: fields that take the numbers of each measurement; empty for messages that are recorded one by one.
+        fixed: values of the other fields.
+        arrived: column, among the numbers of all sensors at a tick, that is 1 when a measurement arrives.
+        first, width: columns of the measurement.
+        every, delay: control ticks between measurements, and from a measurement to its arrival.
+        complete: whether every measurement arrives.
+        derive: (T, width) measurements -> (T, k) numbers of `filled`; None: the measurements themselves.
+    """
+
+    topic: str
+    message: str
+    frame: str
+    filled: tuple[str, ...] = ()
+    fixed: Mapping[str, object] = field(default_factory=dict)
+    arrived: int = 0
+    first: int = 0
+    width: int = 0
+    every: int = 1
+    delay: int = 0
+    complete: bool = True
+    derive: Callable[[Array], Array] | None = None
+
+
 Recorded = ControllerChannel | SensorChannel | None
 """Recorded channels of a loaded controller; None: not recorded."""
 
@@ -114,7 +148,9 @@ class Channel:
     definition: str = ""
 
 
-def channel_table(controllers: Sequence[Recorded], *, live: bool = False) -> tuple[Channel, ...]:
+def channel_table(
+    controllers: Sequence[Recorded], *, live: bool = False, sensors: Sequence[MeasuredChannel] = ()
+) -> tuple[Channel, ...]:
     """All channels of a recording, in the order of their ids; `live`: also that of the commands of a live session."""
     rows: list[tuple[str, str, bool]] = [
         (ROBOT_DESCRIPTION, schemas.STRING, True),
@@ -144,6 +180,7 @@ def channel_table(controllers: Sequence[Recorded], *, live: bool = False) -> tup
                 (controller.status_topic, schemas.GOAL_STATUS_ARRAY, True),
                 (controller.result_topic, result, False),
             ]
+    rows += [(sensor.topic, sensor.message, False) for sensor in sensors]
     if live:
         rows.append((LIVE_COMMANDS, schemas.LIVE_COMMAND, False))
     own = {sensor.topic: sensor.definition for sensor in controllers if isinstance(sensor, SensorChannel)}

@@ -10,8 +10,8 @@ import numpy as np
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, rotate
 from manipcli.core.text import shorten
-from manipcli.replay.drawing import Drawing
-from manipcli.replay.placing import Poses
+from manipcli.render.drawing import Drawing
+from manipcli.render.placing import Poses
 
 Vector = tuple[float, float, float]
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array, quat_product, rotate
 from manipcli.model.state import Contact
-from manipcli.replay.drawing import link_frame
-from manipcli.replay.placing import Poses
+from manipcli.render.drawing import link_frame
+from manipcli.render.placing import Poses
 from manipcli.replay.playback import Playback
 
 LEAST = 0.05

@@ -8,10 +8,10 @@ import numpy.typing as npt
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, to_si
+from manipcli.render.drawing import FLOOR, draw
+from manipcli.render.placing import Placing, Poses
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
-from manipcli.replay.drawing import FLOOR, draw
-from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.renderer import Image, Renderer
 

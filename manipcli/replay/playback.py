@@ -13,7 +13,7 @@ from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
-from manipcli.replay.placing import Placing, Poses
+from manipcli.render.placing import Placing, Poses
 from manipcli.scene.scene import Scene
 
 RATE = 50.0

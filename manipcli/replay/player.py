@@ -19,13 +19,13 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
+from manipcli.render.drawing import WORLD, Drawing, draw, floors_of, ground_height, link_frame
+from manipcli.render.placing import Poses
+from manipcli.render.surface import Surface
 from manipcli.replay.camera import framing
-from manipcli.replay.drawing import WORLD, Drawing, draw, floors_of, ground_height, link_frame
 from manipcli.replay.forces import LONGEST, Forces
 from manipcli.replay.ghost import Ghost
-from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
-from manipcli.replay.surface import Surface
 from manipcli.scene.scene import Scene
 
 Json = dict[str, object]

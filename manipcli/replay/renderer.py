@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from manipcli.model.configuration import configuration
 from manipcli.model.robot import RobotModel
+from manipcli.render.drawing import Drawable, Drawing, draw
+from manipcli.render.placing import Placing, Poses
+from manipcli.render.surface import Surface, surface
 from manipcli.replay.camera import Camera, framing
-from manipcli.replay.drawing import Drawable, Drawing, draw
-from manipcli.replay.placing import Placing, Poses
-from manipcli.replay.surface import Surface, surface
 from manipcli.simulate.rasterizer import Light, Rasterizer, View
 
 Image = npt.NDArray[np.uint8]

@@ -17,6 +17,7 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.from_motion import stopped
+from manipcli.record.channels import SENSORS
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.blocks import BlockLoop
 from manipcli.run.engine_settings import engine_settings
@@ -29,6 +30,7 @@ from manipcli.scene.drop_test import SETTLED_SHIFT
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
+from manipcli.simulate.sensor import Picture
 from manipcli.simulate.session import Session
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
@@ -100,6 +102,7 @@ def _run_steps(
         live = Live(live_world(task, plan, session), manager.controllers, session.period)
         observer = Observer(recorder, live, progress, session.period)
         session.restart_clock(observer)
+        record_sensors(session, recorder)
         run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
         try:
             BlockLoop(plan, run).run()
@@ -131,7 +134,8 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
                 engine=engine,
                 manager=manager,
                 period=simulation.control_period,
-                rng=np.random.default_rng((simulation.seed, 1)),
+                sensors=task.sensors,
+                seed=simulation.seed,
             )
             if state is None:
                 _settle(task, session)
@@ -140,6 +144,16 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
             yield session
     finally:
         engine.close()
+
+
+def record_sensors(session: Session, recorder: Recorder) -> None:
+    """Record what the sensors of a session measure from now on."""
+
+    def deliver(tick: int, taken: int, name: str, picture: Picture) -> None:
+        recorder.measured(tick, taken, f"{SENSORS}/{name}{picture.suffix}", picture.fields)
+
+    recorder.attach(session.sensors.numbers)
+    session.sensors.deliver = deliver
 
 
 def record_saturations(session: Session, recorder: Recorder) -> None:

@@ -19,12 +19,14 @@ from manipcli.judge.measured_run import Variant
 from manipcli.judge.part import PART
 from manipcli.judge.verdict import Verdict
 from manipcli.model.link_parts import LINK_PARTS, link_parts_to_json
+from manipcli.model.robot import RobotModel
 from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.attachments import CONTROLLERS, INERTIALS, ROBOT, SCENE, TASK, URDF
-from manipcli.record.channels import ControllerChannel, Recorded, SensorChannel
+from manipcli.record.channels import SENSORS, ControllerChannel, MeasuredChannel, Recorded, SensorChannel
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.recording import EMBEDDED
+from manipcli.record.schemas import WRENCH
 from manipcli.record.selection import Selection
 from manipcli.record.start_state import START_STATE
 from manipcli.record.write.recorder import Recorder
@@ -33,10 +35,12 @@ from manipcli.run.engine_settings import engine_settings
 from manipcli.scene.scene_file import scene_to_json
 from manipcli.shapes import primitives
 from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.sensors import SENSORS
+from manipcli.simulate.sensor_layout import layout, sensor_frames
+from manipcli.spec.mounted_sensor import MountedSpec
 from manipcli.spec.resolved import resolved
 from manipcli.spec.retry import expressions
 from manipcli.spec.robot import RobotSpec
+from manipcli.spec.sensors import SensorSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
@@ -129,6 +133,8 @@ def open_log(
             ),
             overwrite=overwrite,
             live=task.part.live,
+            sensors=measured_channels(task.sensors, task.true.robot, task.spec.simulation.control_period),
+            sensor_frames=sensor_frames(task.sensors, task.true.robot),
         )
         yield recorder
     except RecordingFailed as failure:
@@ -178,8 +184,31 @@ def recorded(controller: Controller) -> Recorded:
     if not controller.sensors:
         return None
     (request,) = controller.sensors
-    sensor = SENSORS[request.type]
-    return SensorChannel(controller.name, sensor.name, sensor.message, request.frame, sensor.width, sensor.definition)
+    return SensorChannel(controller.name, "wrench", WRENCH, request.frame, 6)
+
+
+def measured_channels(
+    sensors: Mapping[str, SensorSpec], robot: RobotModel, period: float
+) -> tuple[MeasuredChannel, ...]:
+    """The log channels of the sensors of a task; `period` [s] of a control tick."""
+    return tuple(
+        MeasuredChannel(
+            topic=f"{SENSORS}/{name}{topic.suffix}",
+            message=topic.type,
+            frame=name + topic.frame if isinstance(sensors[name], MountedSpec) else "",
+            filled=topic.filled,
+            fixed=topic.constant,
+            arrived=place.first,
+            first=place.first + 1,
+            width=place.width,
+            every=place.sampling.every,
+            delay=place.sampling.delay,
+            complete=place.sampling.dropout == 0.0,
+            derive=topic.derive,
+        )
+        for name, place in layout(sensors, robot, period).items()
+        for topic in place.topics
+    )
 
 
 def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:

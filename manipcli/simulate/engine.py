@@ -121,8 +121,8 @@ class Engine(Protocol):
         the robot grew a lot; cheaper than `contacts`."""
         ...
 
-    def contacts(self) -> tuple[Contact, ...]:
-        """All contacts now, sorted by the names of the parts."""
+    def contacts(self, *, peek: bool = False) -> tuple[Contact, ...]:
+        """All contacts now, sorted by the names of the parts; with `peek`, `touches_changed` ignores this call."""
         ...
 
     def close(self) -> None:

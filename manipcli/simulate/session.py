@@ -9,7 +9,7 @@ the recorder's thread and costs more than ten microseconds. `np.vdot`, `np.matmu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -19,7 +19,7 @@ from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
 from manipcli.control.limiter import JointLimiter, NotFinite
-from manipcli.control.manager import ControllerManager
+from manipcli.control.manager import ControllerManager, JointVectors
 from manipcli.control.roles import is_hand, reads_sensors
 from manipcli.control.saturation import EFFORT, MotorLimits
 from manipcli.core.errors import SimulationFailed
@@ -30,8 +30,8 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import Engine
 from manipcli.simulate.holder import Holder
-from manipcli.simulate.sensor import Sensor
-from manipcli.simulate.sensors import SENSORS
+from manipcli.simulate.sensor_bank import NO_SENSORS, SensorBank
+from manipcli.spec.sensors import SensorSpec
 
 SLOW: Final = 10
 """Control ticks between two updates of slow quantities: body velocities (at the last tick before a multiple of it), all
@@ -68,9 +68,10 @@ class Silent:
 
 
 class Session:
-    """Owns the clock of a run: control tick k begins at k * period. `rng`: of the sensors [default: seeded with 0].
+    """Owns the clock of a run: control tick k begins at k * period.
 
-    `holder`: of attached objects; None where contact and friction hold them.
+    `sensors`: of the robot and the task; `seed`: of their noise. The attribute `sensors` is their bank; `holder`: of
+    attached objects; None where contact and friction hold them.
     """
 
     def __init__(
@@ -81,7 +82,8 @@ class Session:
         engine: Engine,
         manager: ControllerManager,
         period: float,
-        rng: np.random.Generator | None = None,
+        sensors: Mapping[str, SensorSpec] = NO_SENSORS,
+        seed: int = 0,
     ) -> None:
         self.robot = robot
         self.scene = scene
@@ -99,13 +101,13 @@ class Session:
         self._obeyed = -1
         if engine.ideal:
             manager.keep_references()
-        self._rng = np.random.default_rng(0) if rng is None else rng
-        self._sensors: list[Sensor] = []
+        self.sensors = bank = SensorBank(sensors, robot, scene, engine, period=period, seed=seed, state=self.state)
+        self._measured: JointVectors | None = bank.joints
+        self._sensing = bool(bank)
         for controller in manager.controllers:
             if reads_sensors(controller):
-                opened = [SENSORS[request.type].open(engine, request) for request in controller.sensors]
-                controller.attach([sensor.reading for sensor in opened])
-                self._sensors += opened
+                asked = controller.sensors
+                controller.attach([bank.reading(r.sensor) if r.sensor else engine.sense_wrench(r.joint) for r in asked])
         n = len(robot.joint_names)
         self._contact_force = np.zeros(n)
         self._joint_of_part, self._followers = _joint_of_part(robot)
@@ -144,6 +146,7 @@ class Session:
         """Make the next tick number 0, and the first for `observer`; the world is unchanged."""
         self.ticks = 0
         self.observer = observer
+        self.sensors.reset()
         self._limiter.reset()
         self._watchful = 0
         self.actuation.reset()
@@ -154,11 +157,13 @@ class Session:
         Raises:
             SimulationFailed: the state is not finite, or a joint or a body is implausibly fast or low.
         """
-        state = self.state = self.engine.read(velocities=self.ticks % SLOW == SLOW - 1)
+        bank = self.sensors
+        state = self.state = self.engine.read(velocities=bank.body_velocities or self.ticks % SLOW == SLOW - 1)
         time = self.ticks * self.period
         state.time[...] = time
-        for sensor in self._sensors:
-            sensor.sense(state, self._rng)
+        if self._sensing:
+            bank.sense(self.ticks, state)
+        seen = self._measured or state
         self._touch(state)
         if self.holder is not None and self.holder.attached:
             self.holder.look(state, self.engine.contacts())
@@ -166,17 +171,17 @@ class Session:
             limiter = self._limiter
             self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.by_kind[EFFORT])
         manager = self.manager
-        command = manager.update(time, state, self._contact_force)
+        command = manager.update(time, seen, self._contact_force)
         if manager.faults:
             self._refuse_runaway(state)  # an implausible state is the cause, not the controller
         try:
-            self._limiter.apply(command, state.position, state.velocity, self.period)
+            self._limiter.apply(command, seen.position, seen.velocity, self.period)
         except NotFinite as bad:
             self._refuse_runaway(state)
             if not np.isfinite(state.position).all():
                 raise SimulationFailed(str(bad), time=time) from bad
             manager.stop_non_finite(time)
-            self._limiter.apply(command, state.position, state.velocity, self.period)
+            self._limiter.apply(command, seen.position, seen.velocity, self.period)
         if command.version != self._obeyed:
             self._obeyed = command.version
             self.actuation.select(command.modes)

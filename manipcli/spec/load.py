@@ -254,30 +254,42 @@ def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
             first.setdefault(own.value, f"{key}[{k}]")
 
 
-def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
-    """Loads a robot file; uses the overrides that begin with `robot.`."""
-    return load_robot_text(read_bytes(path), str(path), overrides=overrides)
+def load_robot(path: Path, *, overrides: Sequence[str] = (), model: type[RobotSpec] = RobotSpec) -> Located[RobotSpec]:
+    """Loads a robot file; uses the overrides that begin with `robot.`.
+
+    Args:
+        path: the file.
+        overrides: values of `--set`.
+        model: the result of `unions.robot_model`; `RobotSpec` itself knows no type of sensors.
+    """
+    return load_robot_text(read_bytes(path), str(path), overrides=overrides, model=model)
 
 
-def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
+def load_robot_text(
+    text: str | bytes, name: str, *, overrides: Sequence[str] = (), model: type[RobotSpec] = RobotSpec
+) -> Located[RobotSpec]:
     """As `load_robot`, from text; places call it `name`."""
-    source, findings = _robot_source(text, name, overrides)
-    return validate(source, RobotSpec, findings=findings)
+    source, findings = _robot_source(text, name, overrides, model)
+    return validate(source, model, findings=findings)
 
 
-def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Diagnostic]]:
+def _robot_source(
+    text: str | bytes, name: str, overrides: Sequence[str], model: type[RobotSpec]
+) -> tuple[Source, list[Diagnostic]]:
     written, in_text = _source(text, name, "ROBOT", "robot")
-    source, findings = _changed(written, read_overrides(overrides), RobotSpec)
+    source, findings = _changed(written, read_overrides(overrides), model)
     return source, [*in_text, *findings]
 
 
-def salvage_robot_file(path: Path, *, overrides: Sequence[str]) -> Located[RobotSpec] | None:
+def salvage_robot_file(
+    path: Path, *, overrides: Sequence[str], model: type[RobotSpec] = RobotSpec
+) -> Located[RobotSpec] | None:
     """The valid part of a robot file that `load_robot` refused, for further checks; None if too little is left."""
     try:
-        source, _ = _robot_source(read_bytes(path), str(path), overrides)
+        source, _ = _robot_source(read_bytes(path), str(path), overrides, model)
     except InvalidInput:
         return None
-    return salvage_robot(source)
+    return salvage_robot(source, model)
 
 
 def load_controllers(

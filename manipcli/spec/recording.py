@@ -37,9 +37,18 @@ class RatesSpec(Model):
 
 
 ChosenTopic = Literal[
-    "joint_states", "tf", "controller_state", "reference", "error", "actuator_states", "wrench", "contacts", "goals"
+    "joint_states",
+    "tf",
+    "controller_state",
+    "reference",
+    "error",
+    "actuator_states",
+    "wrench",
+    "contacts",
+    "goals",
+    "sensors",
 ]
-"""Optional topics; `goals` are the action topics of the controllers."""
+"""Optional topics; `goals` are the action topics of the controllers, `sensors` those below `/sensors`."""
 JUDGED: Final = ("joint_states", "tf", "controller_state")
 """Topics that the judge reads together, at the ticks at which all of them are recorded."""
 

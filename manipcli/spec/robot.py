@@ -23,6 +23,7 @@ from manipcli.spec.quantity import (
     Length,
     Turn,
 )
+from manipcli.spec.sensors import SensorName, SensorSpec
 
 if TYPE_CHECKING:
     from manipcli.core.geometry import Transform
@@ -302,6 +303,8 @@ class RobotSpec(Model):
     friction: Annotated[float, Field(ge=0)] = Field(
         1.0, description="Friction coefficient of the robot; the engine multiplies it by the other body's. Default 1."
     )
+    # `unions.robot_model` replaces the type by the union of the registered sensors.
+    sensors: dict[SensorName, SensorSpec] | None = Field(None, description="Sensors on its links, by name.")
     compat: Literal["ros1", "ros2"] | None = Field(
         None,
         description="Whose behaviour to follow where ROS 1 and ROS 2 differ: when the integral of a PID acts (ROS 1: "

@@ -32,9 +32,9 @@ def task_schema(model: type[TaskSpec], names: TaskNames | None = None) -> str:
     return _dump(schema)
 
 
-def robot_schema() -> str:
-    """Schema of a robot file."""
-    return _dump(_schema(RobotSpec, "manipcli robot"))
+def robot_schema(model: type[RobotSpec]) -> str:
+    """Schema of a robot file (`unions.robot_model`)."""
+    return _dump(_schema(model, "manipcli robot"))
 
 
 def controllers_schema(model: type[ControllersSpec]) -> str:

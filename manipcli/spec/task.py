@@ -28,6 +28,7 @@ from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.recording import JUDGED, SLOWEST, RecordSpec
 from manipcli.spec.robot import Version
 from manipcli.spec.scene import BodySpec, FrameSpec
+from manipcli.spec.sensors import SensorName, SensorSpec
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.spec.step import StepSpec
 from manipcli.spec.vary import VarySpec
@@ -52,7 +53,7 @@ class TaskSpec(Model):
     verbs: ClassVar[tuple[str, ...]] = ()
     """Words of the members of `steps`; set by `unions.task_model`."""
 
-    # `unions.task_model` replaces `steps`, `expect` and `watch` by unions of the registered members.
+    # `unions.task_model` replaces `steps`, `expect`, `watch` and `sensors` by unions of the registered members.
     task: str = Field(description="The name of the task and of its log.", min_length=1)
     version: Version = None
     robot: str = Field(description="Path of the robot file, relative to this file.", min_length=1)
@@ -68,6 +69,9 @@ class TaskSpec(Model):
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")
     frames: dict[str, FrameSpec] = Field({}, description="Named frames, for poses to refer to.")
+    sensors: dict[SensorName, SensorSpec] | None = Field(
+        None, description="Sensors in the scene or on the robot, by name; in addition to those of the robot file."
+    )
     start: PoseName | None = Field(
         None,
         description="Named pose in which the robot starts. Default: `home` if the robot has it; else every joint at 0, "

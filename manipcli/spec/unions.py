@@ -1,9 +1,9 @@
-"""Discriminated unions of steps, conditions and controllers, built from the registered members.
+"""Discriminated unions of steps, conditions, controllers and sensors, built from the registered members.
 
 A step is a mapping with exactly one verb key and the common keys `id`, `until`, `timeout` and `on_fail`; a condition is
 a mapping with its name as the only key; an expectation is a condition, or `always`, `never`, `eventually` with a
 condition, and the common keys `id`, `at`, `during` and `within`; a watch is `always` or `never`. The key `type` of a
-controller names the member.
+controller or sensor names the member.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from manipcli.spec.condition import (
 )
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.sensors import SensorName
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.spec.step import StepSpec
 from manipcli.spec.structure.words import WORDS, other_word
@@ -64,15 +66,18 @@ C = TypeVar("C", bound=SpecMember)
 E = TypeVar("E", bound=SpecMember)
 P = TypeVar("P", bound=SpecMember)
 L = TypeVar("L", bound=ControllerSpecMember)
+N = TypeVar("N", bound=SpecMember)
 
 _STEP = tuple(name for name in StepSpec.model_fields if name != "verb")
 _EXPECTATION = tuple(ExpectationSpec.model_fields)
 
 
-def task_model(steps: Seam[S], conditions: Seam[C], engines: Seam[E], planners: Seam[P]) -> type[TaskSpec]:
-    """`TaskSpec` with the steps, conditions, engines and path planners of the seams; the same class for the same
-    members."""
-    return _task_model(_members(steps), _members(conditions), _members(engines), _members(planners))
+def task_model(
+    steps: Seam[S], conditions: Seam[C], engines: Seam[E], planners: Seam[P], sensors: Seam[N]
+) -> type[TaskSpec]:
+    """`TaskSpec` with the steps, conditions, engines, path planners and sensors of the seams; the same class for the
+    same members."""
+    return _task_model(_members(steps), _members(conditions), _members(engines), _members(planners), _members(sensors))
 
 
 Members = tuple[tuple[str, type[Model]], ...]
@@ -83,7 +88,9 @@ def _members(seam: Seam[S]) -> Members:
 
 
 @lru_cache(maxsize=8)
-def _task_model(steps: Members, conditions: Members, engines: Members, planners: Members) -> type[TaskSpec]:
+def _task_model(
+    steps: Members, conditions: Members, engines: Members, planners: Members, sensors: Members
+) -> type[TaskSpec]:
     condition = _conditions(conditions)
     expectation = _expectations(conditions, condition)
     until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`object` has no operator `|`)
@@ -105,6 +112,7 @@ def _task_model(steps: Members, conditions: Members, engines: Members, planners:
                 planners[0][1](), description=TaskSpec.model_fields["planner"].description
             ),
         ),
+        sensors=(_sensors(sensors), TaskSpec.model_fields["sensors"]),  # type: ignore[arg-type]
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         blocks=(tuple[block, ...], TaskSpec.model_fields["blocks"]),
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
@@ -140,9 +148,7 @@ def simulation_model(engines: Members) -> type[SimulationSpec]:
 
 def _planners(members: Members) -> object:
     """Union of the path planners by their `type`, the first by default."""
-    any_of: object = reduce(or_, [spec for _, spec in members[1:]], members[0][1])
-    if len(members) > 1:
-        any_of = Annotated[any_of, Field(discriminator="type")]
+    any_of = _by_type([spec for _, spec in members])
     default = members[0][0]
 
     def typed(value: object) -> object:
@@ -158,10 +164,7 @@ def controllers_model(controllers: Seam[L]) -> type[ControllersSpec]:
 
 @lru_cache(maxsize=8)
 def _controllers_model(members: tuple[tuple[str, type[ControllerSpec]], ...]) -> type[ControllersSpec]:
-    specs = [spec for _, spec in members]
-    any_of: object = reduce(or_, specs[1:], specs[0])
-    if len(specs) > 1:
-        any_of = Annotated[any_of, Field(discriminator="type")]
+    any_of = _by_type([spec for _, spec in members])
     # This type exists only at run time; type checkers cannot follow it.
     model = create_model(
         "ControllersSpec",
@@ -171,6 +174,32 @@ def _controllers_model(members: tuple[tuple[str, type[ControllerSpec]], ...]) ->
     )
     model.types = MappingProxyType(dict(members))
     return cast(type[ControllersSpec], model)
+
+
+def robot_model(sensors: Seam[N]) -> type[RobotSpec]:
+    """`RobotSpec` with the sensors of the members; the same class for the same members."""
+    return _robot_model(_members(sensors))
+
+
+@lru_cache(maxsize=8)
+def _robot_model(members: Members) -> type[RobotSpec]:
+    field = (_sensors(members), RobotSpec.model_fields["sensors"])
+    return cast(
+        type[RobotSpec],
+        create_model("RobotSpec", __base__=RobotSpec, __doc__=RobotSpec.__doc__, sensors=field),  # type: ignore[arg-type]
+    )
+
+
+def _sensors(members: Members) -> object:
+    """Sensors by name, each of any type."""
+    any_of = _by_type([spec for _, spec in members])
+    return Optional[dict[SensorName, any_of]]  # type: ignore[valid-type]  # noqa: UP045  (a type only at run time)
+
+
+def _by_type(specs: Sequence[type[Model]]) -> object:
+    """Union of specs by their key `type`."""
+    any_of: object = reduce(or_, specs[1:], specs[0])
+    return Annotated[any_of, Field(discriminator="type")] if len(specs) > 1 else any_of
 
 
 def _conditions(members: Members) -> object:

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from manipcli.spec.load import load_robot, read_bytes
+from manipcli.task.vocabulary import robot_spec
 
 
 @contextmanager
@@ -24,7 +25,7 @@ def bare_task(robot: Path, controllers: Path) -> Iterator[Path]:
         InvalidInput: a file is missing; the robot file is of another kind or faulty.
     """
     read_bytes(controllers)
-    name = re.sub(r"[^A-Za-z0-9_]+", "_", load_robot(robot).spec.robot).strip("_")[:80] or "robot"
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", load_robot(robot, model=robot_spec()).spec.robot).strip("_")[:80] or "robot"
     entries = {"task": name, "robot": str(robot.resolve()), "controllers": str(controllers.resolve())}
     lines = [f"{key}: {json.dumps(value)}" for key, value in entries.items()]
     with TemporaryDirectory(prefix="manipcli-") as folder:

@@ -18,10 +18,11 @@ from manipcli.task.consistency import consistent
 from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample
 from manipcli.task.second_chances import every_finding
+from manipcli.task.sensor_checks import refuse, sensor_findings
 from manipcli.task.task import Task
 from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
-from manipcli.task.vocabulary import controllers_spec, task_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
 
 
 class FileOptions(TypedDict, total=False):
@@ -129,7 +130,7 @@ def _as_written(
     find = finder(path, package_path=package_path, allow_outside=allow_outside)
     file = load_task_file(path, model=task_spec(), overrides=overrides, seed=seed, find=find)
     robot_path, controllers_path = named_file(file, path, "robot"), named_file(file, path, "controllers")
-    robot_file = load_robot(robot_path, overrides=overrides)
+    robot_file = load_robot(robot_path, overrides=overrides, model=robot_spec())
     robot, notes = build_robot(
         robot_file.spec,
         file=robot_path,
@@ -143,6 +144,7 @@ def _as_written(
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
     warnings = consistent(file, controllers_file, robot, scene)
+    refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
     varied = bound(Files(file, robot_file, controllers_file))
     findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings)
     return Task(file, robot_file, controllers_file, robot, scene, findings), varied

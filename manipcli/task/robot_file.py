@@ -12,6 +12,8 @@ from manipcli.spec.load import load_robot
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 from manipcli.task.second_chances import every_robot_finding
+from manipcli.task.sensor_checks import refuse, robot_sensor_findings
+from manipcli.task.vocabulary import robot_spec
 
 
 def read_robot(
@@ -28,10 +30,11 @@ def read_robot(
         InvalidInput: all errors of the file and of the files it names.
     """
     try:
-        file = load_robot(path)
+        file = load_robot(path, model=robot_spec())
         robot, notes = build_robot(
             file.spec, file=path, package_path=package_path, allow_outside=allow_outside, source=file.source
         )
+        refuse(robot_sensor_findings(file, robot))
     except InvalidInput as first:
         raise every_robot_finding(path, first, package_path=package_path, allow_outside=allow_outside) from None
     return file, robot, (*file.findings, *notes)

@@ -27,9 +27,10 @@ from manipcli.task.changed_files import Files, out_of_range
 from manipcli.task.consistency import disagreements, not_there
 from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
+from manipcli.task.sensor_checks import robot_sensor_findings, sensor_findings
 from manipcli.task.task_files import finder
 from manipcli.task.vary import bind
-from manipcli.task.vocabulary import controllers_spec, task_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
 
 T = TypeVar("T")
 
@@ -73,6 +74,7 @@ def every_finding(
     if robot.model is not None:
         found = disagreements(partial, partial_controllers, robot.model, known_scene)
         errors.found += [finding for finding in found if finding.severity == "error"]
+        errors.found += sensor_findings(partial, robot.file, partial_controllers, robot.model, known_scene)
     else:
         errors.found += not_there(partial, named_robot(partial.spec), known_scene)
     if task is not None and robot.file is not None and controllers_file is not None:
@@ -91,7 +93,7 @@ def every_robot_finding(
 ) -> InvalidInput:
     """All errors of a robot file and of its descriptions; arguments as of `every_finding`."""
     errors = _Errors()
-    _Robot.read(path, errors, overrides, package_path, allow_outside)
+    _Robot.read(path, errors, overrides, package_path, allow_outside, alone=True)
     return errors.refusal(first)
 
 
@@ -139,11 +141,13 @@ class _Robot:
         overrides: Sequence[str],
         package_path: Sequence[Path],
         allow_outside: bool,
+        *,
+        alone: bool = False,
     ) -> _Robot:
         if path is None:
             return cls(None, None)
-        file = errors.of(lambda: load.load_robot(path, overrides=overrides))
-        partial = file or load.salvage_robot_file(path, overrides=overrides)
+        file = errors.of(lambda: load.load_robot(path, overrides=overrides, model=robot_spec()))
+        partial = file or load.salvage_robot_file(path, overrides=overrides, model=robot_spec())
         if partial is None:
             return cls(None, None)
         building = _Errors()
@@ -154,6 +158,8 @@ class _Robot:
         )
         # Notes on missing values may concern values that were removed.
         errors.found += [finding for finding in building.found if file is not None or finding.severity == "error"]
+        if file is not None and built is not None and alone:
+            errors.found += robot_sensor_findings(file, built[0])
         return cls(file, built[0] if built is not None and is_whole(partial) else None)
 
 

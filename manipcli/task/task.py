@@ -13,6 +13,7 @@ from manipcli.scene.scene import Scene
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
+from manipcli.spec.sensors import SensorSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.part import WHOLE, Part
 
@@ -78,6 +79,11 @@ class Task:
     def controllers(self) -> ControllersSpec:
         """The controllers file."""
         return self.controllers_file.spec
+
+    @property
+    def sensors(self) -> Mapping[str, SensorSpec]:
+        """The sensors of the robot file, then those of the task, by name."""
+        return {**(self.robot_file.spec.sensors or {}), **(self.spec.sensors or {})}
 
     def log_place(self, *path: str | int) -> str:
         """A place without its folder, for logs: `pour.yaml:21:5`."""

@@ -20,7 +20,6 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.plan.claimed_joints import Claims, unfollowed
-from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot
@@ -168,7 +167,6 @@ def test_a_pid_loop_is_of_the_gains_in_its_file_on_one_interface(member: Control
 
 
 @every_controller
-def test_it_asks_for_sensors_that_there_are_at_links_that_there_are(member: ControllerMember[ControllerSpec]) -> None:
+def test_it_asks_for_wrenches_at_links_that_there_are(member: ControllerMember[ControllerSpec]) -> None:
     for request in built(member).sensors:
-        assert request.type in SENSORS.names
         assert robot().joint(request.joint).child == request.frame

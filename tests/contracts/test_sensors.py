@@ -4,24 +4,32 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from manipcli.control.controller import SensorRequest
+from manipcli.core.geometry import Array
 from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
 from manipcli.record.schemas import schema_text
-from manipcli.record.write.rows import sensor_template
+from manipcli.record.write.rows import measured_template
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.sensor import SensorMember
+from manipcli.simulate.sensor import AnySensor
+from manipcli.simulate.sensor_bank import SensorBank
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.load import load_robot
+from manipcli.spec.sensors import SensorSpec
 
 ROBOT = Path(__file__).parents[2] / "robots" / "arm7_hand3" / "robot.yaml"
+NEEDED: dict[str, dict[str, Any]] = {
+    "contact": {"threshold": 1.0},
+    "tactile": {"size": (0.1, 0.1), "rows": 2, "columns": 3},
+}
+"""Keys without a default."""
 every_sensor = pytest.mark.parametrize("member", SENSORS.members, ids=SENSORS.names)
 
 
@@ -31,55 +39,69 @@ def robot() -> RobotModel:
     return build_robot(file.spec, file=ROBOT, source=file.source)[0]
 
 
-def request_of(member: SensorMember, model: RobotModel) -> SensorRequest:
-    """At the last joint of the arm."""
-    joint = next(joint for joint in model.joints if joint.name == "joint_7")
-    return SensorRequest(member.name, joint.name, joint.child)
+def spec_of(member: AnySensor) -> SensorSpec:
+    """On the palm, if it has a place."""
+    keys = {"type": member.name, **NEEDED.get(member.name, {})}
+    if "link" in member.spec.model_fields:
+        keys["link"] = "palm"
+    spec: SensorSpec = member.spec.model_validate(keys)
+    return spec
 
 
 @every_sensor
 @pytest.mark.parametrize("engine", ENGINES.members, ids=ENGINES.names)
-def test_it_writes_one_array_and_its_randomness_is_that_of_the_generator(
-    member: SensorMember, engine: EngineMember
+def test_its_numbers_are_finite_in_one_array_and_the_same_for_the_same_seed(
+    member: AnySensor, engine: EngineMember
 ) -> None:
     scene = Scene(bodies=(), frames=(), gravity=np.array([0.0, 0.0, -9.81]))
     start = np.zeros(len(robot().joint_names))
     world = engine.open(robot(), scene, EngineSettings(step=1e-3, substeps=1, start=start))
     try:
-        sensors = [member.open(world, request_of(member, robot())) for _ in range(2)]
-        generators = [np.random.default_rng(3) for _ in sensors]
-        assert [sensor.reading.tolist() for sensor in sensors] == [[0.0] * member.width] * 2
-        arrays = [sensor.reading for sensor in sensors]
-        for _ in range(5):
+        sensors = {"it": spec_of(member)}
+        banks = [SensorBank(sensors, robot(), scene, world, period=1e-3, seed=3, state=world.read()) for _ in range(2)]
+        readings = [bank.reading("it") for bank in banks]
+        for tick in range(5):
             world.advance()
             state = world.read()
-            one, other = (sensor.sense(state, rng) for sensor, rng in zip(sensors, generators, strict=True))
-            assert (one is arrays[0], other is arrays[1]) == (True, True)
-            np.testing.assert_array_equal(one, other)
-            assert np.isfinite(one).all()
-        assert (engine.physics == "full") == bool(np.abs(arrays[0]).max() > 0.0)
+            for bank in banks:
+                bank.sense(tick, state)
+            assert all(bank.reading("it") is not None for bank in banks)
+            np.testing.assert_array_equal(*readings)
+            assert np.isfinite(readings[0]).all()
+        assert readings[0].size == sum(q.width for q in member.quantities(sensors["it"], robot()))
     finally:
         world.close()
 
 
 @every_sensor
-def test_its_message_is_a_header_and_one_number_for_each_of_its_reading(member: SensorMember) -> None:
-    """As another library decodes it: ones in, as many ones out, and nothing left."""
-    store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(member.definition or schema_text(member.message), member.message))
-    template = sensor_template(1, "link", member.width)
-    data = bytearray(template.data)
-    ((offset, count),) = template.runs
-    assert count == member.width
-    data[offset : offset + 8 * count] = np.ones(count).tobytes()
-    message = store.deserialize_cdr(bytes(data), member.message)
-    assert message.header.frame_id == "link"
-    assert _numbers(message) == [1.0] * member.width
+def test_its_message_takes_the_numbers_of_a_reading(member: AnySensor) -> None:
+    """As another library decodes it: the numbers that are filled in are there, in their order."""
+    spec = spec_of(member)
+    width = sum(q.width for q in member.quantities(spec, robot()))
+    reading = np.arange(1.0, width + 1.0)
+    for topic in member.topics(spec, robot()):
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(schema_text(topic.type), topic.type))
+        template = measured_template(1, topic.type, topic.filled, topic.constant, "place")
+        wanted = reading if topic.derive is None else topic.derive(reading[None])[0]
+        data, first = bytearray(template.data), 0
+        for (offset, count), code in zip(template.runs, template.codes, strict=True):
+            raw = wanted[first : first + count].astype(code).tobytes()
+            data[offset : offset + len(raw)] = raw
+            first += count
+        assert first == (len(wanted) if topic.filled else 0)
+        message = store.deserialize_cdr(bytes(data), topic.type)
+        assert message.header.frame_id == "place"
+        found = [number for path in topic.filled for number in _numbers(getattr(message, path))]
+        np.testing.assert_allclose(found, wanted[:first])
 
 
-def _numbers(message: object) -> list[float]:
-    """Every float of a message, depth first."""
-    if isinstance(message, float):
-        return [message]
-    fields = vars(message).values() if hasattr(message, "__dict__") else ()
+def _numbers(value: Any) -> list[float]:
+    """Every number of a field, depth first."""
+    if isinstance(value, bool | int | float):
+        return [float(value)]
+    if isinstance(value, np.ndarray):
+        numbers: Array = value.astype(float)
+        return list(numbers.ravel())
+    fields = [each for name, each in vars(value).items() if not name.startswith("__")]
     return [number for field in fields for number in _numbers(field)]

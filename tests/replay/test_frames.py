@@ -15,13 +15,13 @@ from PIL import Image
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
 from manipcli.judge.verdict import StepOutcome, Verdict
+from manipcli.render.drawing import draw
+from manipcli.render.placing import Placing, Poses
 from manipcli.replay import contact_sheet as sheets
 from manipcli.replay import video as videos
 from manipcli.replay.camera import VIEWS, Camera, direction
 from manipcli.replay.caption import NOW
-from manipcli.replay.drawing import draw
 from manipcli.replay.frames import Frames, clearest_time, moment, parse_size
-from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.renderer import Renderer, png_bytes
 from manipcli.scene.scene import Body, Scene

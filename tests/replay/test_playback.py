@@ -25,8 +25,8 @@ from manipcli.pipeline import run_task
 from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
+from manipcli.render.drawing import draw
 from manipcli.replay.display_sampling import SampledContacts, sampled
-from manipcli.replay.drawing import draw
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.player import player_page
 from manipcli.shapes.primitives import Mesh

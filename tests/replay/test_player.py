@@ -17,7 +17,7 @@ from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact, ContactPoint
-from manipcli.replay.drawing import draw
+from manipcli.render.drawing import draw
 from manipcli.replay.playback import Phase, Playback, PlaybackStep
 from manipcli.replay.player import player_html, player_page
 from manipcli.scene.scene import Body, Scene

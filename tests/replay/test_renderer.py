@@ -12,9 +12,9 @@ import pytest
 from PIL import Image as PillowImage
 
 from manipcli.core.geometry import Transform, frozen
+from manipcli.render.drawing import draw
+from manipcli.render.placing import Placing
 from manipcli.replay.camera import Camera, framing
-from manipcli.replay.drawing import draw
-from manipcli.replay.placing import Placing
 from manipcli.replay.renderer import Renderer, png_bytes, sky
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Box, Geometry, Sphere

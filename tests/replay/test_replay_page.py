@@ -20,7 +20,7 @@ from manipcli.core.geometry import matrix_from_quat
 from manipcli.judge.verdict import StepOutcome
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
-from manipcli.replay.drawing import draw
+from manipcli.render.drawing import draw
 from manipcli.replay.ghost import ghost_of
 from manipcli.replay.page_server import PageServer
 from manipcli.replay.playback import RATE, Playback, PlaybackStep

@@ -17,7 +17,7 @@ from manipcli.core.cache import MAGIC
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.description.packages import Packages
-from manipcli.replay.drawing import Layer, draw
+from manipcli.render.drawing import Layer, draw
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.scene.scene_file import scene_from_json, scene_to_json

@@ -91,7 +91,7 @@ class ScriptedEngine:
         seen, self.seen = self.seen, self.touching
         return seen != self.seen
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self, *, peek: bool = False) -> tuple[Contact, ...]:
         return self.touching
 
     def close(self) -> None: ...

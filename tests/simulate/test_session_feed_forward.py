@@ -80,7 +80,7 @@ class Standing:
     def touches_changed(self):
         return False
 
-    def contacts(self):
+    def contacts(self, *, peek=False):
         return ()
 
     def close(self):

@@ -11,7 +11,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.spec.load import load_controllers_text, load_robot_text
 from manipcli.spec.resolved import resolved
 from manipcli.spec.schema import controllers_schema, robot_schema
-from manipcli.task.vocabulary import controllers_spec
+from manipcli.task.vocabulary import controllers_spec, robot_spec
 
 PAPER = """\
 arm_controller:
@@ -197,7 +197,7 @@ def test_a_quaternion_is_of_length_one_within_a_thousandth() -> None:
 
 
 def test_schemas_are_deterministic_and_say_limits_in_json_schema() -> None:
-    assert robot_schema() == robot_schema()
+    assert robot_schema(robot_spec()) == robot_schema(robot_spec())
     schema = json.loads(controllers_schema(controllers_spec()))
     speed = schema["$defs"]["GripperSpec"]["properties"]["speed"]
     speed = speed["anyOf"][0]  # or null
@@ -205,6 +205,6 @@ def test_schemas_are_deterministic_and_say_limits_in_json_schema() -> None:
     assert speed["type"] == ["number", "string"]
     one_of = schema["properties"]["controllers"]["additionalProperties"]["oneOf"]
     assert {f"#/$defs/{name}Spec" for name in ("JointTrajectory", "Gripper", "Pid")} < {one["$ref"] for one in one_of}
-    for words in (robot_schema(), controllers_schema(controllers_spec())):
+    for words in (robot_schema(robot_spec()), controllers_schema(controllers_spec())):
         assert '"gt"' not in words
         assert '"ge"' not in words

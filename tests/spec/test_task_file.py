@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.registry import Seam
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task, load_task_text
 from manipcli.spec.located import Located
@@ -92,7 +93,7 @@ STEPS = Seam("step", (Member("move", Move), Member("pour", Pour), Member("wait",
 CONDITIONS = Seam("condition", (Member("inside", Inside), Member("near", Near)))
 ENGINES = Seam("engine", (Member("pybullet", Solver), Member("kinematic", Plain)))
 PATH_PLANNERS = Seam("path planner", (Member("rrt_connect", PlannerSpec),))
-MODEL = task_model(STEPS, CONDITIONS, ENGINES, PATH_PLANNERS)
+MODEL = task_model(STEPS, CONDITIONS, ENGINES, PATH_PLANNERS, SENSORS)
 
 TASK = """\
 task: pour

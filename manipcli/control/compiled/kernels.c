@@ -1,4 +1,4 @@
-/* Kernels of the control tick: the laws of manipcli/control for all joints of a controller in one call.
+/* Kernels of the control tick, the laws of manipcli/control for all joints of a controller in one call, and of pictures.
  *
  * Each kernel computes what a law in Python computes with numpy, operation by operation and in the same order, so that
  * both give the same bits: no fused multiply-add (-ffp-contract=off), no sums over joints. The law in Python is the
@@ -354,6 +354,244 @@ static const char *wrong_rows(const Kernel *self)
     return NULL;
 }
 
+/* raster: the triangles of surfaces seen by a pinhole camera, in a depth buffer. run()
+ *
+ * Homogeneous edge functions, so that no triangle is clipped: with A, B, C in the camera's frame and a ray d = (x, y, 1),
+ * the weights of the corners are d.(BxC), d.(CxA) and d.(AxB), of one sign within the triangle, and the depth is
+ * A.(BxC) over their sum. The edge of two triangles has the same value with the other sign in the other one, so that no
+ * ray passes between them. */
+static PyObject *run_raster(Kernel *self, PyObject *const *args)
+{
+    enum { VERTICES, NORMALS, FACES, FIRST_VERTEX, FIRST_FACE, POSES, LIGHTS, SHOWN, LENS, COLUMNS, ROWS, POINTS, DEPTH,
+           FACE, SHADE, SLOPE };
+    const double *vertices = doubles(self, VERTICES), *normals = doubles(self, NORMALS), *poses = doubles(self, POSES);
+    const double *lights = doubles(self, LIGHTS), *lens = doubles(self, LENS);
+    const double *columns = doubles(self, COLUMNS), *rows = doubles(self, ROWS);
+    const int64_t *faces = integers(self, FACES), *first_vertex = integers(self, FIRST_VERTEX);
+    const int64_t *first_face = integers(self, FIRST_FACE);
+    const unsigned char *shown = flags(self, SHOWN);
+    double *points = doubles(self, POINTS), *depth = doubles(self, DEPTH), *shade = doubles(self, SHADE);
+    double *slope = doubles(self, SLOPE);
+    int64_t *face = integers(self, FACE);
+    const double fx = lens[0], fy = lens[1], cx = lens[2], cy = lens[3], near = lens[4], margin = lens[5];
+    Size width = length(self, COLUMNS), height = length(self, ROWS);
+    (void)args;
+    Py_BEGIN_ALLOW_THREADS;
+    for (Size k = 0; k < width * height; k++) {
+        depth[k] = INFINITY;
+        shade[k] = slope[k] = 0.0;
+        face[k] = -1;
+    }
+    for (Size s = 0; s < self->n; s++) {
+        const double *R = poses + 12 * s, *t = R + 9, *light = lights + 3 * s;
+        if (!shown[s]) continue;
+        for (Size k = first_vertex[s]; k < first_vertex[s + 1]; k++) {
+            const double *v = vertices + 3 * k, *normal = normals + 3 * k;
+            double *p = points + 6 * k;
+            for (Size i = 0; i < 3; i++) p[i] = ((R[3 * i] * v[0] + R[3 * i + 1] * v[1]) + R[3 * i + 2] * v[2]) + t[i];
+            p[3] = fx * (p[0] / p[2]) + cx;
+            p[4] = fy * (p[1] / p[2]) + cy;
+            p[5] = (normal[0] * light[0] + normal[1] * light[1]) + normal[2] * light[2];
+        }
+        for (Size f = first_face[s]; f < first_face[s + 1]; f++) {
+            const double *a = points + 6 * faces[3 * f], *b = points + 6 * faces[3 * f + 1];
+            const double *c = points + 6 * faces[3 * f + 2];
+            double left = 0.0, right = (double)(width - 1), top = 0.0, bottom = (double)(height - 1), sign, det;
+            double e[3][3], n[3], long_n;
+            int ahead = (a[2] > near) + (b[2] > near) + (c[2] > near);
+            if (ahead == 0) continue;
+            if (ahead == 3) { /* else the projection of the corners does not bound that of the triangle */
+                left = larger(left, ceil(smaller(smaller(a[3], b[3]), c[3]) - margin));
+                right = smaller(right, floor(larger(larger(a[3], b[3]), c[3]) + margin));
+                top = larger(top, ceil(smaller(smaller(a[4], b[4]), c[4]) - margin));
+                bottom = smaller(bottom, floor(larger(larger(a[4], b[4]), c[4]) + margin));
+            }
+            if (!(left <= right && top <= bottom)) continue;
+            for (Size i = 0; i < 3; i++) {
+                Size j = (i + 1) % 3, k = (i + 2) % 3;
+                e[0][i] = b[j] * c[k] - b[k] * c[j];
+                e[1][i] = c[j] * a[k] - c[k] * a[j];
+                e[2][i] = a[j] * b[k] - a[k] * b[j];
+            }
+            det = (a[0] * e[0][0] + a[1] * e[0][1]) + a[2] * e[0][2];
+            if (det == 0.0) continue;
+            sign = det > 0.0 ? 1.0 : -1.0; /* positive: seen from inside */
+            for (Size i = 0; i < 3; i++) n[i] = (e[0][i] + e[1][i]) + e[2][i];
+            long_n = sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
+            for (Size y = (Size)top; y <= (Size)bottom; y++)
+                for (Size x = (Size)left; x <= (Size)right; x++) {
+                    double u = sign * ((e[0][0] * columns[x] + e[0][1] * rows[y]) + e[0][2]);
+                    double v = sign * ((e[1][0] * columns[x] + e[1][1] * rows[y]) + e[1][2]);
+                    double w = sign * ((e[2][0] * columns[x] + e[2][1] * rows[y]) + e[2][2]), sum, z;
+                    Size at = y * width + x;
+                    if (!(u >= 0.0 && v >= 0.0 && w >= 0.0)) continue;
+                    sum = (u + v) + w;
+                    z = (sign * det) / sum; /* sum 0: infinite or NaN, never nearer */
+                    if (!(z > near && z < depth[at])) continue;
+                    depth[at] = z;
+                    face[at] = f;
+                    shade[at] = -sign * (((u * a[5] + v * b[5]) + w * c[5]) / sum);
+                    slope[at] = sum / long_n;
+                }
+        }
+    }
+    Py_END_ALLOW_THREADS;
+    Py_RETURN_NONE;
+}
+
+/* Whether the surfaces cover the vertices and faces, which are arrays `vertices`, `faces` and the two of firsts. */
+static const char *wrong_surfaces(const Kernel *self, Size vertices, Size faces, Size firsts)
+{
+    const int64_t *corner = integers(self, faces), *vertex = integers(self, firsts), *face = integers(self, firsts + 1);
+    Size n = self->n;
+    if (length(self, vertices) % 3 || length(self, faces) % 3) return "expected triples";
+    if (length(self, firsts) != n + 1 || length(self, firsts + 1) != n + 1) return "expected the first of each surface";
+    if (vertex[0] != 0 || face[0] != 0 || 3 * vertex[n] != length(self, vertices) || 3 * face[n] != length(self, faces))
+        return "surfaces do not cover the vertices and faces";
+    for (Size s = 0; s < n; s++) {
+        if (vertex[s] > vertex[s + 1] || face[s] > face[s + 1]) return "surfaces out of order";
+        for (Size k = 3 * face[s]; k < 3 * face[s + 1]; k++)
+            if (corner[k] < vertex[s] || corner[k] >= vertex[s + 1]) return "a wrong vertex";
+    }
+    return NULL;
+}
+
+static const char *wrong_raster(const Kernel *self)
+{
+    Size pixels = length(self, 9) * length(self, 10);
+    if (length(self, 0) != length(self, 1) || length(self, 5) != 12 * self->n || length(self, 8) != 6)
+        return "vectors of another length";
+    if (length(self, 11) != 2 * length(self, 0)) return "expected six numbers per point";
+    for (Size k = 12; k < 16; k++)
+        if (length(self, k) != pixels) return "wrong picture";
+    return wrong_surfaces(self, 0, 2, 3);
+}
+
+/* scan: distances along rays in the plane z = 0 of a frame to the segments in which it cuts triangles. run()
+ *
+ * A ray through an end of a segment meets one of the two segments there: sides are half open. Angles only bound the rays
+ * that are tried. */
+static PyObject *run_scan(Kernel *self, PyObject *const *args)
+{
+    enum { VERTICES, FACES, FIRST_VERTEX, FIRST_FACE, POSES, SHOWN, ANGLES, RAYS, POINTS, DISTANCES };
+    const double *vertices = doubles(self, VERTICES), *poses = doubles(self, POSES), *angles = doubles(self, ANGLES);
+    const double *rays = doubles(self, RAYS);
+    const int64_t *faces = integers(self, FACES), *first_vertex = integers(self, FIRST_VERTEX);
+    const int64_t *first_face = integers(self, FIRST_FACE);
+    const unsigned char *shown = flags(self, SHOWN);
+    double *points = doubles(self, POINTS), *distances = doubles(self, DISTANCES);
+    const double turn = 6.283185307179586;
+    Size n = length(self, ANGLES);
+    double step = n > 1 ? (angles[n - 1] - angles[0]) / (double)(n - 1) : 0.0;
+    (void)args;
+    for (Size k = 0; k < n; k++) distances[k] = INFINITY;
+    for (Size s = 0; s < self->n; s++) {
+        const double *R = poses + 12 * s, *t = R + 9;
+        if (!shown[s]) continue;
+        for (Size k = first_vertex[s]; k < first_vertex[s + 1]; k++) {
+            const double *v = vertices + 3 * k;
+            for (Size i = 0; i < 3; i++)
+                points[3 * k + i] = ((R[3 * i] * v[0] + R[3 * i + 1] * v[1]) + R[3 * i + 2] * v[2]) + t[i];
+        }
+        for (Size f = first_face[s]; f < first_face[s + 1]; f++) {
+            const double *corner[3] = {points + 3 * faces[3 * f], points + 3 * faces[3 * f + 1], points + 3 * faces[3 * f + 2]};
+            int above[3] = {corner[0][2] >= 0.0, corner[1][2] >= 0.0, corner[2][2] >= 0.0};
+            int count = above[0] + above[1] + above[2], alone = 0;
+            double end[2][2], way[2], across, low, high;
+            if (count == 0 || count == 3) continue;
+            while (above[alone] != (count == 1)) alone++;
+            for (int i = 0; i < 2; i++) {
+                const double *p = corner[alone], *q = corner[(alone + 1 + i) % 3];
+                double share = p[2] / (p[2] - q[2]);
+                end[i][0] = p[0] + share * (q[0] - p[0]);
+                end[i][1] = p[1] + share * (q[1] - p[1]);
+            }
+            way[0] = end[1][0] - end[0][0];
+            way[1] = end[1][1] - end[0][1];
+            across = end[0][0] * way[1] - end[0][1] * way[0];
+            low = atan2(end[0][1], end[0][0]);
+            high = atan2(end[1][1], end[1][0]);
+            if (low > high) {
+                double swapped = low;
+                low = high;
+                high = swapped;
+            }
+            if (high - low > turn / 2.0) {
+                double swapped = low + turn;
+                low = high;
+                high = swapped;
+            }
+            for (int shift = -2; shift <= 2; shift++) {
+                Size from = 0, to = n - 1;
+                if (step > 0.0) {
+                    double a = floor((low + shift * turn - angles[0]) / step) - 1.0;
+                    double b = ceil((high + shift * turn - angles[0]) / step) + 1.0;
+                    if (b < 0.0 || a > (double)(n - 1)) continue;
+                    if (a > 0.0) from = (Size)a;
+                    if (b < (double)(n - 1)) to = (Size)b;
+                } else if (shift != 0) continue;
+                for (Size k = from; k <= to; k++) {
+                    const double *d = rays + 2 * k;
+                    double one = d[0] * end[0][1] - d[1] * end[0][0], two = d[0] * end[1][1] - d[1] * end[1][0], r;
+                    if ((one >= 0.0) == (two >= 0.0)) continue;
+                    r = across / (d[0] * way[1] - d[1] * way[0]);
+                    if (r > 0.0 && r < distances[k]) distances[k] = r;
+                }
+            }
+        }
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_scan(const Kernel *self)
+{
+    if (length(self, 8) != length(self, 0) || length(self, 4) != 12 * self->n) return "vectors of another length";
+    if (length(self, 6) == 0 || length(self, 7) != 2 * length(self, 6) || length(self, 9) != length(self, 6)) return "wrong rays";
+    return wrong_surfaces(self, 0, 1, 2);
+}
+
+/* sensor: SignalChain.step without the draw of its noise. run(tick) -> whether a measurement arrives. */
+static PyObject *run_sensor(Kernel *self, PyObject *const *args)
+{
+    enum { TRUTH, LOW, NOISE, LOST, QUANTUM, LEAST, MOST, RING, RING_LOST, READING, BLEND, TIMES };
+    const double *truth = doubles(self, TRUTH), *quantum = doubles(self, QUANTUM);
+    const double *least = doubles(self, LEAST), *most = doubles(self, MOST);
+    double *low = doubles(self, LOW), blend = *doubles(self, BLEND);
+    int64_t every = integers(self, TIMES)[0], delay = integers(self, TIMES)[1];
+    Size n = self->n, block = length(self, LOST), slots = length(self, RING_LOST);
+    unsigned char *ring_lost = flags(self, RING_LOST);
+    int64_t tick = PyLong_AsLongLong(args[0]);
+    if (tick == -1 && PyErr_Occurred()) return NULL;
+    if (tick < 0) {
+        PyErr_SetString(PyExc_IndexError, "no such tick");
+        return NULL;
+    }
+    for (Size j = 0; j < n; j++) low[j] = blend == 1.0 ? truth[j] : low[j] + blend * (truth[j] - low[j]);
+    if (tick % every == 0) {
+        int64_t k = tick / every;
+        const double *noise = doubles(self, NOISE) + k % block * n;
+        double *slot = doubles(self, RING) + k % slots * n;
+        for (Size j = 0; j < n; j++) {
+            double value = low[j] + noise[j];
+            if (quantum[j] > 0.0) value = rint(value / quantum[j]) * quantum[j];
+            slot[j] = smaller(larger(value, least[j]), most[j]);
+        }
+        ring_lost[k % slots] = flags(self, LOST)[k % block];
+    }
+    int64_t due = tick - delay;
+    if (due < 0 || due % every || ring_lost[due / every % slots]) Py_RETURN_FALSE;
+    memcpy(doubles(self, READING), doubles(self, RING) + due / every % slots * n, n * sizeof(double));
+    Py_RETURN_TRUE;
+}
+
+static const char *wrong_sensor(const Kernel *self)
+{
+    if (length(self, 3) == 0 || length(self, 2) != self->n * length(self, 3)) return "noise of another size";
+    if (length(self, 8) == 0 || length(self, 7) != self->n * length(self, 8)) return "measurements of another size";
+    if (length(self, 10) != 1 || length(self, 11) != 2) return "expected 1 factor and 2 times";
+    return integers(self, 11)[0] > 0 && integers(self, 11)[1] >= 0 ? NULL : "times below 0";
+}
+
 static const Law LAWS[] = {
     {"errors", "d2d1d1D2", 1, run_errors, NULL},
     {"pid", "d2d2d1d1d1d1d1d1b1d1b1d1d1D1D1d1d1D1b0", 2, run_pid, wrong_pid},
@@ -363,6 +601,9 @@ static const Law LAWS[] = {
     {"window", "d1d1d1d1d1d0d0D0B0", 0, run_window, wrong_window},
     {"actuation", "d0d0i1d1d1d1d1d1d1d2d1d0B1I1D0b0", 0, run_actuation, wrong_actuation},
     {"rows", "|D0d0", 1, run_rows, wrong_rows},
+    {"scan", "d0i0i0i0d0b1d0d0D0D0", 0, run_scan, wrong_scan},
+    {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0D0", 0, run_raster, wrong_raster},
+    {"sensor", "d1D1d0b0d1d1d1D0B0D1d0i0", 1, run_sensor, wrong_sensor},
     {NULL, NULL, 0, NULL, NULL},
 };
 

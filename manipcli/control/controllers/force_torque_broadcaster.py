@@ -8,7 +8,8 @@
 The force [N] and the torque about the link's origin [N m] are those that the link, with all links below it, exerts on
 its parent, in the link's frame (Gazebo's `child_to_parent`): a link that hangs at rest pulls with its weight. The log
 has it as geometry_msgs/WrenchStamped in /NAME/wrench at every control tick; programs read
-`manager["wrist_sensor"].wrench`. An engine without physics measures zeros.
+`manager["wrist_sensor"].wrench`. An engine without physics measures zeros. With `sensor: NAME` instead of `link` it
+publishes what the sensor NAME of the robot or task measures.
 
 The sensor measures weight, inertia and contact over the last physics step, including joint drives, mimic couplings, and
 the noise of single steps. It does not measure the moment of `spinning_friction` or `rolling_friction` (0 unless given)
@@ -48,6 +49,11 @@ class ForceTorqueBroadcasterSpec(ControllerSpec):
         None,
         description="Link whose wrench on its parent is measured, in this link's frame [N, N m]. Default: `frame_id`.",
     )
+    sensor: str | None = Field(
+        None,
+        description="Name of a sensor `force_torque` of the robot or task, instead of `link`: it publishes what that "
+        "one measures, with its noise and delay, in its frame. Default: the truth.",
+    )
     frame_id: str | None = Field(
         None, description="ROS's name of the frame; if it is not a link and there is no `link`, it measures nothing."
     )
@@ -59,7 +65,7 @@ class Wrench:
 
     Attributes:
         time: [s] of the update.
-        link: the link.
+        link: the link, or the sensor.
         force: (3) [N].
         torque: (3) [N m] about the link's origin.
     """
@@ -75,8 +81,9 @@ class ForceTorqueBroadcaster:
 
     Args:
         name: of the controller.
-        link: in whose frame it measures.
+        link: in whose frame it measures; the name of the sensor with `sensor`.
         joint: between the link and its parent; fixed or not.
+        sensor: the sensor of the robot or task that it publishes; "": the truth at the joint.
     """
 
     role: Role = "other"
@@ -85,10 +92,10 @@ class ForceTorqueBroadcaster:
     interfaces: tuple[Interface, ...] = ()
     feed_forward: FeedForward = "none"
 
-    def __init__(self, *, name: str, link: str, joint: str) -> None:
+    def __init__(self, *, name: str, link: str, joint: str = "", sensor: str = "") -> None:
         self.name = name
         self.link = link
-        self.sensors = (SensorRequest("wrench", joint, link),)
+        self.sensors = (SensorRequest(link, joint, sensor),)
         self.output = ControllerOutput.published(6)
         self._source = np.zeros(6)
         self._time = 0.0
@@ -117,6 +124,8 @@ class ForceTorqueBroadcaster:
 
 def build(name: str, spec: ForceTorqueBroadcasterSpec, context: BuildContext) -> ForceTorqueBroadcaster | None:
     """The controller of a spec; None if its `frame_id` is only a label."""
+    if spec.sensor is not None:
+        return ForceTorqueBroadcaster(name=name, link=spec.sensor, sensor=spec.sensor)
     link = spec.frame_id if spec.link is None else spec.link
     joint = next((joint.name for joint in context.robot.joints if joint.child == link), None)
     return None if link is None or joint is None else ForceTorqueBroadcaster(name=name, link=link, joint=joint)
@@ -127,6 +136,10 @@ def check(spec: ForceTorqueBroadcasterSpec, robot: RobotModel) -> Iterator[Probl
     if spec.joints:
         yield Problem(("joints",), "it reads no joints", "remove `joints`; `link` sets where it measures", "CTRL184")
     carried = [joint.child for joint in robot.joints]
+    if spec.sensor is not None:
+        if spec.link is not None:
+            yield Problem(("link",), "it has both `link` and `sensor`", "remove one of them", "CTRL184")
+        return
     if spec.link is None and spec.frame_id is None:
         yield Problem((), "it has no `link`", "add `link: ...`, the link at which it measures", "CTRL184")
     elif spec.link is None and spec.frame_id not in carried:

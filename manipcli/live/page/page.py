@@ -28,8 +28,8 @@ from manipcli.live.page.snapshot import ENDED, Snapshot
 from manipcli.live.page.story import TOPICS, Story
 from manipcli.model.configuration import configuration
 from manipcli.model.state import WorldState
-from manipcli.replay.drawing import draw, floors_of
-from manipcli.replay.placing import Placing
+from manipcli.render.drawing import draw, floors_of
+from manipcli.render.placing import Placing
 from manipcli.replay.view.viser_scene import ViserScene
 from manipcli.replay.view.viser_server import LocalServer
 

@@ -19,11 +19,13 @@ from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
-from manipcli.record.channels import Channel, ControllerChannel, Recorded, SensorChannel
+from manipcli.record.channels import Channel, ControllerChannel, MeasuredChannel, Recorded, SensorChannel
 from manipcli.record.messages import WORLD
 from manipcli.record.selection import Selection
+from manipcli.record.write.arrivals import Arrivals, nanoseconds, together
 from manipcli.record.write.rows import (
     RowBlock,
+    Rows,
     Template,
     Times,
     controller_state_template,
@@ -71,22 +73,6 @@ class _Source:
     template: Template
     values: Values
     controller: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Messages of some ticks of a block, the same on each tick.
-
-    Attributes:
-        ticks: (n,) rows of the block.
-        bytes: (n, size) the messages of each tick.
-        channels, starts: channel of each message and its offset in a row.
-    """
-
-    ticks: Places
-    bytes: npt.NDArray[np.uint8]
-    channels: tuple[int, ...]
-    starts: tuple[int, ...]
 
 
 _Idle = tuple[int, frozenset[int]]
@@ -139,7 +125,7 @@ class _Group:
         self._controllers = [source.controller for source in sources]
         self._written = np.zeros(len(sources), dtype=np.int64)
 
-    def fill(self, ticks: Times, times: Times, idle: Sequence[_Idle]) -> Iterator[_Rows]:
+    def fill(self, ticks: Times, times: Times, idle: Sequence[_Idle]) -> Iterator[Rows]:
         """Encode its messages of a block."""
         picked = np.flatnonzero(ticks % self._stride == 0)
         if not len(picked):
@@ -157,11 +143,19 @@ class _Group:
         for first, end in pairwise([0, *changes, len(picked)]):
             kept = np.flatnonzero(there[:, first]).tolist()
             if kept:
-                yield _Rows(picked[first:end], *self._rows.part(first, end, kept))
+                yield Rows(picked[first:end], *self._rows.part(first, end, kept))
 
 
 class Block:
-    """Buffer for `capacity` ticks; `channels`: recorded channels; `topics`: those of them with messages at ticks."""
+    """Buffer for `capacity` ticks.
+
+    Args:
+        channels: recorded channels.
+        sensors: those of numbers.
+
+    Attributes:
+        topics: those with messages at ticks.
+    """
 
     def __init__(
         self,
@@ -172,6 +166,7 @@ class Block:
         selection: Selection,
         period: float,
         capacity: int,
+        sensors: Sequence[MeasuredChannel] = (),
     ) -> None:
         n, m = len(robot.moving_joints), len(scene.movable)
         self.count = 0
@@ -195,6 +190,14 @@ class Block:
         for stride in sorted(set(strides)):
             mine = [source for source, every in zip(sources, strides, strict=True) if every == stride]
             self._groups.append(_Group(stride, mine, capacity))
+        self._measured = np.zeros((capacity, max((s.first + s.width for s in sensors), default=0)))
+        self._sensed: Array | None = None
+        self._arrivals = [Arrivals(same, self._ids, capacity) for same in together(sensors, self._ids)]
+
+    def attach(self, numbers: Array) -> None:
+        """Copy these numbers (width of all sensors) at every tick from now on; see `MeasuredChannel`."""
+        self._sensed = numbers if self._measured.shape[1] else None
+        self._seen = None
 
     def _sources(self, robot: RobotModel, scene: Scene, controllers: Sequence[Recorded]) -> list[_Source]:
         """All periodic messages; allocates the buffers of the controllers."""
@@ -233,13 +236,13 @@ class Block:
         found: list[_Source] = []
         if topics.JOINT_STATES in ids:
             template = joint_state_template(ids[topics.JOINT_STATES], robot.joint_names, effort=True)
-            found.append(_Source(topics.JOINT_STATES, template, self._measured))
+            found.append(_Source(topics.JOINT_STATES, template, self._joints))
         if topics.TF in ids:
             found.append(_Source(topics.TF, tf_template(ids[topics.TF], frames), self._frames))
         found += [*states, *readings, *plots]
         if self._actuators.names and topics.ACTUATOR_STATES in ids:
             template = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
-            actuators: Values = lambda at: self._actuators.state(*self._measured(at))  # noqa: E731
+            actuators: Values = lambda at: self._actuators.state(*self._joints(at))  # noqa: E731
             found.append(_Source(topics.ACTUATOR_STATES, template, actuators))
         return found
 
@@ -256,6 +259,8 @@ class Block:
             self._compiled(k)
             return
         self._numbers[k] = numbers
+        if self._sensed is not None:
+            self._measured[k] = self._sensed
         for rows, speeds, output in zip(self._rows, self._speeds, outputs, strict=True):
             if rows is not None and output is not None:
                 rows[k] = output.rows
@@ -274,6 +279,8 @@ class Block:
         if idle != self._idle[-1][1]:
             self._idle.append((self.count - 1, idle))
         groups = [self._numbers, numbers]
+        if self._sensed is not None:
+            groups += [self._measured, self._sensed]
         for rows, speeds, output in zip(self._rows, self._speeds, outputs, strict=True):
             if rows is not None and output is not None and rows[0].size:
                 groups += [rows, output.rows] if speeds is None else [rows, output.rows, speeds, output.speed]
@@ -283,14 +290,17 @@ class Block:
         """Encode and empty the block, with `singles` after the tick of their time. None if empty."""
         T, self.count = self.count, 0
         ticks = self._ticks[:T]
-        times = np.rint(ticks * self._period * 1e9).astype(np.int64)
+        times = nanoseconds(ticks, self._period)
         rows = [part for group in self._groups for part in group.fill(ticks, times, self._idle)]
+        if self._sensed is not None:
+            numbers = self._measured[:T]
+            rows += [part for same in self._arrivals for part in same.fill(ticks, times, numbers, self._period)]
         self._idle = [(0, self._idle[-1][1])]
         if not singles and not rows:
             return None
         return _joined(times, rows, sorted(singles, key=lambda single: single.ns))
 
-    def _measured(self, at: Ticks) -> list[Array]:
+    def _joints(self, at: Ticks) -> list[Array]:
         return [self._states.position[at], self._states.velocity[at], self._states.effort[at]]
 
     def _frames(self, at: Ticks) -> list[Array]:
@@ -300,13 +310,13 @@ class Block:
         return [*links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
 
     def _state(self, of: _ControllerRows, at: Ticks) -> list[Array]:
-        return of.state(at, *self._measured(at))
+        return of.state(at, *self._joints(at))
 
     def _errors(self, of: _ControllerRows, at: Ticks) -> list[Array]:
-        return of.errors(at, *self._measured(at)[:2])
+        return of.errors(at, *self._joints(at)[:2])
 
 
-def _joined(times: Times, rows: Sequence[_Rows], singles: Sequence[Single]) -> ChunkContent:
+def _joined(times: Times, rows: Sequence[Rows], singles: Sequence[Single]) -> ChunkContent:
     """Rows and singles in time order, and the offset of each message.
 
     A tick has its rows, the most frequent first, then the singles up to the next tick.

@@ -17,12 +17,21 @@ from pathlib import Path
 
 from manipcli.control.action import Feedback, GoalResult
 from manipcli.control.controller import ControllerOutput
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
-from manipcli.record.channels import TRANSIENT_LOCAL, Channel, ControllerChannel, Recorded, channel_table
+from manipcli.record.channels import (
+    TRANSIENT_LOCAL,
+    Channel,
+    ControllerChannel,
+    MeasuredChannel,
+    Recorded,
+    channel_table,
+)
 from manipcli.record.contents import RECORD, Contents
+from manipcli.record.encode import encode
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.recording import TaskEvent
 from manipcli.record.schemas import ACTIONS, schema_text
@@ -51,6 +60,8 @@ class Recorder:
         selection: recorded topics and their rates.
         overwrite: replace a recording or partial recording at this path.
         live: the recording is that of a live session, and has its commands.
+        sensors: topics of sensors; `attach` gives the numbers.
+        sensor_frames: (parent, child, X_PC) of their frames.
 
     Attributes:
         listener: called with the topic, time [ns] and CDR bytes of each message that is not written at every tick.
@@ -73,15 +84,17 @@ class Recorder:
         selection: Selection = EVERYTHING,
         overwrite: bool = False,
         live: bool = False,
+        sensors: Sequence[MeasuredChannel] = (),
+        sensor_frames: Sequence[tuple[str, str, Transform]] = (),
     ) -> None:
         self.listener: Callable[[str, int, bytes], None] = _nobody
-        _check_names(path, robot, scene, [name for name, _, _ in attachments])
-        everything = channel_table(controllers, live=live)
+        _check_names(path, robot, scene, [child for _, child, _ in sensor_frames], [name for name, _, _ in attachments])
+        everything = channel_table(controllers, live=live, sensors=sensors)
         table = [channel for channel in everything if selection.holds(channel)]
         self._period = period
         self._ids = {channel.topic: channel.id for channel in table}
         capacity = max(1, round(BLOCK_SECONDS / period))
-        self._block = Block(robot, scene, controllers, table, selection, period, capacity)
+        self._block = Block(robot, scene, controllers, table, selection, period, capacity, sensors)
         self._singles: list[Single] = []
         self._sequences: Counter[int] = Counter()
         self._contact_encoder = messages.ContactEncoder()
@@ -99,8 +112,10 @@ class Recorder:
         )
         self._goals = {c.name: GoalLog(c) for c in controllers if isinstance(c, ControllerChannel) and c.action}
         self._touches = topics.CONTACTS in self._ids
+        self._frames = {sensor.topic: (sensor.message, sensor.frame) for sensor in sensors}
+        static = (*messages.static_transforms(robot, scene), *sensor_frames)
         try:
-            self._begin(table, attachments, {RECORD: self._contents.metadata(), **metadata}, robot, scene)
+            self._begin(table, attachments, {RECORD: self._contents.metadata(), **metadata}, robot, scene, static)
         except BaseException:
             self._thread.shutdown()
             self._container.close()
@@ -113,6 +128,7 @@ class Recorder:
         metadata: Mapping[str, Mapping[str, str]],
         robot: RobotModel,
         scene: Scene,
+        static: Sequence[tuple[str, str, Transform]],
     ) -> None:
         """Write what is known before the first tick."""
         _declare(self._container, table)
@@ -121,7 +137,7 @@ class Recorder:
         for name, values in metadata.items():
             self._container.metadata(name, values)
         self._single(topics.ROBOT_DESCRIPTION, 0, messages.string_message(robot.urdf))
-        self._single(topics.TF_STATIC, 0, messages.tf_message(messages.static_transforms(robot, scene), 0))
+        self._single(topics.TF_STATIC, 0, messages.tf_message(static, 0))
         self._single(topics.MARKERS, 0, messages.marker_message(scene, 0))
         self.flush()
 
@@ -135,6 +151,16 @@ class Recorder:
         if self._block.count == self._block.capacity:
             self._send()
         self._block.add(tick, state, outputs)
+
+    def attach(self, numbers: Array) -> None:
+        """Record the numbers of all sensors from now on, at every tick; see `MeasuredChannel`."""
+        self._block.attach(numbers)
+
+    def measured(self, tick: int, taken: int, topic: str, fields: Mapping[str, object]) -> None:
+        """Record a message of a sensor that arrives at `tick` and was taken at the tick `taken`."""
+        if topic in self._ids:
+            kind, frame = self._frames[topic]
+            self._single(topic, self._ns(tick), encode(kind, fields, ns=self._ns(taken), frame=frame).data)
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
         """Record all contacts from `tick` until the next call; see `contact_filter.py`."""
@@ -291,11 +317,14 @@ def _declare(container: Container, table: Sequence[Channel]) -> None:
     )
 
 
-def _check_names(path: Path, robot: RobotModel, scene: Scene, attachments: Sequence[str]) -> None:
+def _check_names(
+    path: Path, robot: RobotModel, scene: Scene, sensors: Sequence[str], attachments: Sequence[str]
+) -> None:
     """Check that frame names are unique in /tf and attachments have plain file names."""
     frames = Counter([messages.WORLD, *(link.name for link in robot.links if link.name != messages.WORLD)])
     frames.update([body.name for body in scene.bodies])
     frames.update([frame.name for frame in scene.frames])
+    frames.update(sensors)
     for name, times in frames.items():
         if times > 1:
             raise RecordingRefused(

@@ -10,7 +10,7 @@ rows at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import NS_PER_S, CdrWriter
+from manipcli.record.encode import encode
 from manipcli.record.records import MESSAGE, MESSAGE_HEAD
 from manipcli.spec.controllers import Interface
 
@@ -33,12 +34,21 @@ def message_record(channel: int, sequence: int, ns: int, data: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A message with zeros as numbers. `stamps`: offsets of its times; `runs`: (offset, count) of its doubles."""
+    """A message with zeros as numbers.
+
+    Attributes:
+        channel: its channel.
+        data: the message.
+        stamps: offsets of its times.
+        runs: (offset, count) of its numbers.
+        codes: numpy types of the runs; empty: all are doubles.
+    """
 
     channel: int
     data: bytes
     stamps: tuple[int, ...]
     runs: tuple[tuple[int, int], ...]
+    codes: tuple[str, ...] = ()
 
 
 def joint_state_template(channel: int, joints: Sequence[str], *, effort: bool) -> Template:
@@ -101,6 +111,32 @@ def sensor_template(channel: int, frame: str, width: int) -> Template:
     return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=((offset, width),))
 
 
+def measured_template(
+    channel: int, kind: str, filled: Sequence[str], fixed: Mapping[str, object], frame: str
+) -> Template:
+    """A message of a sensor: fields that are `filled` at every measurement, those `fixed`, and its frame."""
+    message = encode(kind, fixed, frame=frame, filled=filled)
+    runs = tuple((run.offset, run.count) for run in message.runs)
+    stamps = (message.stamp,) if message.stamp >= 0 else ()
+    return Template(channel, message.data, stamps, runs, tuple(run.code for run in message.runs))
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Messages of some ticks of a block, the same on each tick.
+
+    Attributes:
+        ticks: (n,) rows of the block.
+        bytes: (n, size) the messages of each tick.
+        channels, starts: channel of each message and its offset in a row.
+    """
+
+    ticks: npt.NDArray[np.intp]
+    bytes: npt.NDArray[np.uint8]
+    channels: tuple[int, ...]
+    starts: tuple[int, ...]
+
+
 class RowBlock:
     """Up to `capacity` rows of the messages of `templates`, in that order.
 
@@ -128,8 +164,9 @@ class RowBlock:
             payload = start + MESSAGE_HEAD.size
             for stamp in template.stamps:
                 self._stamps.append((self._field("<i4", payload + stamp), self._field("<u4", payload + stamp + 4)))
-            for offset, count in template.runs:
-                self._runs.append(self._field(f"({count},)<f8", payload + offset))
+            codes = template.codes or ("<f8",) * len(template.runs)
+            for (offset, count), code in zip(template.runs, codes, strict=True):
+                self._runs.append(self._field(f"({count},){code}", payload + offset))
 
     def _field(self, code: str, offset: int) -> Field:
         """A view of one field of all rows."""
@@ -137,15 +174,17 @@ class RowBlock:
         view: Field = self.bytes.view(layout)[:, 0]["field"]
         return view
 
-    def fill(self, times_ns: Times, sequences: Times, values: Sequence[Array]) -> None:
+    def fill(
+        self, times_ns: Times, sequences: Times, values: Sequence[Array], *, stamps_ns: Times | None = None
+    ) -> None:
         """Write the first T rows: times (T,), sequence numbers (messages, T), and one array (T, count) for every run
-        of every template, in order."""
+        of every template, in order. `stamps_ns`: of the headers, if they are not the times."""
         T = len(times_ns)
         for field, sequence in zip(self._sequences, sequences, strict=True):
             field[:T] = sequence
         for field in self._times:
             field[:T] = times_ns
-        sec, nanosec = np.divmod(times_ns, NS_PER_S)
+        sec, nanosec = np.divmod(times_ns if stamps_ns is None else stamps_ns, NS_PER_S)
         for sec_field, nanosec_field in self._stamps:
             sec_field[:T] = sec
             nanosec_field[:T] = nanosec

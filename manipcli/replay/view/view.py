@@ -13,8 +13,8 @@ from manipcli.core.geometry import Array
 from manipcli.description.elements import Joint
 from manipcli.model.configuration import configuration, with_mimics, zero_configuration
 from manipcli.model.robot import RobotModel
-from manipcli.replay.drawing import draw, floors_of
-from manipcli.replay.placing import Placing
+from manipcli.render.drawing import draw, floors_of
+from manipcli.render.placing import Placing
 from manipcli.replay.view.viser_scene import Shown, ViserScene
 from manipcli.replay.view.viser_server import LocalServer
 from manipcli.scene.scene import Scene

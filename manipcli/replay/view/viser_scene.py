@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Transform
+from manipcli.render.drawing import WORLD, Drawable, Drawing, ground_height
+from manipcli.render.placing import Poses
 from manipcli.replay.camera import framing
-from manipcli.replay.drawing import WORLD, Drawable, Drawing, ground_height
-from manipcli.replay.placing import Poses
 from manipcli.replay.renderer import sky
 from manipcli.shapes.primitives import Rgba
 

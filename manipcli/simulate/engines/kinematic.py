@@ -94,7 +94,7 @@ class KinematicEngine:
     def touches_changed(self) -> bool:
         return False
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self, *, peek: bool = False) -> tuple[Contact, ...]:
         return ()
 
     def close(self) -> None:

@@ -151,8 +151,8 @@ class MujocoEngine:
     def touches_changed(self) -> bool:
         return self._contacts.changed()
 
-    def contacts(self) -> tuple[Contact, ...]:
-        return self._contacts.now()
+    def contacts(self, *, peek: bool = False) -> tuple[Contact, ...]:
+        return self._contacts.peek() if peek else self._contacts.now()
 
     def close(self) -> None:
         """Memory is freed with the object."""

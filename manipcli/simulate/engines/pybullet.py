@@ -244,9 +244,10 @@ class PybulletEngine:
     def touches_changed(self) -> bool:
         return self._watch.changed(self._contact_points())
 
-    def contacts(self) -> tuple[Contact, ...]:
+    def contacts(self, *, peek: bool = False) -> tuple[Contact, ...]:
         points = self._contact_points()
-        self._watch.seen(points)
+        if not peek:
+            self._watch.seen(points)
         return self._merge(points)
 
     def _contact_points(self) -> tuple[BulletPoint, ...]:

@@ -21,15 +21,15 @@ _NAMED = ("groups", "poses", "tool", "transmissions")
 _ROUNDS = 5
 
 
-def salvage_robot(source: Source) -> Located[RobotSpec] | None:
-    """The robot file without invalid values; None if the links and joints are unknown."""
+def salvage_robot(source: Source, model: type[RobotSpec] = RobotSpec) -> Located[RobotSpec] | None:
+    """The robot file without invalid values; None if the links and joints are unknown. `model`: see `load_robot`."""
     root = source.root
     for _ in range(_ROUNDS):
         if not isinstance(root, MappingNode):
             return None
         left = replace(source, root=root, whole=source.root)
         try:
-            return Located(RobotSpec.model_validate(left.plain()), left)
+            return Located(model.model_validate(left.plain()), left)
         except ValidationError as error:
             faults = dict.fromkeys(fault["loc"] for fault in error.errors(include_url=False))
             if any(fault[0] in _LINKS for fault in faults):

@@ -23,7 +23,10 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial, Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
 from manipcli.model.robot import Actuator, RobotModel
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.simulate.sensor import Quantity
+from manipcli.simulate.signal_chain import Sampling, SignalChain
 from manipcli.spec.controllers import GainsSpec
+from manipcli.spec.sensors import Noise
 
 PERIOD = 1e-3
 Rng = np.random.Generator
@@ -301,3 +304,28 @@ def test_a_hand(equal_bits: Any) -> None:
         return seen
 
     equal_bits(grip, "errors", "pid", seeds=10)
+
+
+def test_a_sensor(equal_bits: Any) -> None:
+    """Filtered or not, at any rate and delay, with losses."""
+
+    def sense(rng: Rng) -> list[Any]:
+        n = int(rng.integers(1, 5))
+        noise = Noise[float](white=0.1, bias=1.0, walk=0.5 * rng.integers(0, 2), quantisation=0.01 * rng.integers(0, 2))
+        most = float(bound(rng, 1)[0])
+        sampling = Sampling(
+            PERIOD,
+            every=int(rng.integers(1, 4)),
+            delay=int(rng.integers(0, 9)),
+            cutoff=None if rng.random() < 0.5 else 30.0,
+            dropout=0.2 * rng.integers(0, 2),
+        )
+        truth = np.zeros(n)
+        chain = SignalChain([Quantity("force", n, noise, -most, most)], sampling, seed=1, name="a", truth=truth)
+        seen: list[Any] = []
+        for tick in range(600):
+            truth[:] = numbers(rng, n)
+            seen += [chain.step(tick), chain.reading.copy()]
+        return seen
+
+    equal_bits(sense, "sensor", seeds=10)

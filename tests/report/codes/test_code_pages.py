@@ -20,7 +20,7 @@ from manipcli.spec.source.yaml import parse
 ROOT = Path(__file__).parents[3]
 SOURCE = [path for path in (ROOT / "manipcli").rglob("*.py") if "codes" not in path.parts]
 LITERAL = re.compile(
-    r"""["']((?:BLE|CTRL|INIT|INT|LIVE|LOG|PLAN|PLOT|REPLAY|ROBOT|RUN|SIM|SRDF|TASK|TRAJ|TRAN|TUNE|URDF|USE|VIEW|XACRO|YAML)\d{3})["']"""
+    r"""["']((?:BLE|CTRL|INIT|INT|LIVE|LOG|PLAN|PLOT|REPLAY|ROBOT|RUN|SENS|SIM|SRDF|TASK|TRAJ|TRAN|TUNE|URDF|USE|VIEW|XACRO|YAML)\d{3})["']"""
 )
 BASES: Mapping[Kind, str] = {
     "task": f"""\

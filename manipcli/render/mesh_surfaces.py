@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from manipcli.replay.surface import Surface, smoothed
+from manipcli.render.surface import Surface, smoothed
 from manipcli.shapes.mesh import TriangleMesh, read_mesh
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Rgba

@@ -15,6 +15,8 @@ Faces = npt.NDArray[np.int32]
 
 SEGMENTS = 48
 """Segments around a cylinder or a sphere."""
+MOST_SEGMENTS = 256
+"""Of those that follow from a deviation."""
 CREASE = math.radians(35.0)
 """Angle between triangles [rad] above which their edge is sharp; below it they are shaded as one round surface."""
 
@@ -80,27 +82,37 @@ def box_surface(box: Box) -> Surface:
     return smoothed(corners * np.asarray(box.size), faces)
 
 
-def sphere_surface(sphere: Sphere) -> Surface:
-    """A sphere of circles of latitude between two poles."""
-    polar = np.linspace(0.0, math.pi, SEGMENTS // 2 + 1)
-    return _revolved(sphere.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1))
+def segments(radius: float, deviation: float | None) -> int:
+    """Segments around a circle whose chords lie at most `deviation` [m] within it; `SEGMENTS` or more. Even."""
+    if deviation is None or deviation >= radius:
+        return SEGMENTS
+    wanted = math.ceil(math.pi / math.acos(1.0 - deviation / radius))
+    return min(max(SEGMENTS, wanted + wanted % 2), MOST_SEGMENTS)
 
 
-def cylinder_surface(cylinder: Cylinder) -> Surface:
+def sphere_surface(sphere: Sphere, deviation: float | None = None) -> Surface:
+    """A sphere of circles of latitude between two poles; chords lie at most `deviation` [m] within it."""
+    count = segments(sphere.radius, deviation)
+    polar = np.linspace(0.0, math.pi, count // 2 + 1)
+    return _revolved(sphere.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1), count)
+
+
+def cylinder_surface(cylinder: Cylinder, deviation: float | None = None) -> Surface:
     """A cylinder; side and ends have separate vertices, so that the rims stay sharp."""
     radius, half = cylinder.radius, cylinder.length / 2.0
-    return _revolved(np.array([(0.0, half), (radius, half), (radius, -half), (0.0, -half)]))
+    profile = np.array([(0.0, half), (radius, half), (radius, -half), (0.0, -half)])
+    return _revolved(profile, segments(radius, deviation))
 
 
-def _revolved(profile: Array) -> Surface:
+def _revolved(profile: Array, count: int) -> Surface:
     """The surface of revolution of points (radius, z), from top to bottom, around the z axis."""
-    around = np.arange(SEGMENTS) * 2.0 * math.pi / SEGMENTS
+    around = np.arange(count) * 2.0 * math.pi / count
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
-    rings = [np.column_stack([radius * circle, np.full(SEGMENTS, z)]) for radius, z in profile]
-    k, after = np.arange(SEGMENTS), (np.arange(SEGMENTS) + 1) % SEGMENTS
+    rings = [np.column_stack([radius * circle, np.full(count, z)]) for radius, z in profile]
+    k, after = np.arange(count), (np.arange(count) + 1) % count
     faces = []
-    for upper in range(0, (len(profile) - 1) * SEGMENTS, SEGMENTS):
-        lower = upper + SEGMENTS
+    for upper in range(0, (len(profile) - 1) * count, count):
+        lower = upper + count
         faces += [np.stack([upper + k, lower + k, lower + after], axis=1)]
         faces += [np.stack([upper + k, lower + after, upper + after], axis=1)]
     return smoothed(np.concatenate(rings), np.concatenate(faces))

@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.description.elements import Link
 from manipcli.model.robot import RobotModel
-from manipcli.replay.drawing import bones, draw
+from manipcli.render.drawing import bones, draw
 from manipcli.shapes.primitives import Geometry, Mesh
 from manipcli.task.load_view import load_sight
 

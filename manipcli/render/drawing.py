@@ -16,9 +16,9 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import listed
 from manipcli.description.elements import Inertial, Link
 from manipcli.model.robot import RobotModel
-from manipcli.replay.mesh_surfaces import mesh_surfaces
-from manipcli.replay.placing import Poses
-from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+from manipcli.render.mesh_surfaces import mesh_surfaces
+from manipcli.render.placing import Poses
+from manipcli.render.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere, drawn_once
@@ -94,8 +94,8 @@ def link_frame(link: str) -> str:
     return f"robot/{link}"
 
 
-def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
-    """The drawing of a robot, a scene, or both.
+def draw(robot: RobotModel | None, scene: Scene | None = None, *, deviation: float | None = None) -> Drawing:
+    """The drawing of a robot, a scene, or both; spheres and cylinders within `deviation` [m] [default: for the eye].
 
     Collision meshes are drawn as their convex hulls, as planner and physics use them. A link without drawable visual
     shapes is drawn with its collision shapes, and a link without either with bones.
@@ -108,7 +108,7 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
         bare: list[str] = []
         for link in robot.links:
             frames.append(link_frame(link.name))
-            shown = tuple(_link(link, missing))
+            shown = tuple(_link(link, missing, deviation))
             drawables += shown
             if (link.visuals or link.collisions) and not any(drawable.layer == "visual" for drawable in shown):
                 bare.append(link.name)
@@ -124,15 +124,15 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
     if scene is not None:
         for body in scene.bodies:
             frames.append(body.name)
-            drawables += _body(body, missing)
+            drawables += _body(body, missing, deviation)
         marks += [Mark(frame.name, frame.parent, frame.X_PF) for frame in scene.frames]
     return Drawing(tuple(frames), tuple(drawables), tuple(marks), tuple(dict.fromkeys(missing)))
 
 
-def _link(link: Link, missing: list[str]) -> Iterator[Drawable]:
+def _link(link: Link, missing: list[str], deviation: float | None) -> Iterator[Drawable]:
     frame = link_frame(link.name)
-    seen = list(_shapes("visual", frame, link.visuals, None, missing))
-    touched = list(_shapes("collision", frame, link.collisions, COLLISION, missing))
+    seen = list(_shapes("visual", frame, link.visuals, None, missing, deviation))
+    touched = list(_shapes("collision", frame, link.collisions, COLLISION, missing, deviation))
     # Draw the collision shapes of a link without visual shapes or with missing meshes.
     instead = () if seen else touched
     yield from seen
@@ -159,19 +159,24 @@ def _bone(end: Array) -> Surface:
     return cylinder_surface(cylinder).moved(Transform.of(xyz=end / 2.0, R=R))
 
 
-def _body(body: Body, missing: list[str]) -> Iterator[Drawable]:
-    yield from _shapes("visual", body.name, body.geometries, None, missing)
-    yield from _shapes("collision", body.name, body.geometries, COLLISION, missing)
+def _body(body: Body, missing: list[str], deviation: float | None) -> Iterator[Drawable]:
+    yield from _shapes("visual", body.name, body.geometries, None, missing, deviation)
+    yield from _shapes("collision", body.name, body.geometries, COLLISION, missing, deviation)
     if not body.fixed:
         yield from _inertia(body.name, Inertial(body.mass, body.X_OI, body.inertia))
 
 
 def _shapes(
-    layer: Layer, frame: str, geometries: tuple[Geometry, ...], rgba: Rgba | None, missing: list[str]
+    layer: Layer,
+    frame: str,
+    geometries: tuple[Geometry, ...],
+    rgba: Rgba | None,
+    missing: list[str],
+    deviation: float | None,
 ) -> Iterator[Drawable]:
     for k, geometry in enumerate(geometries if layer == "collision" else drawn_once(geometries)):
         try:
-            surfaces = shape_surfaces(geometry.shape, hull=layer == "collision")
+            surfaces = shape_surfaces(geometry.shape, hull=layer == "collision", deviation=deviation)
         except UnusableMesh as error:
             missing.append(f"{layer} shape of '{frame}': {error}")
             continue
@@ -180,12 +185,13 @@ def _shapes(
             yield Drawable(name, layer, frame, part.moved(geometry.X_LS), rgba or geometry.rgba or part.rgba or PLAIN)
 
 
-def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
+def shape_surfaces(shape: Shape, *, hull: bool = False, deviation: float | None = None) -> tuple[Surface, ...]:
     """The surfaces of a shape in its own frame, scaled; one for each colour of a mesh file.
 
     Args:
         shape: the shape.
         hull: use the convex hull of a mesh, or its part, instead of its triangles.
+        deviation: most by which chords of spheres and cylinders lie within them [m].
 
     Raises:
         UnusableMesh: the mesh cannot be drawn.
@@ -194,9 +200,9 @@ def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
         case Box():
             return (box_surface(shape),)
         case Sphere():
-            return (sphere_surface(shape),)
+            return (sphere_surface(shape, deviation),)
         case Cylinder():
-            return (cylinder_surface(shape),)
+            return (cylinder_surface(shape, deviation),)
         case Mesh(part=part) if hull and part is not None:
             return (smoothed(np.array(part.points), np.array(part.triangles)).scaled(shape.scale),)
         case Mesh():

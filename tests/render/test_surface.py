@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+from manipcli.render.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.shapes.primitives import Box, Cylinder, Sphere
 
 

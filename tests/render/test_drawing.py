@@ -13,8 +13,8 @@ from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Inertial
 from manipcli.model.configuration import configuration, with_mimics, zero_configuration
 from manipcli.model.kinematics import Kinematics
-from manipcli.replay.drawing import COLLISION, PLAIN, draw, inertia_box, shape_surfaces
-from manipcli.replay.placing import Placing
+from manipcli.render.drawing import COLLISION, PLAIN, draw, inertia_box, shape_surfaces
+from manipcli.render.placing import Placing
 from manipcli.shapes.primitives import Box, Mesh
 from manipcli.task.load_view import Sight, load_sight
 

@@ -1,0 +1,190 @@
+"""Checks of `sensors:` in the robot file and in the task: places, times and names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from manipcli.conditions.condition import Problem
+from manipcli.conditions.frames import fixed_frame
+from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.text import did_you_mean, listed
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Scene
+from manipcli.simulate.sensor_layout import ticks_per_measurement
+from manipcli.simulate.sensors import SENSORS
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located
+from manipcli.spec.mounted_sensor import MountedSpec
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.sensors import SensorSpec
+from manipcli.spec.task import TaskSpec
+
+LOG_FOLDER: Final = "sensors"
+"""A controller of this name publishes next to the sensors."""
+OF_CONTROLLERS: Final = ("controller_state", "reference", "error", "wrench")
+WHOLE: Final = 1e-6
+"""Accepted deviation of a number of ticks from a whole number, as a share."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """A sensor and its file; `fixed`: whether it may be in a frame of the scene."""
+
+    name: str
+    spec: SensorSpec
+    file: Located[RobotSpec] | Located[TaskSpec]
+    fixed: bool
+
+    def finding(self, problem: Problem, *, key: bool = False) -> Diagnostic:
+        """A problem at its place."""
+        at = ("sensors", self.name, *problem.loc)
+        place = self.file.source.key_place(*at) if key else self.file.place(*at)
+        message = f"sensor '{self.name}': {problem.message}"
+        return Diagnostic(problem.code or "SENS100", message, place, problem.hint, problem.severity)
+
+
+def refuse(findings: Sequence[Diagnostic]) -> None:
+    """
+    Raises:
+        InvalidInput: there are findings.
+    """
+    if findings:
+        raise InvalidInput(findings)
+
+
+def robot_sensor_findings(file: Located[RobotSpec], robot: RobotModel) -> tuple[Diagnostic, ...]:
+    """All errors about the sensors of a robot file, which need no task."""
+    sensors = _of_robot(file)
+    found = [finding for own in sensors for finding in _of_one(own, robot, None)]
+    return (*found, *_names(sensors, None, robot, None), *_measured_twice(sensors, robot))
+
+
+def sensor_findings(
+    task: Located[TaskSpec],
+    robot_file: Located[RobotSpec] | None,
+    controllers: Located[ControllersSpec] | None,
+    robot: RobotModel,
+    scene: Scene,
+) -> tuple[Diagnostic, ...]:
+    """All errors about the sensors of a task and of its robot file; files that are refused are None."""
+    sensors = [] if robot_file is None else _of_robot(robot_file)
+    sensors += [_Named(name, spec, task, True) for name, spec in (task.spec.sensors or {}).items()]
+    found = [finding for own in sensors for finding in _of_one(own, robot, scene)]
+    period = task.spec.simulation.control_period
+    found += [own.finding(problem) for own in sensors for problem in _times(own.spec, period)]
+    found += _names(sensors, controllers, robot, scene)
+    found += _measured_twice(sensors, robot)
+    if controllers is not None and robot_file is not None:
+        found += _readers(controllers, {own.name: own.spec for own in sensors})
+    return tuple(found)
+
+
+def _of_robot(file: Located[RobotSpec]) -> list[_Named]:
+    return [_Named(name, spec, file, False) for name, spec in (file.spec.sensors or {}).items()]
+
+
+def _of_one(own: _Named, robot: RobotModel, scene: Scene | None) -> Iterator[Diagnostic]:
+    """Problems of a sensor alone; `scene`: None for a robot file without a task."""
+    member, spec = SENSORS[own.spec.type], own.spec
+    placed = _place(own, robot, scene) if isinstance(spec, MountedSpec) else ()
+    found = [*placed] or [*member.check(spec, robot, scene or Scene((), (), robot.X_WB.p))]
+    yield from map(own.finding, found)
+
+
+def _place(own: _Named, robot: RobotModel, scene: Scene | None) -> Iterator[Problem]:
+    """Problems of `link` and `frame`."""
+    spec, links = own.spec, [link.name for link in robot.links]
+    assert isinstance(spec, MountedSpec)
+    if spec.link is not None and spec.frame is not None:
+        yield Problem(("frame",), "it has both `link` and `frame`", "remove one of them", "SENS102")
+    elif spec.link is not None and spec.link not in links:
+        hint = did_you_mean(spec.link, links, kind="links")
+        yield Problem(("link",), f"robot '{robot.name}' has no link '{spec.link}'", hint, "SENS101")
+    elif spec.frame is not None and not own.fixed:
+        hint = "write `link: LINK`, or move the sensor to the task"
+        yield Problem(("frame",), "`frame` is of the scene; a sensor of a robot file is on a link", hint, "SENS102")
+    elif spec.link is None and (SENSORS[spec.type].needs_link or not own.fixed):
+        what = f"a sensor of type '{spec.type}'" if own.fixed else "a sensor of a robot file"
+        yield Problem((), f"it is on no link; {what} needs one", f"add `link: ...`; links: {listed(links)}", "SENS100")
+    elif spec.frame is not None and scene is not None:
+        for problem in fixed_frame(robot, scene, spec.frame, ("frame",)):
+            yield Problem(problem.loc, problem.message, problem.hint, "SENS101")
+
+
+def _times(spec: SensorSpec, period: float) -> Iterator[Problem]:
+    """Problems of `rate` and `delay` with control ticks of `period` [s]."""
+    ticks = ticks_per_measurement(spec, period)
+    if spec.rate is not None and (round(ticks) < 1 or abs(ticks - round(ticks)) > WHOLE * ticks):
+        message = f"rate {spec.rate:g} Hz does not divide the control rate, {1.0 / period:g} Hz"
+        yield Problem(("rate",), message, f"write {' or '.join(_near_rates(ticks, period))}", "SENS106")
+    delay = spec.delay / period
+    if abs(delay - round(delay)) > WHOLE * max(1.0, delay):
+        near = [f"'{1e3 * period * whole:.10g} ms'" for whole in (math.floor(delay), math.ceil(delay))]
+        message = f"delay {1e3 * spec.delay:g} ms is not a whole number of control periods, {1e3 * period:g} ms"
+        yield Problem(("delay",), message, f"write {' or '.join(near)}", "SENS107")
+
+
+def _near_rates(ticks: float, period: float) -> list[str]:
+    """The next rates below and above that divide the control rate, with few digits if there are any near."""
+    found: list[str] = []
+    for counts in (range(math.ceil(ticks), 2 * math.ceil(ticks) + 1), range(math.floor(ticks), 0, -1)):
+        rates = [1.0 / (period * count) for count in counts]
+        plain = [rate for rate in rates[:20] if abs(rate - round(rate, 3)) < 1e-9 * rate]
+        found += [f"'{rate:.10g} Hz'" for rate in (plain or rates)[:1]]
+    return found
+
+
+def _names(
+    sensors: list[_Named], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene | None
+) -> Iterator[Diagnostic]:
+    """Names that another sensor, a frame or a topic of a controller has already."""
+    taken = {link.name: "a link of the robot" for link in robot.links}
+    taken |= {body.name: "a body of the scene" for body in (scene.bodies if scene else ())}
+    taken |= {frame.name: "a frame of the scene" for frame in (scene.frames if scene else ())} | {"world": "the world"}
+    beside = controllers is not None and LOG_FOLDER in controllers.spec.controllers
+    seen: dict[str, str] = {}
+    for own in sensors:
+        member = SENSORS[own.spec.type]
+        frames = [own.name, *(own.name + suffix for suffix in member.frames(own.spec))]
+        message = ""
+        if own.name in seen:
+            message = f"duplicate name: {seen[own.name]} has a sensor of this name"
+        elif isinstance(own.spec, MountedSpec) and (clash := next((f for f in frames if f in taken), None)):
+            message = f"its frame '{clash}' has the name of {taken[clash]}"
+        elif beside and own.name in OF_CONTROLLERS:
+            message = f"its topic /sensors/{own.name} is one of the controller '{LOG_FOLDER}'"
+        if message:
+            hint = "rename it: names of sensors are unique, and name frames and topics in the log"
+            yield own.finding(Problem((), message, hint, "SENS108"), key=True)
+        seen.setdefault(own.name, "the task" if own.fixed else "the robot file")
+        taken |= dict.fromkeys(frames, f"a frame of the sensor '{own.name}'")
+
+
+def _measured_twice(sensors: list[_Named], robot: RobotModel) -> Iterator[Diagnostic]:
+    """Joints that two sensors measure: controllers read one of them."""
+    owners: dict[str, str] = {}
+    for own in sensors:
+        joints = SENSORS[own.spec.type].joints
+        for name in () if joints is None else joints(own.spec, robot):
+            if (other := owners.setdefault(name, own.name)) != own.name:
+                message = f"joint '{name}' is measured by the sensor '{other}' already; controllers read one sensor"
+                yield own.finding(Problem((), message, "list other `joints`, or remove one of them", "SENS110"))
+                break
+
+
+def _readers(controllers: Located[ControllersSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:
+    """Controllers that read a sensor that is missing or of another type."""
+    wrenches = [name for name, spec in sensors.items() if spec.type == "force_torque"]
+    for name, spec in controllers.spec.controllers.items():
+        read = getattr(spec, "sensor", None)
+        if not isinstance(read, str) or read in wrenches:
+            continue
+        place = controllers.place("controllers", name, "sensor")
+        if read in sensors:
+            message = f"controller '{name}': sensor '{read}' is of type '{sensors[read].type}', not 'force_torque'"
+        else:
+            message = f"controller '{name}': neither robot nor task has a sensor '{read}'"
+        yield Diagnostic("SENS111", message, place, did_you_mean(read, wrenches, kind="sensors"))
