@@ -29,7 +29,10 @@ _URL = re.compile(rb"ws://127\.0\.0\.1:\d+/\?token=[\w-]+")
 
 Step = Annotated[
     dict[str, Any],
-    Field(description='A step as in a task file: {"pick": {"object": "cup"}}, {"move": {"to": "home"}}.'),
+    Field(
+        description='A step as in a task file: {"pick": {"object": "cup", "grasp": {"posture": "wrap"}}}, '
+        '{"move": {"to": "home"}}.'
+    ),
 ]
 
 

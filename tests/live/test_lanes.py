@@ -56,7 +56,7 @@ def test_samples_are_wanted_for_topics_of_ticks_alone() -> None:
     wanted: set[str] = set()
     publisher = SimpleNamespace(latched={}, sampled=frozenset({"/clock", "/joint_states"}))
     hub = Hub(cast(Any, publisher), cast(Any, None), numbers)
-    hub.outlets = [cast(Any, SimpleNamespace(wanted=lambda: wanted, watches=lambda: False))]
+    hub.outlets = [cast(Any, SimpleNamespace(notice="", wanted=lambda: wanted, watches=lambda: False))]
     for topics, sampled in (({"/rosout", "/task/events"}, 0), ({"/rosout", "/clock"}, 1), (set(), 0)):
         wanted = topics
         hub.subscribed()
