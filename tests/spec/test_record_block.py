@@ -19,7 +19,9 @@ def loaded(text: str) -> TaskSpec:
 def test_rates_are_ticks_between_messages_and_topics_leave_the_others_out() -> None:
     spec = loaded("record: {rates: {tf: 100 Hz, joint_states: 1 kHz, error: 50}, topics: [tf, error, goals]}")
     assert spec.record.strides(spec.simulation.control_period) == {"tf": 10, "joint_states": 1, "error": 20}
-    assert spec.record.left_out == {"controller_state", "reference", "actuator_states", "wrench", "contacts"}
+    assert spec.record.left_out == {
+        "controller_state", "reference", "actuator_states", "wrench", "contacts", "sensors",
+    }  # fmt: skip
     usual = loaded("").record
     assert (usual.strides(0.001), usual.left_out) == ({}, frozenset())
 
