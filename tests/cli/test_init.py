@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -173,16 +172,3 @@ def test_the_example_shows_the_same_workflow() -> None:
     shown = ROOT / "examples" / "09_continuous_integration" / "manipcli.yml"
     template = (TEMPLATES / "github/workflows/manipcli.yml").read_text()
     assert shown.read_text() == template.replace("INSTALL", f"./vendor/manipcli-{__version__}-py3-none-any.whl")
-
-
-@pytest.mark.slow
-def test_its_tests_pass(project: Path) -> None:
-    assert main(["test"]) == 0
-    plugin = "manipcli.cli.pytest_plugin"
-    installed = any(one.value == plugin for one in entry_points(group="pytest11"))
-    known = [] if installed else ["-p", plugin]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", *known], capture_output=True, text=True, check=False, timeout=300
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "1 passed" in done.stdout
