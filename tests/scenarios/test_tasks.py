@@ -134,7 +134,7 @@ def test_without_physics_the_steps_are_done_and_objects_not_judged(call_cli: Any
 
 @pytest.mark.parametrize(
     "overrides",
-    [("scene.cup.mass='60 g'", "scene.cup.at=[0.76, -0.015]", "scene.cup.friction=0.6", "params.tilt=120 deg")],
+    [("scene.cup.mass='60 g'", "scene.cup.at=[0.76, -0.015]"), ("scene.cup.friction=0.6", "params.tilt=120 deg")],
 )
 def test_the_pour_can_be_varied_from_the_command_line(
     call_cli: Any, tmp_path: Path, overrides: tuple[str, ...]

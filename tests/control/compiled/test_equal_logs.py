@@ -12,7 +12,7 @@ from manipcli.pipeline import run_task
 ROOT = Path(__file__).resolve().parents[3]
 
 
-@pytest.mark.parametrize("task", ["tasks/home.yaml", pytest.param("tasks/pick_place.yaml", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("task", ["tasks/home.yaml", pytest.param("tasks/pour.yaml", marks=pytest.mark.slow)])
 def test_a_run_writes_the_same_log(task: str, watched: Any, using: Any, tmp_path: Path) -> None:
     logs = []
     for name, used in (("compiled", watched), ("python", None)):
