@@ -249,7 +249,7 @@ def ros2(tmp_path: Path) -> dict[str, str]:
     tool = tmp_path / "bin" / "ros2"
     tool.parent.mkdir()
     tool.write_text(
-        '#!/bin/sh\nprintf "%s " "$1" "$2" "$3" "$4" >> "$NOTED"; echo >> "$NOTED"\n'
+        '#!/bin/sh\nprintf "%s %s %s %s\\n" "$1" "$2" "$3" "$4" >> "$NOTED"\n'
         'case "$3" in *"$FAIL"*) echo "Goal finished with status: ABORTED";; '
         '*) echo "Goal finished with status: SUCCEEDED";; esac\n'
     )
