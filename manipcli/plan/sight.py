@@ -46,8 +46,10 @@ class Sighting:
     def why(self, body: str, camera: str) -> str:
         """Why it cannot be located, for a message."""
         if self.inside < INSIDE:
-            return f"{share(1.0 - self.inside)} of '{body}' {self.misses}" if self.inside > 0.0 else (
-                f"'{body}' {self.misses}"
+            return (
+                f"{share(1.0 - self.inside)} of '{body}' {self.misses}"
+                if self.inside > 0.0
+                else (f"'{body}' {self.misses}")
             )
         if self.shown < SHOWN:
             return f"'{self.hider}' hides {share(round(1.0 - self.shown, 2))} of '{body}' from '{camera}'"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Final
@@ -77,10 +77,10 @@ class CameraSight:
         """X_WC."""
         return self._mount.pose(self._world(state)) @ X_SC
 
-    def background(self, state: PlanningState, body: str) -> Array:
-        """(h, w) depth [m] of everything believed but this body; infinite where nothing is."""
+    def background(self, state: PlanningState, bodies: Sequence[str]) -> Array:
+        """(h, w) depth [m] of everything believed but these bodies; infinite where nothing is."""
         view = self._camera.view(self._world(state), self.pose(state))
-        return self._camera.shoot(self._without(view, body), colour=False).depth
+        return self._camera.shoot(self._without(view, bodies), colour=False).depth
 
     def noise(self, depth: Array) -> Array:
         """(h, w) standard deviation of measured depth (h, w) [m], by its data, at right angles to the surface."""
@@ -105,7 +105,7 @@ class CameraSight:
         camera = self._coarse
         part = self._stage.parts.index(body.name)
         view = camera.view(self._world(state), X_WC)
-        alone = camera.shoot(self._without(view, body.name, others=True), colour=False).part == part
+        alone = camera.shoot(self._without(view, [body.name], others=True), colour=False).part == part
         seen = camera.shoot(view, colour=False).part
         count, visible = int(alone.sum()), int((seen == part).sum())
         hiders = np.bincount(seen[alone & (seen != part)], minlength=1)
@@ -129,9 +129,9 @@ class CameraSight:
         worst = z[framed & ~measured]
         return found, depth_text(least, most, float(worst[0]))
 
-    def _without(self, view: View, body: str, *, others: bool = False) -> View:
-        """A view without a body, or with it alone."""
-        own = self._stage.part_of == self._stage.parts.index(body)
+    def _without(self, view: View, bodies: Sequence[str], *, others: bool = False) -> View:
+        """A view without these bodies, or with them alone."""
+        own = np.isin(self._stage.part_of, [self._stage.parts.index(body) for body in bodies])
         return replace(view, position=np.where((own != others)[:, None], AWAY, view.position))
 
     def _world(self, state: PlanningState) -> WorldState:
