@@ -188,7 +188,7 @@ def _settle(task: Task, session: Session) -> None:
         cause = f"{what} while settling before the start{mark}{advice}"
         raise SimulationFailed(cause, time=failed.time) from failed
     state = session.engine.read()
-    for k, body in enumerate(task.scene.movable):
+    for k, body in enumerate(task.true.scene.movable):
         shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))
         speed = float(np.linalg.norm(state.body_linear[k]))
         if not shift < SETTLED_SHIFT:
