@@ -129,8 +129,8 @@ class MotionBuilder:
 
         Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
         path is. So are those near one of `avoid`, (n) each. Part of the orientation may be left open. Where no straight
-        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`). A `solver`
-        is that of another frame than the tool, which then moves to the pose.
+        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`). With a
+        `solver` for another frame, that frame moves to the pose instead of the tool.
         """
         if free:
             self._planner.free_start(self._now, self._allowed)

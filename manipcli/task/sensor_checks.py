@@ -182,10 +182,17 @@ def _measured_twice(sensors: list[_Named], robot: RobotModel) -> Iterator[Diagno
 
 
 def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:
-    """Steps that look with a sensor that is missing, or that is not a camera with depth."""
+    """Steps that look at an object that is known exactly, or with a sensor that is no camera with depth."""
     able = [name for name, spec in sensors.items() if isinstance(spec, CameraSpec) and spec.depth]
     for k, step in enumerate(task.spec.steps):
-        if not isinstance(step.body, LocateSpec) or (name := step.body.with_) in able:
+        if not isinstance(step.body, LocateSpec):
+            continue
+        body = task.spec.scene.get(step.body.object)
+        if body is not None and body.known is None and not body.fixed:
+            message = f"the pose of '{step.body.object}' is known exactly: it has no `known`"
+            hint = "add to it `known: {region: {radius: 3 cm}}`, or remove this step"
+            yield task.source.finding(ABSENT, ("steps", k, step.verb, "object"), message, hint=hint)
+        if (name := step.body.with_) in able:
             continue
         spec = sensors.get(name)
         if spec is None:

@@ -142,12 +142,8 @@ def _refuse_unseen(spec: LocateSpec, planner: Planner, state: PlanningState, sig
 
 
 def check(spec: LocateSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """An unknown object, or one whose pose is known exactly. The camera is checked with the sensors."""
-    unknown = unknown_body(scene, spec.object, ("object",), movable=True)
-    if unknown or scene.body(spec.object).known is not None:
-        return unknown
-    hint = f"add to '{spec.object}': `known: {{region: {{radius: 3 cm}}}}`; or remove this step"
-    return (Problem(("object",), f"the pose of '{spec.object}' is known exactly: it has no `known`", hint),)
+    """An unknown object. What is said about it and about the camera is checked with the files."""
+    return unknown_body(scene, spec.object, ("object",), movable=True)
 
 
 def uncommanded(spec: LocateSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
