@@ -90,6 +90,8 @@ class Planner:
         self.clearance = clearance
         self.clearances = clearances
         self.sights = sights
+        self.starts: dict[str, Transform] = {}
+        """Poses at the start of bodies that were located before anything moved them."""
         self.allowed = NOTHING
         self.robot = robot
         self.scene = scene

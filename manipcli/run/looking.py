@@ -87,6 +87,9 @@ class Looking:
             found = localise(view, Prior(body, before, region, known.rotation), expected)
         except NotSeen as missing:
             return Found(f"'{looks.sensor}' does not show '{name}': {missing.reason}")
+        start = planner.starts.get(name, body.X_WO)
+        if np.array_equal(before.p, start.p) and np.array_equal(before.R, start.R):
+            planner.starts[name] = found.X_WO
         self._belief.update(name, found.X_WO, found.covariance)
         away, turned = between(before, found.X_WO, round_as=body.kind)
         return Found("", f"'{name}' is {mm(away)} and {deg(turned)} from where it was believed ({_quality(found)})")
