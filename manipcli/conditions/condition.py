@@ -49,6 +49,7 @@ class World:
         referenced: joints with a recorded reference.
         steps: ids of the steps.
         period: [s] between two ticks in a state window.
+        belief: the world as the robot believes it, for windows of `StateWindow.belief`; None: it is this one.
     """
 
     robot: RobotModel
@@ -59,6 +60,7 @@ class World:
     referenced: frozenset[str] = frozenset()
     steps: tuple[str, ...] = ()
     period: float = 0.0
+    belief: World | None = None
 
     @cached_property
     def kinematics(self) -> Kinematics:

@@ -55,6 +55,7 @@ class StateWindow:
         references: of every recorded controller.
         contacts: changes of the contacts, in order; the first may be older than the first tick and is valid there.
         steps: all steps of the task.
+        belief: the same ticks with the body poses that the robot believes; None: they are those of this window.
     """
 
     states: WorldState
@@ -62,6 +63,7 @@ class StateWindow:
     references: tuple[Reference, ...]
     contacts: tuple[Touching, ...]
     steps: tuple[StepTime, ...]
+    belief: StateWindow | None = None
 
     @property
     def times(self) -> Array:
@@ -79,6 +81,7 @@ class StateWindow:
             before=self.states.map(lambda a: a[first - 1]) if first > 0 else self.before,
             references=tuple(Reference(r.joints, r.position[first:last]) for r in self.references),
             contacts=self.contacts[max(valid, 0) :],
+            belief=None if self.belief is None else self.belief.part(first, last),
         )
 
     def touching(self, k: int) -> tuple[Contact, ...]:

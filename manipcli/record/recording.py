@@ -7,7 +7,9 @@ Small parts are read at once. States are read span by span, so that the memory d
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.state import Contact, WorldState
@@ -60,12 +62,14 @@ class Span:
     """Successive control ticks with complete data.
 
     `states` has a leading time axis T, the traces of the controllers are on the same ticks, and `contacts` are the
-    changes of contacts during the span.
+    changes of contacts during the span. `believed` (T, k, 7): position and quaternion of the bodies with believed poses
+    of their own.
     """
 
     states: WorldState
     controllers: tuple[ControllerTrace, ...]
     contacts: tuple[ContactSnapshot, ...]
+    believed: Array = field(default_factory=lambda: np.zeros((0, 0, 7)))
 
 
 EMBEDDED = "embedded_meshes"
@@ -89,6 +93,7 @@ class Recording:
             absent has no trace.
         silent: topics without a message although a run records them: another program removed them, or the run ended
             before.
+        believed_names: bodies with believed poses of their own.
 
     `states`, `controllers` and `contacts` cover all spans and need a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
@@ -104,6 +109,7 @@ class Recording:
     period: float = 0.0
     absent: tuple[str, ...] = ()
     silent: tuple[str, ...] = ()
+    believed_names: tuple[str, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The embedded mesh files by the URI in URDF and scene, with the material files of OBJ meshes; empty unless the
@@ -162,6 +168,7 @@ def joined(spans: Iterable[Span]) -> Span:
         states=first.states.map(lambda _: next(arrays)),
         controllers=tuple(trace.map(lambda _: next(arrays)) for trace in first.controllers),
         contacts=tuple(contacts),
+        believed=next(arrays),
     )
 
 
@@ -176,7 +183,7 @@ def _arrays(span: Span) -> list[Array]:
     span.states.map(keep)
     for trace in span.controllers:
         found += trace.arrays
-    return found
+    return [*found, span.believed]
 
 
 class _Growing:

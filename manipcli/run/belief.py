@@ -86,9 +86,9 @@ class Belief:
         It is `state` itself where everything is known exactly. Velocities of uncertain bodies are the true ones.
 
         Args:
-            state: the true state of one tick.
+            state: the true state of one tick, or what this returned for it.
         """
-        if not self._own:
+        if not self._own or state is self._state:
             return state
         if self._state is None:
             self._state = WorldState.room(len(state.position), len(self._row))
@@ -122,7 +122,7 @@ class Belief:
 
         Args:
             carried: the object and the link.
-            state: the true state.
+            state: as for `look`.
         """
         if not self._own:
             return
@@ -139,7 +139,7 @@ class Belief:
         """The hand has opened: what it held stays where it is believed to be.
 
         Args:
-            state: the true state.
+            state: as for `look`.
         """
         if any(own.held is not None for own in self._own.values()):
             self.look(state)
