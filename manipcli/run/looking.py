@@ -26,6 +26,9 @@ from manipcli.task.camera_sights import CameraSight
 LATE: Final = 0.1
 """[s] A picture that arrives this much later than its camera can deliver one is lost."""
 
+UNMOVED: Final = 1e-9
+"""[m], and of a rotation matrix: a belief that differs by less from that at the start is still that."""
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -88,10 +91,10 @@ class Looking:
         except NotSeen as missing:
             return Found(f"'{looks.sensor}' does not show '{name}': {missing.reason}")
         start = planner.starts.get(name, body.X_WO)
-        if np.array_equal(before.p, start.p) and np.array_equal(before.R, start.R):
+        if np.allclose(before.p, start.p, atol=UNMOVED) and np.allclose(before.R, start.R, atol=UNMOVED):
             planner.starts[name] = found.X_WO
         self._belief.update(name, found.X_WO, found.covariance)
-        away, turned = between(before, found.X_WO, round_as=body.kind)
+        away, turned = between(before, found.X_WO, round_as="" if found.free is None else body.kind)
         return Found("", f"'{name}' is {mm(away)} and {deg(turned)} from where it was believed ({_quality(found)})")
 
     @contextmanager

@@ -262,7 +262,7 @@ class StepAttempt:
         self.located = True
         name, tick = looks.object, self._session.ticks
         self._recorder.believed(tick, name, self._belief.pose(name), self._belief.covariance(name))
-        self._event("located", planned, "", found.text)
+        self._event("located", planned, name, found.text)
         self._report(found.text, detail=False)
         return MotionEnd("done", found.text)
 
