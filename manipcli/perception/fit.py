@@ -22,15 +22,17 @@ from manipcli.render.surface import Surface
 LATERAL = 0.5
 """Standard deviation of the place in the picture where depth is measured [pixel]."""
 BLUR = 1.5
-"""Standard deviation of the blur of outlines [pixel]."""
+"""Standard deviation of the blur of edges [pixel]."""
 EDGE = 0.7
-"""Standard deviation of the place of an outline [pixel], at each of its pixels."""
+"""Standard deviation of the place of an edge [pixel], at each of its pixels."""
 GATE = 4.0
 """Standard deviations of depth within which a pixel is explained."""
 LONGEST, WIDEST = 0.03, 0.25
 """Largest step: translation [m] and rotation [rad]."""
-CLOSE = 0.02
-"""What is not the body in front of or beside it is farther from its depth than this [m]."""
+JUMP = 0.01
+"""Depth by which a pixel is off, beyond its noise, that is as wrong as any more [m]."""
+HELD, HELD_ROTATION = 2e-3, 0.05
+"""Standard deviations of a step [m] and [rad] where the picture tells nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,13 +143,13 @@ class Fit:
         found[self.free] += move[self.free]
         return found
 
-    def refined(self, state: Array, gate: float, *, outline: bool = False) -> tuple[Array, Array]:
+    def refined(self, state: Array, gate: float, *, edges: bool = False) -> tuple[Array, Array]:
         """One Gauss-Newton step, and the information matrix (free, free) of the state before it.
 
         Args:
             state: (4,).
             gate: most depth error of a pixel that counts [m]; GATE standard deviations always count.
-            outline: use the outline too.
+            edges: use the edges too.
         """
         picture, rendered = self._picture, self._render(state)
         error = picture.depth.reshape(-1)[rendered.at] - rendered.depth.reshape(-1)[rendered.at]
@@ -160,54 +162,52 @@ class Fit:
         J = (rendered.change[used] / rendered.sigma[used, None])[:, self.free]
         H = J.T @ J
         g = J.T @ (error[used] / rendered.sigma[used])
-        if outline:
-            more_H, more_g = self._outline(state, rendered)
+        if edges:
+            more_H, more_g = self._edges(state, rendered)
             H, g = H + more_H, g + more_g
         H = H + self._weight
         g = g - self._weight @ state[self.free]
-        step = np.linalg.solve(H, g)
+        held = np.array([HELD, HELD, HELD, HELD_ROTATION])[self.free]
+        step = np.linalg.solve(H + np.diag(1.0 / np.square(held)), g)
         whole = np.zeros(4)
         whole[self.free] = step
         length, turn = float(np.linalg.norm(whole[:3])), abs(float(whole[3]))
         whole *= min(1.0, LONGEST / max(length, 1e-12), WIDEST / max(turn, 1e-12))
         return state + whole, H
 
-    def _outline(self, state: Array, rendered: _Rendered) -> tuple[Array, Array]:
-        """Information matrix and gradient of the outline.
+    def _edges(self, state: Array, rendered: _Rendered) -> tuple[Array, Array]:
+        """Information matrix and gradient of edges: of outlines, and of what is in front of other parts of the body.
 
-        Blurred masks differ by e g(x) where an edge is off by e pixels, with the profile g of the blur; the sum of g^2
-        across the edge is 1 / (2 sqrt(pi) BLUR), so this weight gives each pixel along the edge (e / EDGE)^2.
+        Pixels that are nearer or farther than rendered, by more than noise, are -1 or 1. Blurred, they are e g(x) where
+        an edge is off by e pixels, with the profile g of the blur; the sum of g^2 across the edge is 1 / (2 sqrt(pi)
+        BLUR), so this weight gives each pixel along the edge (e / EDGE)^2. Pixels that another thing covers are -1 at
+        any state, so they have no effect.
         """
         from scipy.ndimage import gaussian_filter
 
         picture = self._picture
+        sigma = picture.noise.copy()
+        sigma.reshape(-1)[rendered.at] = rendered.sigma
+
+        def misfit(depth: Array) -> Array:
+            error = picture.depth - np.minimum(depth, picture.expected)
+            sign = np.clip(np.abs(error) - GATE * sigma, 0.0, JUMP) / JUMP
+            return np.where(self._seen, np.copysign(sign, error), 0.0)
 
         def blurred(values: Array) -> Array:
-            return np.asarray(gaussian_filter(values, BLUR, truncate=3.0))
+            return np.asarray(gaussian_filter(values, BLUR, truncate=3.0)).reshape(-1)
 
-        here = rendered.shown.astype(np.float64)
-        spread = blurred(here)
-        beside = blurred(np.where(rendered.shown, rendered.depth, 0.0)) / np.maximum(spread, 1e-9)
-        local = np.where(rendered.shown, rendered.depth, beside)
-        with np.errstate(invalid="ignore"):
-            error = picture.depth - local
-            foreign = picture.shown & ((error < -CLOSE) | (~rendered.shown & (error > CLOSE)))
-        counts = (self._seen & ~foreign).astype(np.float64)
-        weight = 2.0 * math.sqrt(math.pi) * BLUR / EDGE**2
-        residual = blurred(counts * (picture.shown.astype(np.float64) - here))
-        distance = float(np.linalg.norm(self.pose(state).p - picture.X_WC.p))
-        length = BLUR * distance / picture.lens.fx
+        length = BLUR * float(np.linalg.norm(self.pose(state).p - picture.X_WC.p)) / picture.lens.fx
         deltas = np.array([length, length, length, length / self._radius])
         columns = []
         for k in self.free:
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = state.copy()
-                moved[k] += sign * deltas[k]
-                ends.append((self._see(moved)[0] < picture.floor).astype(np.float64))
-            columns.append(blurred(counts * (ends[0] - ends[1])).reshape(-1) / (2.0 * deltas[k]))
+            step = np.zeros(4)
+            step[k] = deltas[k]
+            ends = [misfit(self._see(state + sign * step)[0]) for sign in (-1.0, 1.0)]
+            columns.append(blurred(ends[0] - ends[1]) / (2.0 * deltas[k]))
         J = np.stack(columns, axis=1)
-        return weight * (J.T @ J), weight * (J.T @ residual.reshape(-1))
+        weight = 2.0 * math.sqrt(math.pi) * BLUR / EDGE**2
+        return weight * (J.T @ J), weight * (J.T @ blurred(misfit(rendered.depth)))
 
     def compare(self, state: Array, slack: float = 0.0) -> Comparison:
         """How a state explains the picture; `slack` [m] is added to the depth errors that are explained."""

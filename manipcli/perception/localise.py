@@ -183,7 +183,7 @@ def _coarse(fit: Fit, start: Array, mask: Mask) -> tuple[float, Array]:
     for _ in range(2):
         state = fit.shifted(state, mask)
     for gate in (0.03, 0.02, 0.01):
-        state, _ = fit.refined(state, gate)
+        state, _ = fit.refined(state, gate, edges=True)
     return fit.compare(state, slack=3e-3).cost, state
 
 
@@ -191,13 +191,13 @@ def _fine(fit: Fit, start: Array) -> tuple[Comparison, Array]:
     """A state at a minimum, and how it explains the picture."""
     state = start
     for gate in (0.01, 0.005, 0.0, 0.0):
-        state, _ = fit.refined(state, gate)
+        state, _ = fit.refined(state, gate, edges=True)
     return fit.compare(state), state
 
 
 def _checked(fit: Fit, comparison: Comparison, state: Array, prior: Prior, free: bool) -> Localisation:
     for _ in range(4):
-        state, information = fit.refined(state, 0.0, outline=True)
+        state, information = fit.refined(state, 0.0, edges=True)
     comparison = fit.compare(state)
     if comparison.explained < LEAST_PIXELS or comparison.inliers < LEAST_INLIERS:
         raise NotSeen(

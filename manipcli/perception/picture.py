@@ -16,6 +16,8 @@ NEARER = 4.0
 """Standard deviations by which a pixel is nearer than expected to count as something that was not expected."""
 LEAST_NOISE = 1e-4
 """Of depth [m]: rounding and tessellation."""
+NOTHING = 1e3
+"""Depth where nothing is [m]."""
 NEIGHBOURS = 5
 """Least number of such pixels among 3 x 3; fewer are noise."""
 
@@ -28,8 +30,9 @@ class Picture:
         lens: of these pixels.
         X_WC: optical frame in the world.
         rays: (h, w, 3) of the pixels in C, at z = 1.
-        depth: (h, w) measured [m]; NaN: not measured.
+        depth: (h, w) measured [m]; NaN: not measured, NOTHING: neither measured nor expected.
         noise: (h, w) its standard deviation [m].
+        expected: (h, w) depth without the body [m]; NOTHING where nothing is.
         floor: (h, w) depth [m] from which on a pixel cannot be told from what was expected.
         shown: (h, w) where something unexpected is.
         near: (h, w) where it is in the volume that the body can be in.
@@ -41,6 +44,7 @@ class Picture:
     rays: Array
     depth: Array
     noise: Array
+    expected: Array
     floor: Array
     shown: Mask
     near: Mask
@@ -54,7 +58,7 @@ class Picture:
         depth = self.depth[some]
         old, (height, width) = self.lens, depth.shape
         lens = Lens(width, height, old.fx / stride, old.fy / stride, old.cx / stride, old.cy / stride)
-        arrays = (self.noise[some], self.floor[some], self.shown[some], self.near[some])
+        arrays = (self.noise[some], self.expected[some], self.floor[some], self.shown[some], self.near[some])
         return Picture(lens, self.X_WC, self.rays[some], depth, *arrays, self.pixel)
 
 
@@ -75,18 +79,20 @@ def cut(
     z = np.array(depth[window], dtype=np.float64)
     sigma = np.broadcast_to(np.asarray(noise, dtype=np.float64), depth.shape)[window]
     sigma = np.maximum(np.where(np.isfinite(sigma), sigma, LEAST_NOISE), LEAST_NOISE)
+    behind = np.minimum(np.asarray(expected, dtype=np.float64), NOTHING)
     z[~(z > 0.0) | ~np.isfinite(z)] = np.nan
+    z[np.isnan(z) & (behind[window] == NOTHING)] = NOTHING
     part = Lens(z.shape[1], z.shape[0], lens.fx, lens.fy, lens.cx - columns.start, lens.cy - rows.start)
     rays = np.asarray(part.points(np.ones_like(z)))
     # A pixel may show what its neighbours were expected to show.
-    floor = minimum_filter(np.asarray(expected, dtype=np.float64), size=3)[window] - NEARER * sigma
+    floor = minimum_filter(behind, size=3)[window] - NEARER * sigma
     with np.errstate(invalid="ignore"):
         shown = z < floor
     shown &= uniform_filter(shown.astype(np.float64), size=3, mode="nearest") * 9.0 > NEIGHBOURS - 0.5
     points = X_WC.apply(rays * np.where(shown, z, 0.0)[..., None])
     near = shown & ((points >= low) & (points <= high)).all(axis=-1)
     pixel = np.array([1.0 / lens.fx, 1.0 / lens.fy])
-    return Picture(part, X_WC, rays, z, sigma, floor, shown, near, pixel)
+    return Picture(part, X_WC, rays, z, sigma, behind[window], floor, shown, near, pixel)
 
 
 def _window(lens: Lens, corners: Array) -> tuple[slice, slice] | None:
