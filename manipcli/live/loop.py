@@ -145,12 +145,12 @@ def simulate_live(
     replanning = 0.0
     try:
         with open_session(task, plan, manager, LiveSession) as session:
-            live = Live(live_world(task, plan, session), manager.controllers, session.period)
+            live = Live(live_world(task, plan, session), manager.controllers, session.period, session.sensors)
             runs = task.part.last is None
             observer = Observer(recorder, live, progress if runs else SILENT, session.period)
             outside.feed.observer = observer
             session.restart_clock(outside.feed)
-            record_sensors(session, recorder)
+            record_sensors(session, recorder, live)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             steps = LiveSteps(task, plan, session, recorder, live, observer, progress, outside.pace)

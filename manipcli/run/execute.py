@@ -31,6 +31,7 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.sensor import Picture
+from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.session import Session
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
@@ -99,10 +100,10 @@ def _run_steps(
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
     with open_session(task, plan, manager, Session) as session:
-        live = Live(live_world(task, plan, session), manager.controllers, session.period)
+        live = Live(live_world(task, plan, session), manager.controllers, session.period, session.sensors)
         observer = Observer(recorder, live, progress, session.period)
         session.restart_clock(observer)
-        record_sensors(session, recorder)
+        record_sensors(session, recorder, live)
         run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
         try:
             BlockLoop(plan, run).run()
@@ -146,10 +147,11 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
         engine.close()
 
 
-def record_sensors(session: Session, recorder: Recorder) -> None:
-    """Record what the sensors of a session measure from now on."""
+def record_sensors(session: Session, recorder: Recorder, live: Live) -> None:
+    """Record what the sensors of a session measure from now on; conditions get the pictures."""
 
     def deliver(tick: int, taken: int, name: str, picture: Picture) -> None:
+        live.picture(tick, name, picture)
         recorder.measured(tick, taken, f"{SENSORS}/{name}{picture.suffix}", picture.fields)
 
     recorder.attach(session.sensors.numbers)
@@ -172,6 +174,7 @@ def live_world(task: Task, plan: Plan, session: Session) -> World:
         referenced=frozenset(name for c in session.manager.controllers if c.interfaces for name in c.joints),
         steps=tuple(str(step.id) for step in task.spec.steps),
         period=task.spec.simulation.control_period,
+        sensors=sensed_by_name(task.sensors, task.true.robot, task.true.scene),
     )
 
 
