@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -110,6 +111,11 @@ def _check(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
     yield from needs_a_part(spec, scene)
 
 
+def _sensed(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Sensed:
+    cells = spec.rows * spec.columns
+    return Sensed("tactile", fields=(("force", cells),), forces=cells)
+
+
 MEMBER = SensorMember(
-    name="tactile", spec=TactileSpec, quantities=_quantities, topics=_topics, open=Taxels, check=_check
+    name="tactile", spec=TactileSpec, quantities=_quantities, topics=_topics, open=Taxels, check=_check, sensed=_sensed
 )
