@@ -151,6 +151,7 @@ def simulate_live(
             outside.feed.observer = observer
             session.restart_clock(outside.feed)
             record_sensors(session, recorder)
+            outside.feed.attach(session.sensors.numbers)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             steps = LiveSteps(task, plan, session, recorder, live, observer, progress, outside.pace)
