@@ -63,7 +63,7 @@ class World:
     steps: tuple[str, ...] = ()
     period: float = 0.0
     belief: World | None = None
-    sensors: Mapping[str, Sensed] = NO_SENSORS
+    sensors: Mapping[str, Sensed] = field(default_factory=lambda: NO_SENSORS)
 
     @cached_property
     def kinematics(self) -> Kinematics:
