@@ -58,6 +58,11 @@ class Comparison:
     spread: float
 
     @property
+    def wrong(self) -> int:
+        """Pixels that speak against the pose."""
+        return self.missing + self.covered + self.beside
+
+    @property
     def inliers(self) -> float:
         """Share of the pixels that should show the body and do."""
         return self.explained / max(self.explained + self.missing + self.covered, 1)
@@ -82,10 +87,10 @@ class Fit:
         picture: what was measured.
         shown: the surface of the body in O.
         X_WO: believed pose.
-        prior: (4,) standard deviations of the state before; 0: known.
+        reach: (4,) the state is at most this before; 0: known. Rotations stay within it, pi: any.
     """
 
-    def __init__(self, picture: Picture, shown: Surface, X_WO: Transform, prior: Array) -> None:
+    def __init__(self, picture: Picture, shown: Surface, X_WO: Transform, reach: Array) -> None:
         self._picture = picture
         self._raster = Raster([shown], picture.lens)
         a, b, c = (shown.vertices[shown.faces[:, k]] for k in range(3))
@@ -93,8 +98,9 @@ class Fit:
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
         self._X_WO, self._R_CW = X_WO, picture.X_WC.R.T
         self._rays = picture.rays.reshape(-1, 3)
-        self.free = np.flatnonzero(prior > 0.0)
-        self._weight = np.diag(1.0 / np.square(prior[self.free]))
+        self.free = np.flatnonzero(reach > 0.0)
+        self._weight = np.diag(3.0 / np.square(reach[self.free]))  # of uniform distributions
+        self._rotation = float(reach[3]) if reach[3] < math.pi else math.inf
         self._seen = np.isfinite(picture.depth)
         self._radius = float(np.linalg.norm(shown.vertices, axis=1).max())
 
@@ -173,7 +179,9 @@ class Fit:
         whole[self.free] = step
         length, turn = float(np.linalg.norm(whole[:3])), abs(float(whole[3]))
         whole *= min(1.0, LONGEST / max(length, 1e-12), WIDEST / max(turn, 1e-12))
-        return state + whole, H
+        found = state + whole
+        found[3] = np.clip(found[3], -self._rotation, self._rotation)
+        return found, H
 
     def _edges(self, state: Array, rendered: _Rendered) -> tuple[Array, Array]:
         """Information matrix and gradient of edges: of outlines, and of what is in front of other parts of the body.
