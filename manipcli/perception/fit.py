@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
-from manipcli.perception.picture import Mask, Picture
+from manipcli.perception.picture import Mask, Picture, patches
 from manipcli.render.raster import Raster
 from manipcli.render.surface import Surface
 
@@ -44,6 +44,7 @@ class Comparison:
         missing: should show it, and show something behind it.
         covered: should show it, and show something unexpected in front of it, in the volume.
         beside: show something unexpected in the volume where the body is not.
+        against: missing, covered and beside pixels in patches, more than the single ones along edges.
         cost: truncated sum of squared depth errors, in standard deviations.
         residual: root mean square of the depth errors of explained pixels [m].
         spread: the same in standard deviations.
@@ -53,14 +54,10 @@ class Comparison:
     missing: int
     covered: int
     beside: int
+    against: int
     cost: float
     residual: float
     spread: float
-
-    @property
-    def wrong(self) -> int:
-        """Pixels that speak against the pose."""
-        return self.missing + self.covered + self.beside
 
     @property
     def inliers(self) -> float:
@@ -228,17 +225,18 @@ class Fit:
             explained = np.abs(error) <= allowed
             missing = error > allowed
         covered = seen & ~explained & ~missing & near
-        beside = int(picture.near.sum()) - int(near.sum())
+        wrong = picture.near.copy()
+        wrong.reshape(-1)[at] = missing | covered
+        bad, count = int(wrong.sum()), int(explained.sum())
         ratio = error[explained] / rendered.sigma[explained]
-        bad = int(missing.sum()) + int(covered.sum()) + beside
-        squares = float(np.square(ratio).sum())
-        count = int(explained.sum())
+        squares = np.square(ratio)
         return Comparison(
             explained=count,
             missing=int(missing.sum()),
             covered=int(covered.sum()),
-            beside=beside,
-            cost=float(np.minimum(np.square(ratio), most).sum()) + most * bad,
+            beside=int(picture.near.sum()) - int(near.sum()),
+            against=int(patches(wrong).sum()),
+            cost=float(np.minimum(squares, most).sum()) + most * bad,
             residual=math.sqrt(float(np.square(error[explained]).mean())) if count else 0.0,
-            spread=math.sqrt(squares / count) if count else 0.0,
+            spread=math.sqrt(float(squares.mean())) if count else 0.0,
         )

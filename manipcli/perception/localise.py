@@ -39,8 +39,9 @@ APART, APART_ROTATION = 2e-3, math.radians(4.0)
 """Poses closer than this are the same [m], [rad]."""
 TIE = 25.0
 """Difference of cost between poses that explain a picture equally well, in squared standard deviations."""
-SCAN, ALIKE = math.radians(5.0), 10
-"""Rotations are compared in such steps [rad]; up to this many pixels more may speak against one that is as good."""
+SCAN, FLAT, ALIKE = math.radians(5.0), math.radians(15.0), 10
+"""Rotations are compared in such steps [rad]. Over such an angle or more [rad], it cannot be told which is right if at most
+this many pixels more speak against them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,19 +224,21 @@ def _distinct(hypotheses: list[_Hypothesis]) -> list[_Hypothesis]:
 def _centred(fit: Fit, chosen: _Hypothesis, rotation: float) -> tuple[Array, float]:
     """The state in the middle of the rotations that explain the picture as well, such as those that hide a handle, and
     the angle between the outermost ones [rad]."""
-    most = chosen.comparison.wrong + ALIKE + 2.0 * math.sqrt(chosen.comparison.wrong)
+    most = chosen.comparison.against + ALIKE
     ends = []
     for sign in (-1.0, 1.0):
         state, count = chosen.state.copy(), 0
         while count * SCAN < math.pi and (rotation >= math.pi or abs(state[3] + sign * SCAN) <= rotation):
             state[3] += sign * SCAN
-            if fit.compare(state).wrong > most:
+            if fit.compare(state).against > most:
                 break
             count += 1
         ends.append(sign * count * SCAN)
-    state = chosen.state.copy()
+    state, width = chosen.state.copy(), ends[1] - ends[0]
+    if width < FLAT:
+        return state, 0.0
     state[3] += (ends[0] + ends[1]) / 2.0
-    return state, ends[1] - ends[0]
+    return state, width
 
 
 def _checked(fit: Fit, chosen: _Hypothesis, equal: list[Array], prior: Prior, free: bool) -> Localisation:

@@ -86,7 +86,7 @@ def cut(
 
     None if the volume is not in the picture.
     """
-    from scipy.ndimage import minimum_filter, uniform_filter
+    from scipy.ndimage import minimum_filter
 
     corners = np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
     inside = window(lens, X_WC.inverse().apply(corners))
@@ -105,7 +105,7 @@ def cut(
     floor = minimum_filter(behind, size=3)[inside] - NEARER * sigma
     with np.errstate(invalid="ignore"):
         shown = z < floor
-    shown &= uniform_filter(shown.astype(np.float64), size=3, mode="nearest") * 9.0 > NEIGHBOURS - 0.5
+    shown = patches(shown)
     points = X_WC.apply(rays * np.where(shown, z, 0.0)[..., None])
     near = shown & ((points >= low) & (points <= high)).all(axis=-1)
     pixel = np.array([1.0 / lens.fx, 1.0 / lens.fy])
@@ -124,3 +124,11 @@ def window(lens: Lens, corners: Array) -> tuple[slice, slice] | None:
     if (first >= last).any():
         return None
     return slice(int(first[1]), int(last[1])), slice(int(first[0]), int(last[0]))
+
+
+def patches(mask: Mask) -> Mask:
+    """The pixels (h, w) of a mask with at least NEIGHBOURS of it among the 3 x 3 about them."""
+    from scipy.ndimage import uniform_filter
+
+    found: Mask = mask & (uniform_filter(mask.astype(np.float32), size=3, mode="nearest") * 9.0 > NEIGHBOURS - 0.5)
+    return found
