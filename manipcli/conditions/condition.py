@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from manipcli.conditions.robustness import Robustness
-from manipcli.conditions.sensed import NO_SENSORS, Sensed
+from manipcli.conditions.sensed import Sensed
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc, Severity
 from manipcli.core.text import did_you_mean
@@ -61,7 +61,7 @@ class World:
     referenced: frozenset[str] = frozenset()
     steps: tuple[str, ...] = ()
     period: float = 0.0
-    sensors: Mapping[str, Sensed] = NO_SENSORS
+    sensors: Mapping[str, Sensed] = field(default_factory=dict)
 
     @cached_property
     def kinematics(self) -> Kinematics:
