@@ -50,6 +50,7 @@ class World:
         referenced: joints with a recorded reference.
         steps: ids of the steps.
         period: [s] between two ticks in a state window.
+        belief: the world as the robot believes it, for windows of `StateWindow.belief`; None: it is this one.
         sensors: whose readings are in the state windows if a condition asks for them.
     """
 
@@ -61,6 +62,7 @@ class World:
     referenced: frozenset[str] = frozenset()
     steps: tuple[str, ...] = ()
     period: float = 0.0
+    belief: World | None = None
     sensors: Mapping[str, Sensed] = field(default_factory=dict)
 
     @cached_property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -67,10 +67,12 @@ def examine(
             continue
         if successive is None:
             successive = WindowsOfSpans(order, steps)
+            states = order.applied(span.states)
+            believed = order.belief(states, span.believed)
             world = World(
                 robot,
                 scene,
-                start=order.applied(span.states).map(lambda a: a[0]),
+                start=states.map(lambda a: a[0]),
                 physics=physics,
                 unrecorded=unrecorded(recording),
                 referenced=frozenset(name for trace in span.controllers for name in trace.joints),
@@ -78,6 +80,8 @@ def examine(
                 period=_period(span.states.time, recording.period),
                 sensors={name: sensors[name] for name in recording.sensors},
             )
+            if believed is not None:
+                world = replace(world, belief=replace(world, start=believed.map(lambda a: a[0])))
             asked = [Expected(expectation, world, steps, seam) for expectation in expect]
         window = successive.next(span)
         if window.times[0] >= until - ROUNDING:

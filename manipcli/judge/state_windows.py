@@ -11,6 +11,7 @@ import numpy as np
 from manipcli.conditions.condition import Seen
 from manipcli.conditions.robustness import NotEvaluated
 from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
+from manipcli.core.geometry import Array
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -24,10 +25,14 @@ MOST_TICKS: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Indices of the robot's joints and of the scene's movable bodies in the recorded arrays."""
+    """Indices of the robot's joints and of the scene's movable bodies in the recorded arrays.
+
+    `believed`: the rows, among these bodies, of those with believed poses of their own.
+    """
 
     joints: list[int]
     bodies: list[int]
+    believed: list[int]
 
     @staticmethod
     def of(recording: Recording, robot: RobotModel, scene: Scene) -> Order | NotEvaluated:
@@ -43,6 +48,7 @@ class Order:
         return Order(
             [recording.joint_names.index(name) for name in robot.joint_names],
             [recording.body_names.index(name) for name in bodies],
+            [bodies.index(name) for name in recording.believed_names if name in bodies],
         )
 
     def applied(self, s: WorldState) -> WorldState:
@@ -58,6 +64,14 @@ class Order:
             body_linear=s.body_linear[:, bodies],
             body_angular=s.body_angular[:, bodies],
         )
+
+    def belief(self, states: WorldState, believed: Array) -> WorldState | None:
+        """Ordered states with the believed poses (T, k, 7) of a span; None: they are the true ones."""
+        if not self.believed or not believed.size:
+            return None
+        position, quat = states.body_position.copy(), states.body_quat_xyzw.copy()
+        position[:, self.believed], quat[:, self.believed] = believed[..., :3], believed[..., 3:]
+        return replace(states, body_position=position, body_quat_xyzw=quat)
 
 
 def unrecorded(recording: Recording) -> dict[Seen, str]:
@@ -96,7 +110,7 @@ def at_every_tick(window: StateWindow, since: StateWindow | None, period: float)
     times = np.round(np.arange(first, last + 1) * period, 9)
     unknown = window.states.map(lambda a: np.broadcast_to(np.nan, (count, *a.shape[1:])))
     before = None if since is None else since.states.map(lambda a: a[-1])
-    return replace(window, states=replace(unknown, time=times), before=before, references=())
+    return replace(window, states=replace(unknown, time=times), before=before, references=(), belief=None)
 
 
 class WindowsOfSpans:
@@ -112,6 +126,7 @@ class WindowsOfSpans:
     def next(self, span: Span) -> StateWindow:
         """The window of a span with at least one tick."""
         held = self._last.contacts[-1:] if self._last is not None else ()
+        last_believed = None if self._last is None else self._last.belief
         self._last = StateWindow(
             states=self._order.applied(span.states),
             before=None if self._last is None else self._last.states.map(lambda a: a[-1]),
@@ -122,4 +137,8 @@ class WindowsOfSpans:
             if self._last is None
             else {name: self._last.readings[name].then(more) for name, more in span.readings.items()},
         )
+        believed = self._order.belief(self._last.states, span.believed)
+        if believed is not None:
+            before = None if last_believed is None else last_believed.states.map(lambda a: a[-1])
+            self._last = replace(self._last, belief=replace(self._last, states=believed, before=before))
         return self._last

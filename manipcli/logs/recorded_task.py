@@ -31,6 +31,7 @@ from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
+from manipcli.task.believed_scene import believing
 from manipcli.task.consistency import disagreements
 from manipcli.task.sample import sampled
 from manipcli.task.sensor_checks import sensed
@@ -114,6 +115,8 @@ def recorded_task(
             robot_of=lambda file: meshes.robot(robot_of(recording, path, file.spec)),
             scene_of=scene_of,
         )
+    else:
+        made = believing(made)
     files = mesh_files(made)
     _check_there(files, path, meshes)
     unlike = (*_versions(recording, path, made), *_meshes(recording, path, files))

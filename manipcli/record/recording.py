@@ -63,12 +63,14 @@ class Span:
     """Successive control ticks with complete data.
 
     `states` has a leading time axis T, the traces of the controllers are on the same ticks, and `contacts` are the
-    changes of contacts during the span; `readings`: those that arrived during the span, of the sensors that are read.
+    changes of contacts during the span. `believed` (T, k, 7): position and quaternion of the bodies with believed poses
+    of their own. `readings`: those that arrived during the span, of the sensors that are read.
     """
 
     states: WorldState
     controllers: tuple[ControllerTrace, ...]
     contacts: tuple[ContactSnapshot, ...]
+    believed: Array = field(default_factory=lambda: np.zeros((0, 0, 7)))
     readings: Mapping[str, Readings] = field(default_factory=dict)
 
 
@@ -93,6 +95,7 @@ class Recording:
             absent has no trace.
         silent: topics without a message although a run records them: another program removed them, or the run ended
             before.
+        believed_names: bodies with believed poses of their own.
         sensors: whose readings are in the spans.
 
     `states`, `controllers` and `contacts` cover all spans and need a recording that is `whole`.
@@ -109,6 +112,7 @@ class Recording:
     period: float = 0.0
     absent: tuple[str, ...] = ()
     silent: tuple[str, ...] = ()
+    believed_names: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
@@ -171,6 +175,7 @@ def joined(spans: Iterable[Span]) -> Span:
         states=first.states.map(lambda _: next(arrays)),
         controllers=tuple(trace.map(lambda _: next(arrays)) for trace in first.controllers),
         contacts=tuple(contacts),
+        believed=next(arrays),
         readings={
             name: Readings(np.concatenate([each.times for each in parts]), np.concatenate([e.values for e in parts]))
             for name, parts in readings.items()
@@ -189,7 +194,7 @@ def _arrays(span: Span) -> list[Array]:
     span.states.map(keep)
     for trace in span.controllers:
         found += trace.arrays
-    return found
+    return [*found, span.believed]
 
 
 class _Growing:

@@ -13,6 +13,7 @@ from manipcli.model.build_robot import build_robot
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.load import load_controllers, load_robot
 from manipcli.spec.load import load_task as load_task_file
+from manipcli.task.believed_scene import believing
 from manipcli.task.changed_files import Files, bound
 from manipcli.task.consistency import consistent
 from manipcli.task.named_file import named_file
@@ -147,4 +148,4 @@ def _as_written(
     refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
     varied = bound(Files(file, robot_file, controllers_file))
     findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings)
-    return Task(file, robot_file, controllers_file, robot, scene, findings), varied
+    return believing(Task(file, robot_file, controllers_file, robot, scene, findings)), varied

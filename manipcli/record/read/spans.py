@@ -16,7 +16,7 @@ from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import schemas
 from manipcli.record.cdr import CdrError
-from manipcli.record.channels import ControllerChannel
+from manipcli.record.channels import ControllerChannel, believed_frame
 from manipcli.record.contents import Contents
 from manipcli.record.decode import Int
 from manipcli.record.faults import Thinned
@@ -181,6 +181,12 @@ class _SpanReader:
         if topics.TF not in contents.absent:
             poses = body_runs(frozenset(contents.bodies), WORLD)
             self._columns[topics.TF] = Columns(topics.TF, schemas.TF_MESSAGE, poses, contents.bodies, (7,) * m)
+        if contents.believed and topics.BELIEF_TF not in contents.absent:
+            frames = tuple(map(believed_frame, contents.believed))
+            poses = body_runs(frozenset(frames), WORLD)
+            self._columns[topics.BELIEF_TF] = Columns(
+                topics.BELIEF_TF, schemas.TF_MESSAGE, poses, frames, (7,) * len(frames)
+            )
         for controller in self._controllers:
             topic, widths = controller.state_topic, (len(controller.joints),) * 4
             self._columns[topic] = Columns(
@@ -253,6 +259,12 @@ class _SpanReader:
         taken = [self._trace(controller.state_topic, ns, position) for controller in self._controllers]
         if not np.array_equal(ns, body_ns):
             raise _Apart
+        believed = np.zeros((0, 0, 7))
+        if topics.BELIEF_TF in self._columns:
+            belief_ns, beliefs = self._columns[topics.BELIEF_TF].take(ticks)
+            believed = np.stack(beliefs, axis=1)
+            if not np.array_equal(ns, belief_ns):
+                raise _Apart
         self._count(ns)
         time = _settled(ns / 1e9)
         bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
@@ -265,6 +277,7 @@ class _SpanReader:
                 for controller, runs in zip(self._controllers, taken, strict=True)
             ),
             contacts=self._contacts_until(time[-1] if ticks else np.inf),
+            believed=_settled(believed),
             readings={
                 name: self._sensed[topic].until(float(ns[-1]) if ticks else np.inf)
                 for name, topic in self._sensors.items()
