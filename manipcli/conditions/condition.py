@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from manipcli.conditions.robustness import Robustness
-from manipcli.conditions.sensed import Sensed
+from manipcli.conditions.sensed import NO_SENSORS, Sensed
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc, Severity
 from manipcli.core.text import did_you_mean
@@ -63,7 +63,7 @@ class World:
     steps: tuple[str, ...] = ()
     period: float = 0.0
     belief: World | None = None
-    sensors: Mapping[str, Sensed] = field(default_factory=dict)
+    sensors: Mapping[str, Sensed] = field(default_factory=lambda: NO_SENSORS)
 
     @cached_property
     def kinematics(self) -> Kinematics:

@@ -161,6 +161,7 @@ def simulate_live(
             session.restart_clock(outside.feed)
             record_sensors(session, recorder, live)
             record_belief(belief, recorder)
+            outside.feed.attach(session.sensors.numbers)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             steps = LiveSteps(task, plan, session, recorder, live, observer, progress, outside.pace)

@@ -1,8 +1,8 @@
 """Re-planning from the measured state: its differences to the state a step was planned from, and the new plan.
 
-Bodies are where the robot believes them to be. Joints that follow trajectories count as at their commanded position if they are near it, so that a new trajectory
-starts at the end of the last one. An object in the hand has its measured pose in the hand, so that it is placed
-correctly after slip.
+Bodies are where the robot believes them to be. Joints that follow trajectories count as at their commanded position if
+they are near it, so that a new trajectory starts at the end of the last one. An object in the hand has its measured
+pose in the hand, so that it is placed correctly after slip.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class Topic:
         constant: path -> value of fields that never change, and of arrays in `filled` (which sets their lengths).
         suffix: of the topic `/sensors/NAME`: `/image_raw`.
         frame: suffix of the frame in the header, one of `frames` of the member: `_optical`.
-        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves.
+        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves; picklable.
     """
 
     type: str

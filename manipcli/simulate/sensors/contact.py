@@ -7,6 +7,7 @@ measured force is at least `threshold`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
@@ -65,11 +66,13 @@ def _quantities(spec: ContactSpec, robot: RobotModel) -> tuple[Quantity, ...]:
 
 
 def _topics(spec: ContactSpec, robot: RobotModel) -> tuple[Topic, ...]:
-    def closed(force: Array) -> Array:
-        return np.concatenate((force >= spec.threshold, force), axis=1)
-
+    closed = partial(_closed, spec.threshold)
     fixed = {"threshold": spec.threshold}
     return (Topic("manipcli_msgs/msg/ContactSwitch", ("closed", "force"), derive=closed, constant=fixed),)
+
+
+def _closed(threshold: float, force: Array) -> Array:
+    return np.concatenate((force >= threshold, force), axis=1)
 
 
 def _check(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Iterator[Problem]:
