@@ -19,6 +19,8 @@ SEGMENTATION = "/segmentation"
 MOST_CELLS = 1 << 14
 MOST_RAYS = 720
 """Of a scan; of more, every second, third, ... is shown."""
+FARTHEST = 1e4
+"""[m]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +89,20 @@ def read_sweep(reader: CdrReader, kind: str) -> Sweep:
     if kind == RANGE:
         reader.skip(1, 1)
         _, least, most, distance = _floats(reader, 4)
-        angles: Array = np.zeros(1)
-        distances: Array = np.array([distance])
-    else:
-        first, _, step, _, _, least, most = _floats(reader, 7)
-        count = reader.count(4)
-        if not (np.isfinite([first, step]).all() and abs(step) * count < 100.0):
-            raise Unshown(f"{count} rays from {first:g} rad in steps of {step:g} rad")
-        every = max(1, -(-count // MOST_RAYS))
-        distances = np.frombuffer(reader.take(4 * count, 4), "<f4").astype(np.float64)[::every]
-        angles = first + step * np.arange(count)[::every]
-    measured = (distances >= least) & (distances <= most) & (distances <= 1e4)
-    return Sweep(frame, stamp, angles, np.where(measured, distances, np.inf))
+        return Sweep(frame, stamp, np.zeros(1), _measured(np.array([distance]), least, most))
+    first, _, step, _, _, least, most = _floats(reader, 7)
+    count = reader.count(4)
+    if not (np.isfinite([first, step]).all() and abs(step) * count < 100.0):
+        raise Unshown(f"{count} rays from {first:g} rad in steps of {step:g} rad")
+    every = max(1, -(-count // MOST_RAYS))
+    distances = np.frombuffer(reader.take(4 * count, 4), "<f4").astype(np.float64)[::every]
+    return Sweep(frame, stamp, first + step * np.arange(count, dtype=np.float64)[::every], _measured(distances, least, most))
+
+
+def _measured(distances: Array, least: float, most: float) -> Array:
+    """The distances in the range of the sensor; others are infinite."""
+    within = (distances >= least) & (distances <= min(most, FARTHEST))
+    return np.where(within, distances, np.inf)
 
 
 def _floats(reader: CdrReader, count: int) -> tuple[float, ...]:
