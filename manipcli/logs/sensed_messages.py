@@ -96,7 +96,9 @@ def read_sweep(reader: CdrReader, kind: str) -> Sweep:
         raise Unshown(f"{count} rays from {first:g} rad in steps of {step:g} rad")
     every = max(1, -(-count // MOST_RAYS))
     distances = np.frombuffer(reader.take(4 * count, 4), "<f4").astype(np.float64)[::every]
-    return Sweep(frame, stamp, first + step * np.arange(count, dtype=np.float64)[::every], _measured(distances, least, most))
+    return Sweep(
+        frame, stamp, first + step * np.arange(count, dtype=np.float64)[::every], _measured(distances, least, most)
+    )
 
 
 def _measured(distances: Array, least: float, most: float) -> Array:
