@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen, wrapped
-from manipcli.perception.fit import GATE, Comparison, Fit
+from manipcli.perception.fit import Comparison, Fit
 from manipcli.perception.picture import Mask, Picture, cut
 from manipcli.perception.seen_surface import key, looks_same, seen_surface
 from manipcli.render.lens import Lens

@@ -101,8 +101,8 @@ def _run_steps(
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
     with open_session(task, plan, manager, Session) as session:
-            belief = belief_of(task, plan, session)
-            live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
+        belief = belief_of(task, plan, session)
+        live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
         observer = Observer(recorder, live, progress, session.period, belief)
         session.restart_clock(observer)
         record_sensors(session, recorder, live)
