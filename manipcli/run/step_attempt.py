@@ -16,6 +16,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
+from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Monitors
@@ -55,6 +56,7 @@ class StepAttempt:
         progress: receives steps and unplanned events.
         on_goal: called with every goal, see `Executor`.
         replanning: stopwatch of re-planning.
+        belief: about the poses of bodies.
     """
 
     def __init__(
@@ -68,11 +70,13 @@ class StepAttempt:
         *,
         on_goal: Callable[[str, GoalHandle], None],
         replanning: Stopwatch,
+        belief: Belief,
     ) -> None:
         self._task = task
         self._live = live
         self._plan = plan
         self._session = session
+        self._belief = belief
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
@@ -82,7 +86,7 @@ class StepAttempt:
         self._replans = replan is not False
         self._guards = any(motion.guarded for step in plan.every for motion in step.plan.motions)
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
-        self._measured = Measured(session, plan.planner, limits, physics=self._physics)
+        self._measured = Measured(session, plan.planner, limits, physics=self._physics, belief=belief)
         self._grasp_margin = GraspMargin(task.true.robot, task.true.scene)
         self._believed = plan.start
         self._replanning = replanning
@@ -103,7 +107,7 @@ class StepAttempt:
     def _follow(self, state: WorldState) -> None:
         """Update the grasp."""
         if self._physics and self._session.ticks % SLOW == 0:
-            self._measured.grasp.look(state, self._session.touching)
+            self._measured.grasp.look(self._belief.look(state), self._session.touching)
         self._attaching.look(self._at)
 
     @property
@@ -190,7 +194,7 @@ class StepAttempt:
         """All motions of the plan, which starts in `before`, and the wait for `until`; both up to `limit` [s]."""
         deadline = _sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
         if before.carried is not None and self._physics:
-            self._measured.grasp.begin_step(before.carried, self._session.engine.read(), self._session.touching)
+            self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
         with self._awaited(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
@@ -202,6 +206,8 @@ class StepAttempt:
                     left = self._left_behind(before.carried)
                     if left is not None:
                         return left
+                if motion.opens or motion.lets_go:
+                    self._belief.let_go(self._state)
                 self._attaching.before(motion, planned)
                 over = deadline
                 if motion.awaits and until is not None and step.timeout is None:
@@ -218,6 +224,7 @@ class StepAttempt:
                     self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
                     self._take(planned.plan.end.carried)
                     if loose := (yield from self._loose(motion, planned.plan.end.carried.body)):
+                        self._belief.let_go(self._state)
                         return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
@@ -255,7 +262,8 @@ class StepAttempt:
     def _take(self, carried: Carried) -> None:
         """The hand has closed on an object."""
         if self._physics:
-            self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
+            self._belief.hold(carried, self._state)
+            self._measured.grasp.close(carried, self._state, self._session.touching)
 
     def _loose(self, motion: Motion, body: str) -> Lane[str]:
         """Why the closed hand does not hold an object, up to `SQUEEZED` after it closed; "" where it does."""
@@ -276,9 +284,10 @@ class StepAttempt:
         """A failure if the hand does not carry the planned object; None if it does."""
         if carried is None or not self._physics:
             return None
-        why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
+        why = self._measured.grasp.lost(carried, self._state, self._session.touching)
         if not why:
             return None
+        self._belief.let_go(self._state)
         text = f"the hand does not carry '{carried.body}': {why}"
         if self._attaching.holding is not None:
             return MotionEnd("failed", text)
@@ -295,7 +304,7 @@ class StepAttempt:
             return None
         planner = self._plan.planner
         motion = planner.tool_pose(end).p - planner.tool_pose(before).p
-        why = self._measured.grasp.short_of(motion, self._session.engine.read())
+        why = self._measured.grasp.short_of(motion, self._state)
         return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
 
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
@@ -317,6 +326,11 @@ class StepAttempt:
         self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
         (_, first), (_, second), *_ = pressing(self._session.touching, body)
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
+
+    @property
+    def _state(self) -> WorldState:
+        """The state now, as the robot believes it."""
+        return self._belief.look(self._session.engine.read())
 
     def _report(self, text: str, *, detail: bool) -> None:
         self._progress.message(text, detail=detail)

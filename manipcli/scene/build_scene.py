@@ -138,6 +138,9 @@ class _Builder:
             return
         self._add_shape(name, kind, shape)
         if spec.fixed:
+            if spec.known is not None:
+                hint = "remove `known`, or write `fixed: false`"
+                self._error("TASK228", f"body '{name}' is fixed: its pose is known exactly", (*loc, "known"), hint)
             return
         if max(shape.size) > LONGEST:
             message = f"body '{name}' is {max(shape.size):.3g} m long; movable bodies are at most {LONGEST:g} m"

@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from manipcli.spec.base import Model
+from manipcli.spec.known import KnownSpec
 from manipcli.spec.names import BodyName, FrameName
 from manipcli.spec.quantity import Length, Mass, Turn
 from manipcli.spec.robot import PoseSpec
@@ -120,6 +121,9 @@ class BodySpec(Model):
     inside: BodyName | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
     fixed: bool = Field(
         False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
+    )
+    known: KnownSpec | None = Field(
+        None, description="How well the robot knows its pose at the start, of a movable body. Default: exactly."
     )
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
         None, description="Mass [kg], above 0 to 100 t; required unless `fixed` or `urdf`."

@@ -22,6 +22,7 @@ from manipcli.spec.located import Located
 from manipcli.spec.override import Override, read_overrides
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
+from manipcli.task.believed_scene import believed_scene
 from manipcli.task.changed_files import Changes, Files
 from manipcli.task.consistency import refused_by_engine
 from manipcli.task.named_file import named_file
@@ -98,7 +99,7 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
         planned = written.changed(seen)
         true = written.changed(changes)
         robot = task.robot if planned.robot is written.robot else robot_of(planned.robot)
-        scene = task.scene if planned.task is written.task else scene_of(planned.task)
+        scene = task.true.scene if planned.task is written.task else scene_of(planned.task)
         truth = GroundTruth(
             robot=robot if _same(changes, seen, "ROBOT") else robot_of(true.robot),
             scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
@@ -106,6 +107,7 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
         )
         if refused := refused_by_engine(task.file, truth.robot, truth.scene):
             raise InvalidInput(refused)
+        scene = believed_scene(planned.task, scene, drawn.number)
     except InvalidInput as invalid:
         findings = [
             replace(finding, message=f"{finding.message} (sample {drawn.number})") for finding in invalid.findings

@@ -141,6 +141,8 @@ class _Reader:
         }
         for name in self._contents.controllers:
             self._types[ControllerChannel(name, ()).state_topic] = schemas.CONTROLLER_STATE
+        if self._contents.believed:
+            self._types[topics.BELIEF_TF] = schemas.TF_MESSAGE
         for topic in self._contents.absent:
             self._types.pop(topic, None)
 
@@ -207,6 +209,7 @@ class _Reader:
         return Recording(
             joint_names=known.joints,
             body_names=known.bodies,
+            believed_names=known.believed,
             spans=FileSpans(
                 path=self._path,
                 contents=known,

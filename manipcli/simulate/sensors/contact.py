@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -82,6 +83,10 @@ def _check(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
         yield Problem(("threshold",), message, "raise `limits: {force: ...}`, or lower the threshold", "SENS109")
 
 
+def _sensed(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Sensed:
+    return Sensed("contact", fields=(("force", 1),), forces=1, threshold=spec.threshold)
+
+
 MEMBER = SensorMember(
-    name="contact", spec=ContactSpec, quantities=_quantities, topics=_topics, open=Touched, check=_check
+    name="contact", spec=ContactSpec, quantities=_quantities, topics=_topics, open=Touched, check=_check, sensed=_sensed
 )
