@@ -32,6 +32,7 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.sensor import Picture
+from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.session import Session
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
@@ -101,10 +102,10 @@ def _run_steps(
     """
     with open_session(task, plan, manager, Session) as session:
         belief = belief_of(task, plan, session)
-        live = Live(live_world(task, session, belief), manager.controllers, session.period)
+        live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
         observer = Observer(recorder, live, progress, session.period, belief)
         session.restart_clock(observer)
-        record_sensors(session, recorder)
+        record_sensors(session, recorder, live)
         record_belief(belief, recorder)
         run = StepLoop(
             task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning, belief=belief
@@ -151,10 +152,11 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
         engine.close()
 
 
-def record_sensors(session: Session, recorder: Recorder) -> None:
-    """Record what the sensors of a session measure from now on."""
+def record_sensors(session: Session, recorder: Recorder, live: Live) -> None:
+    """Record what the sensors of a session measure from now on; conditions get the pictures."""
 
     def deliver(tick: int, taken: int, name: str, picture: Picture) -> None:
+        live.picture(tick, name, picture)
         recorder.measured(tick, taken, f"{SENSORS}/{name}{picture.suffix}", picture.fields)
 
     recorder.attach(session.sensors.numbers)
@@ -194,6 +196,7 @@ def live_world(task: Task, session: Session, belief: Belief) -> World:
         referenced=frozenset(name for c in session.manager.controllers if c.interfaces for name in c.joints),
         steps=tuple(str(step.id) for step in task.spec.steps),
         period=task.spec.simulation.control_period,
+        sensors=sensed_by_name(task.sensors, task.true.robot, task.true.scene),
     )
 
 

@@ -9,11 +9,12 @@ from typing import Final
 
 from manipcli.conditions.condition import Problem
 from manipcli.conditions.frames import fixed_frame
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, listed
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
-from manipcli.simulate.sensor_layout import ticks_per_measurement
+from manipcli.simulate.sensor_layout import sensed_by_name, ticks_per_measurement
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
@@ -80,6 +81,15 @@ def sensor_findings(
     if controllers is not None and robot_file is not None:
         found += _readers(controllers, {own.name: own.spec for own in sensors})
     return tuple(found)
+
+
+def sensed(
+    task: Located[TaskSpec], robot_file: Located[RobotSpec] | None, robot: RobotModel, scene: Scene
+) -> dict[str, Sensed] | None:
+    """The sensors of a task and its robot as conditions see them; None: a file is refused, or they have errors."""
+    if robot_file is None or not task.source.untouched("sensors"):
+        return None
+    return sensed_by_name({**(robot_file.spec.sensors or {}), **(task.spec.sensors or {})}, robot, scene)
 
 
 def _of_robot(file: Located[RobotSpec]) -> list[_Named]:

@@ -40,6 +40,7 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
             pass
         else:
             args = file.spec.args
+            names["sensor"] = {*(file.spec.sensors or {}), *_keys(source, "sensors")}
             links = [f"robot{SEPARATOR}{link.name}" for link in robot.links]
             names["joint"] = {joint.name for joint in robot.joints if joint.independent}
             names["link"] = {link.name for link in robot.links}
@@ -88,6 +89,12 @@ def _of_scene(source: Source) -> dict[NameKind, set[str]]:
         "part": {*bodies, *ground, "robot"},
         "frame": frame - {*RESERVED} | (frame & {"world", "base", "tool", "floor"}),
     }
+
+
+def _keys(source: Source, key: str) -> set[str]:
+    """The keys of a block of the task."""
+    node = child(source.root, key)
+    return {*node.entries} if isinstance(node, MappingNode) else set()
 
 
 def _is_true(node: Node | None) -> bool:
