@@ -109,8 +109,8 @@ class Recording:
         silent: topics without a message although a run records them: another program removed them, or the run ended
             before.
         believed_names: bodies with believed poses of their own.
-        beliefs: what the robot believed at the start, and wherever it looked.
         sensors: whose readings are in the spans.
+        beliefs: what the robot believed at the start, and wherever it looked.
 
     `states`, `controllers` and `contacts` cover all spans and need a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
@@ -127,8 +127,8 @@ class Recording:
     absent: tuple[str, ...] = ()
     silent: tuple[str, ...] = ()
     believed_names: tuple[str, ...] = ()
-    beliefs: tuple[BeliefSnapshot, ...] = ()
     sensors: tuple[str, ...] = ()
+    beliefs: tuple[BeliefSnapshot, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The embedded mesh files by the URI in URDF and scene, with the material files of OBJ meshes; empty unless the
