@@ -84,6 +84,12 @@ def units_of(spec: ConditionSpec, seam: Seams) -> tuple[str, ...]:
     return tuple(dict.fromkeys(unit for leaf in leaves(spec) for unit in seam[leaf.name].units))
 
 
+def sensors_of(spec: ConditionSpec, seam: Seams) -> tuple[str, ...]:
+    """The sensors whose readings it asks for, without duplicates."""
+    asked = ((seam[leaf.name].sensor, leaf.body) for leaf in leaves(spec))
+    return tuple(dict.fromkeys(sensor(body) for sensor, body in asked if sensor is not None))
+
+
 def leaves(spec: ConditionSpec) -> Iterator[ConditionSpec]:
     """The conditions in it, without combinations."""
     if not spec.combines:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -11,6 +11,7 @@ import numpy as np
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import Seams, leaves
 from manipcli.conditions.robustness import NotEvaluated
+from manipcli.conditions.sensed import Sensed
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
@@ -44,9 +45,10 @@ def examine(
     seam: Seams,
     physics: bool,
     steps: tuple[StepOutcome, ...],
+    sensors: Mapping[str, Sensed],
     until: float = inf,
 ) -> Examined:
-    """The outcomes of `expect` before the time `until` [s].
+    """The outcomes of `expect` before the time `until` [s]; `sensors`: of the task.
 
     Every span is read, even without expectations, so damage anywhere in the file is detected. Only the last half second
     is kept in memory.
@@ -79,6 +81,7 @@ def examine(
                 referenced=frozenset(name for trace in span.controllers for name in trace.joints),
                 steps=tuple(step.id for step in steps),
                 period=_period(span.states.time, recording.period),
+                sensors={name: sensors[name] for name in recording.sensors},
             )
             if believed is not None:
                 world = replace(world, belief=replace(world, start=believed.map(lambda a: a[0])))

@@ -15,7 +15,7 @@ from manipcli.core.geometry import Array
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
-from manipcli.record.channels import CONTACTS, TF
+from manipcli.record.channels import CONTACTS, SENSORS, TF
 from manipcli.record.recording import Recording, Span
 from manipcli.scene.scene import Scene
 
@@ -75,11 +75,12 @@ class Order:
 
 
 def unrecorded(recording: Recording) -> dict[Seen, str]:
-    """Why bodies, contacts or references are unknown: the task excludes them, or the log lost them."""
-    words: dict[Seen, str] = {"bodies": TF, "contacts": CONTACTS, "references": "/controller_state"}
-    absent = {
-        seen: [topic for topic in recording.absent if topic == word or (seen == "references" and topic.endswith(word))]
-        for seen, word in words.items()
+    """Why bodies, contacts, references or sensors are unknown: the task excludes them, or the log lost them."""
+    absent: dict[Seen, list[str]] = {
+        "bodies": [topic for topic in recording.absent if topic == TF],
+        "contacts": [topic for topic in recording.absent if topic == CONTACTS],
+        "references": [topic for topic in recording.absent if topic.endswith("/controller_state")],
+        "sensors": [topic for topic in recording.absent if topic.startswith(f"{SENSORS}/")],
     }
     found = {
         seen: f"the log has no {topics[0]}: the task's `record:` excludes it"
@@ -113,7 +114,7 @@ def at_every_tick(window: StateWindow, since: StateWindow | None, period: float)
 
 
 class WindowsOfSpans:
-    """Converts successive spans to state windows, with the last state and contacts of the span before."""
+    """Converts successive spans to state windows, with the last state, contacts and readings of the span before."""
 
     def __init__(self, order: Order, steps: Sequence[StepOutcome]) -> None:
         self._order = order
@@ -132,6 +133,9 @@ class WindowsOfSpans:
             references=tuple(Reference(trace.joints, trace.reference_position) for trace in span.controllers),
             contacts=(*held, *(Touching(change.time, change.contacts) for change in span.contacts)),
             steps=self._steps,
+            readings=span.readings
+            if self._last is None
+            else {name: self._last.readings[name].then(more) for name, more in span.readings.items()},
         )
         believed = self._order.belief(self._last.states, span.believed)
         if believed is not None:

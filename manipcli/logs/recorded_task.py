@@ -34,6 +34,7 @@ from manipcli.spec.task import TaskSpec
 from manipcli.task.believed_scene import believing
 from manipcli.task.consistency import disagreements
 from manipcli.task.sample import sampled
+from manipcli.task.sensor_checks import sensed
 from manipcli.task.task import Task
 from manipcli.task.vary import bind
 
@@ -92,7 +93,7 @@ def recorded_task(
         )  # the recorded gravity is the sampled one
 
     scene = scene_of(task)
-    found = disagreements(task, controllers, robot, scene)
+    found = disagreements(task, controllers, robot, scene, sensed(task, robot_file, robot, scene))
     if any(finding.severity == "error" for finding in found):
         raise InvalidInput(found)
     made = Task(

@@ -5,36 +5,25 @@ A pure function of what the camera measured and what the robot believes. It know
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen, wrapped
-from manipcli.perception.fit import GATE, Comparison, Fit
-from manipcli.perception.picture import Mask, Picture, cut
-from manipcli.perception.seen_surface import looks_same_about, seen_surface
+from manipcli.perception.fit import Comparison
+from manipcli.perception.picture import cut
+from manipcli.perception.search import OUTSIDE, Found, search
+from manipcli.perception.seen_surface import key, looks_same, seen_surface
 from manipcli.render.lens import Lens
 from manipcli.render.surface import Surface
 from manipcli.scene.scene import Body
 
 LEAST_PIXELS = 30
 """That show the body."""
-LEAST_INLIERS = 0.5
-"""Share of the pixels that should show the body and do."""
+LEAST_INLIERS, LEAST_OPAQUE = 0.5, 0.8
+"""Share of the pixels that should show the body and do, and of those of them that nothing else covers."""
 ROOM = 0.02
 """Added to the region on every side when looking [m], so that a body just outside is found and refused."""
-OUTSIDE = 2e-3
-"""A body is refused farther outside its region than this and three standard deviations [m]."""
-COARSE, FINE = 48, 160
-"""Most pixels along a side of the picture that starts and results are compared in."""
-YAWS = math.radians(20.0)
-"""Largest angle between starts."""
-KEPT = 4
-"""Starts that are refined."""
-TIE = 0.02
-"""Share of its pixels by which a pose explains more than another one if it is better; else the believed one decides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +109,7 @@ def localise(view: DepthView, prior: Prior, expected: Array) -> Localisation:
     shown = seen_surface(prior.body.geometries)
     if not len(shown.faces):
         raise NotSeen("it has no shape that a camera can see")
-    free = looks_same_about(prior.body.geometries, _key(prior.X_WO.R[2]))
+    free = looks_same(prior.body.geometries, key(prior.X_WO.R[2]))
     low, high = _volume(prior, shown)
     picture = cut(view.lens, view.X_WC, view.depth, view.noise, expected, low, high)
     if picture is None:
@@ -128,24 +117,28 @@ def localise(view: DepthView, prior: Prior, expected: Array) -> Localisation:
     pixels = int(picture.near.sum())
     if pixels < LEAST_PIXELS:
         raise NotSeen(f"{pixels} pixels show something unexpected in its region, at least {LEAST_PIXELS} are needed")
-    spread = np.append(np.asarray(prior.region, dtype=np.float64), 0.0 if free else prior.rotation) / math.sqrt(3.0)
-    side = max(picture.depth.shape)
-    small = picture.strided(-(-side // COARSE))
-    coarse = Fit(small, shown, prior.X_WO, spread)
-    fine = Fit(picture.strided(-(-side // FINE)), shown, prior.X_WO, spread)
-    begun = [_coarse(coarse, start, mask) for start, mask in _starts(small, 0.0 if free else prior.rotation)]
-    begun.sort(key=lambda pair: pair[0])
-    found = [_fine(fine, state) for _, state in begun[:KEPT]]
-    least = min(comparison.cost for comparison, _ in found)
-    room = TIE * GATE**2 * max(comparison.explained for comparison, _ in found)
-    equal = [pair for pair in found if pair[0].cost <= least + room]
-    comparison, state = min(equal, key=lambda pair: abs(float(wrapped(pair[1][3]))))
-    return _checked(fine, comparison, state, prior, free)
-
-
-def _key(axis: Array) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in np.round(axis, 6))
-    return x, y, z
+    reach = np.append(np.asarray(prior.region, dtype=np.float64), 0.0 if free else prior.rotation)
+    found = search(picture, shown, prior.X_WO, reach)
+    state, information = found.fit.refined(found.state, 0.0, edges=True)
+    state, information = found.fit.refined(state, 0.0, edges=True)
+    comparison = found.fit.compare(state)
+    _explained(comparison)
+    covariance = np.zeros((6, 6))
+    index = np.array([0, 1, 2, 5])[found.fit.free]
+    covariance[np.ix_(index, index)] = max(comparison.spread, 1.0) ** 2 * np.linalg.inv(information)
+    _inside(state[:3], reach[:3], np.sqrt(np.diag(covariance)[:3]))
+    covariance += _ambiguity(found, prior.body, key(prior.X_WO.R[2]))
+    if free:
+        covariance[5, 5] = prior.rotation**2 / 3.0
+    state[:3] = np.clip(state[:3], -reach[:3], reach[:3])
+    return Localisation(
+        X_WO=found.fit.pose(state),
+        covariance=frozen(covariance),
+        residual=comparison.residual,
+        inliers=comparison.inliers,
+        pixels=comparison.explained,
+        free=frozen((0.0, 0.0, 1.0)) if free else None,
+    )
 
 
 def _volume(prior: Prior, shown: Surface) -> tuple[Array, Array]:
@@ -159,72 +152,34 @@ def _volume(prior: Prior, shown: Surface) -> tuple[Array, Array]:
     return prior.X_WO.p + low - reach, prior.X_WO.p + high + reach
 
 
-def _starts(picture: Picture, rotation: float) -> Iterator[tuple[Array, Mask]]:
-    """States to start from, each with the pixels whose middle is the body's: all, and each larger patch of them."""
-    from scipy.ndimage import label
-
-    patches, count = label(picture.near)
-    sizes = np.bincount(patches.reshape(-1), minlength=count + 1)[1:]
-    large = [k + 1 for k in np.argsort(-sizes, kind="stable")[:3] if sizes[k] >= 0.2 * sizes.max()]
-    masks: list[Mask] = [picture.near]
-    if len(large) > 1:
-        masks += [patches == k for k in large]
-    full = rotation > math.pi - 1e-6
-    steps = math.ceil((2.0 * math.pi if full else 2.0 * rotation) / YAWS)
-    yaws = np.arange(steps) * 2.0 * math.pi / steps if full else np.linspace(-rotation, rotation, steps + 1)
-    for mask in masks:
-        for yaw in yaws if steps else (0.0,):
-            yield np.array([0.0, 0.0, 0.0, yaw]), mask
-
-
-def _coarse(fit: Fit, start: Array, mask: Mask) -> tuple[float, Array]:
-    """A state after a few steps, and its cost."""
-    state = start
-    for _ in range(2):
-        state = fit.shifted(state, mask)
-    for gate in (0.03, 0.02, 0.01):
-        state, _ = fit.refined(state, gate)
-    return fit.compare(state, slack=3e-3).cost, state
-
-
-def _fine(fit: Fit, start: Array) -> tuple[Comparison, Array]:
-    """A state at a minimum, and how it explains the picture."""
-    state = start
-    for gate in (0.01, 0.005, 0.0, 0.0):
-        state, _ = fit.refined(state, gate)
-    return fit.compare(state), state
-
-
-def _checked(fit: Fit, comparison: Comparison, state: Array, prior: Prior, free: bool) -> Localisation:
-    for _ in range(4):
-        state, information = fit.refined(state, 0.0, outline=True)
-    comparison = fit.compare(state)
-    if comparison.explained < LEAST_PIXELS or comparison.inliers < LEAST_INLIERS:
+def _explained(comparison: Comparison) -> None:
+    """Raise NotSeen unless the picture shows the body."""
+    count, covered, missing = comparison.explained, comparison.covered, comparison.missing
+    if count < LEAST_PIXELS or comparison.inliers < LEAST_INLIERS or count < LEAST_OPAQUE * (count + missing):
         raise NotSeen(
-            f"no pose in its region explains the picture: the best one explains {comparison.explained} pixels, "
-            f"{100.0 * comparison.inliers:.0f} % of those that should show it; at least {LEAST_PIXELS} and "
-            f"{100.0 * LEAST_INLIERS:.0f} % are needed"
+            f"no pose in its region explains the picture: of {count + covered + missing} pixels that the best one "
+            f"would show, {count} agree, {missing} show something behind it, {covered} something in front"
         )
+
+
+def _inside(offset: Array, reach: Array, deviation: Array) -> None:
+    """Raise NotSeen if a position is outside the region."""
+    beyond = np.abs(offset) - reach
+    k = int(np.argmax(beyond - 3.0 * deviation))
+    if beyond[k] > OUTSIDE + 3.0 * deviation[k]:
+        raise NotSeen(
+            f"its best pose is {1e3 * beyond[k]:.1f} mm outside its region: {1e3 * offset[k]:.1f} mm along {'xyz'[k]} "
+            f"from where it was believed to be, at most {1e3 * reach[k]:.1f} mm are possible"
+        )
+
+
+def _ambiguity(found: Found, body: Body, axis: tuple[float, float, float]) -> Array:
+    """(6, 6) covariance of other poses that explain the picture as well, without those in which it looks the same."""
     covariance = np.zeros((6, 6))
-    index = np.array([0, 1, 2, 5])[fit.free]
-    covariance[np.ix_(index, index)] = max(comparison.spread, 1.0) ** 2 * np.linalg.inv(information)
-    if free:
-        covariance[5, 5] = prior.rotation**2 / 3.0
-    reach = np.asarray(prior.region, dtype=np.float64)
-    beyond = np.abs(state[:3]) - reach
-    worst = int(np.argmax(beyond))
-    if beyond[worst] > OUTSIDE + 3.0 * math.sqrt(covariance[worst, worst]):
-        raise NotSeen(
-            f"its best pose is {1e3 * beyond[worst]:.1f} mm outside its region: {1e3 * state[worst]:.1f} mm from the "
-            f"believed position along {'xyz'[worst]}, where at most {1e3 * reach[worst]:.1f} mm are possible"
-        )
-    state[:3] = np.clip(state[:3], -reach, reach)
-    state[3] = np.clip(wrapped(state[3]), -prior.rotation, prior.rotation)
-    return Localisation(
-        X_WO=fit.pose(state),
-        covariance=frozen(covariance),
-        residual=comparison.residual,
-        inliers=comparison.inliers,
-        pixels=comparison.explained,
-        free=frozen((0.0, 0.0, 1.0)) if free else None,
-    )
+    for state in found.equal:
+        apart = state - found.state
+        if not looks_same(body.geometries, axis, (float(apart[3]),)):
+            error = np.array([*apart[:3], 0.0, 0.0, float(wrapped(apart[3]))])
+            covariance += np.outer(error, error) / (len(found.equal) + 1)
+    covariance[5, 5] += found.flat**2 / 12.0
+    return covariance

@@ -43,11 +43,27 @@ class PlanningState:
         return replace(self, position=position, at_start=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Reflex:
+    """Pressing more while the hand holds and its taxels report beginning slip.
+
+    Attributes:
+        friction: coefficient that the robot believes.
+        onset: share of the friction cone above which it presses more.
+        force: [N] most of each finger; None: what the hand can.
+    """
+
+    friction: float
+    onset: float
+    force: float | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Grip:
     """A goal of the hand: `joints` move to `target` (n) until each finger meets `force` [N] or arrives.
 
     With `must_hold`, closing on nothing is a failure; with `must_arrive`, so is being stopped before the target.
+    `reflex`: None without one.
     """
 
     joints: tuple[str, ...]
@@ -55,6 +71,7 @@ class Grip:
     force: float | None
     must_hold: bool = False
     must_arrive: bool = False
+    reflex: Reflex | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,6 +85,12 @@ DEFINITIONS: dict[str, str] = {
         "# Size of a cell along x and along y [m].\nfloat64 width\nfloat64 height\n"
         "# Normal force on each cell [N], row by row from the lowest y, each from the lowest x.\nfloat64[] force\n"
     ),
+    "manipcli_msgs/TaxelShear": (
+        "# The tangential forces on the cells of a grid of taxels, which is as in Taxels.\nstd_msgs/Header header\n"
+        "# Cells along y and along x.\nuint32 rows\nuint32 columns\n"
+        "# Size of a cell along x and along y [m].\nfloat64 width\nfloat64 height\n"
+        "# Force on each cell along x and along y of the frame [N], in the order of Taxels.\nfloat64[] x\nfloat64[] y\n"
+    ),
     "sensor_msgs/CompressedImage": "std_msgs/Header header\nstring format\nuint8[] data\n",
     "sensor_msgs/Image": (
         "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\n"

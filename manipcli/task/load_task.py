@@ -19,7 +19,7 @@ from manipcli.task.consistency import consistent
 from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample
 from manipcli.task.second_chances import every_finding
-from manipcli.task.sensor_checks import refuse, sensor_findings
+from manipcli.task.sensor_checks import refuse, sensed, sensor_findings
 from manipcli.task.task import Task
 from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
@@ -144,7 +144,7 @@ def _as_written(
     )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
-    warnings = consistent(file, controllers_file, robot, scene)
+    warnings = consistent(file, controllers_file, robot, scene, sensed(file, robot_file, robot, scene))
     refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
     varied = bound(Files(file, robot_file, controllers_file))
     findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings)

@@ -40,6 +40,7 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
             pass
         else:
             args = file.spec.args
+            names["sensor"] = {*(file.spec.sensors or {}), *_keys(source, "sensors")}
             links = [f"robot{SEPARATOR}{link.name}" for link in robot.links]
             names["joint"] = {joint.name for joint in robot.joints if joint.independent}
             names["link"] = {link.name for link in robot.links}

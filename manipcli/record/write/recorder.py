@@ -176,7 +176,7 @@ class Recorder:
 
     def measured(self, tick: int, taken: int, topic: str, fields: Mapping[str, object]) -> None:
         """Record a message of a sensor that arrives at `tick` and was taken at the tick `taken`."""
-        if topic in self._ids:
+        if topic in self._ids or self.listener is not _nobody:
             kind, frame = self._frames[topic]
             self._single(topic, self._ns(tick), encode(kind, fields, ns=self._ns(taken), frame=frame).data)
 
