@@ -107,16 +107,17 @@ class GripReflex:
             self._rotations = self._turned(position)
         normal, tangential = joint_forces([pad.reading for pad in self._pads], self._rotations)
         slips = friction_share(normal, tangential, reflex.friction) > reflex.onset and normal > TOUCHES * self._first
-        before = self.force
+        grows = False
         if slips:
             cells = [pad.reading[: len(pad.reading) // 3].sum() for pad in self._pads]
             pressing = {pad.link for pad, force in zip(self._pads, cells, strict=True) if force > 0.0}
             if not self._pressed:
                 self._first_press(reflex, float(normal) / len(pressing), command, effort)
+            before = self.force
             missing = (float(tangential) / (reflex.friction * reflex.onset) - float(normal)) / len(pressing)
             self.force = max(before, min(before + period * min(RATE, GAIN * missing), self._most))
             np.multiply(self._held, self.force / self._first - 1.0, out=self.extra)
-        grows = self.force > before
+            grows = self.force > before
         self._count += grows and not self._presses
         self._presses = grows
         return self._pressed
