@@ -138,6 +138,9 @@ class _Builder:
             return
         self._add_shape(name, kind, shape)
         if spec.fixed:
+            if spec.known is not None:
+                hint = "remove `known`, or write `fixed: false`"
+                self._error("TASK228", f"body '{name}' is fixed: its pose is known exactly", (*loc, "known"), hint)
             return
         if max(shape.size) > LONGEST:
             message = f"body '{name}' is {max(shape.size):.3g} m long; movable bodies are at most {LONGEST:g} m"
@@ -161,6 +164,13 @@ class _Builder:
         if spec.cup is not None:
             if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
                 raise ValueError(f"wall of {spec.cup.wall:g} m is too thick: the cup has no interior")
+            handle = spec.cup.handle
+            middle = spec.cup.height / 2.0 if handle is None or handle.middle is None else handle.middle
+            if handle is not None and abs(middle - spec.cup.height / 2.0) > (spec.cup.height - handle.height) / 2.0:
+                ends = middle - handle.height / 2.0, middle + handle.height / 2.0
+                raise ValueError(f"handle from {ends[0]:g} to {ends[1]:g} m is beyond the cup of {spec.cup.height:g} m")
+            if handle is not None and handle.thickness >= min(handle.reach, handle.height / 2.0):
+                raise ValueError(f"thickness of {handle.thickness:g} m leaves no room in the handle")
             return body_shapes.cup(spec.cup, rgba)
         if spec.tray is not None:
             x, y, z = spec.tray.size

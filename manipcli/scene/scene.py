@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.shapes.primitives import Box, Cylinder, Geometry
+
+if TYPE_CHECKING:
+    from manipcli.scene.known import Known
 
 SEPARATOR: Final = "/"
 """Between a body and its part: `cup/handle`."""
@@ -55,6 +58,7 @@ class Body:
         interior: the hollow of a container, else None.
         size: (3,) [m] bounding box of the body in O (full lengths).
         centre: (3,) [m] centre of that bounding box in O.
+        known: of a believed scene, how well the robot knows X_WO; None: exactly.
     """
 
     name: str
@@ -72,6 +76,7 @@ class Body:
     interior: Interior | None
     size: Array
     centre: Array
+    known: Known | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,10 @@ COMBINATIONS = {
     "all": "All of these conditions hold.",
     "any": "At least one of these conditions holds.",
     "not": "This condition does not hold.",
+    "believed": "This condition holds for the poses that the robot believes, not for the true ones.",
 }
+SINGLE = ("not", "believed")
+"""Combinations of one condition."""
 QUANTIFIERS = {
     "always": "This condition holds all the time.",
     "never": "This condition never holds.",
@@ -55,7 +58,7 @@ class KeyedSpec(Model):
 
 
 class ConditionSpec(KeyedSpec):
-    """A condition: its name with its parameters; or `all`, `any`, `not` with other conditions."""
+    """A condition: its name with its parameters; or `all`, `any`, `not`, `believed` with other conditions."""
 
     @property
     def name(self) -> str:
@@ -73,7 +76,7 @@ class ConditionSpec(KeyedSpec):
         if not self.combines:
             return ()
         found = getattr(self, self.word)
-        return (found,) if self.word == "not" else found
+        return (found,) if self.word in SINGLE else found
 
 
 class ExpectationSpec(ConditionSpec):

@@ -9,12 +9,21 @@ from typing import Final
 
 from manipcli.conditions.condition import Problem
 from manipcli.conditions.frames import fixed_frame
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, listed
 from manipcli.model.robot import RobotModel
+from manipcli.plan.claimed_joints import Claims
+from manipcli.plan.hand import moved_links
+from manipcli.plan.steps.grasp import GraspSpec
+from manipcli.plan.steps.locate import LocateSpec
+from manipcli.plan.steps.pick import PickSpec
 from manipcli.scene.scene import Scene
-from manipcli.simulate.sensor_layout import ticks_per_measurement
+from manipcli.simulate.hand_pads import hand_pads
+from manipcli.simulate.sensor_layout import sensed_by_name, ticks_per_measurement
 from manipcli.simulate.sensors import SENSORS
+from manipcli.simulate.sensors.camera import CameraSpec
+from manipcli.simulate.sensors.tactile import TactileSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.mounted_sensor import MountedSpec
@@ -22,6 +31,8 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.sensors import SensorSpec
 from manipcli.spec.task import TaskSpec
 
+ABSENT: Final = 230
+"""Number of the code of a finding about a name in a task that does not exist."""
 LOG_FOLDER: Final = "sensors"
 """A controller of this name publishes next to the sensors."""
 OF_CONTROLLERS: Final = ("controller_state", "reference", "error", "wrench")
@@ -78,8 +89,20 @@ def sensor_findings(
     found += _names(sensors, controllers, robot, scene)
     found += _measured_twice(sensors, robot)
     if controllers is not None and robot_file is not None:
-        found += _readers(controllers, {own.name: own.spec for own in sensors})
+        every = {own.name: own.spec for own in sensors}
+        found += [*_readers(controllers, every), *_reflexes(task, controllers.spec, every, robot)]
+    if robot_file is not None and not task.source.kept:
+        found += _looking(task, {own.name: own.spec for own in sensors})
     return tuple(found)
+
+
+def sensed(
+    task: Located[TaskSpec], robot_file: Located[RobotSpec] | None, robot: RobotModel, scene: Scene
+) -> dict[str, Sensed] | None:
+    """The sensors of a task and its robot as conditions see them; None: a file is refused, or they have errors."""
+    if robot_file is None or not task.source.untouched("sensors"):
+        return None
+    return sensed_by_name({**(robot_file.spec.sensors or {}), **(task.spec.sensors or {})}, robot, scene)
 
 
 def _of_robot(file: Located[RobotSpec]) -> list[_Named]:
@@ -175,6 +198,30 @@ def _measured_twice(sensors: list[_Named], robot: RobotModel) -> Iterator[Diagno
                 break
 
 
+def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:
+    """Steps that look at an object that is known exactly, or with a sensor that is no camera with depth."""
+    able = [name for name, spec in sensors.items() if isinstance(spec, CameraSpec) and spec.depth]
+    for k, step in enumerate(task.spec.steps):
+        if not isinstance(step.body, LocateSpec):
+            continue
+        body = task.spec.scene.get(step.body.object)
+        if body is not None and body.known is None and not body.fixed:
+            message = f"the pose of '{step.body.object}' is known exactly: it has no `known`"
+            hint = "add to it `known: {region: {radius: 3 cm}}`, or remove this step"
+            yield task.source.finding(ABSENT, ("steps", k, step.verb, "object"), message, hint=hint)
+        if (name := step.body.with_) in able:
+            continue
+        spec = sensors.get(name)
+        if spec is None:
+            message = f"neither robot nor task has a sensor '{name}'"
+        elif isinstance(spec, CameraSpec):
+            message = f"camera '{name}' has no depth: `depth` is false"
+        else:
+            message = f"sensor '{name}' is of type '{spec.type}', not 'camera'"
+        hint = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
+        yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=hint)
+
+
 def _readers(controllers: Located[ControllersSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:
     """Controllers that read a sensor that is missing or of another type."""
     wrenches = [name for name, spec in sensors.items() if spec.type == "force_torque"]
@@ -188,3 +235,23 @@ def _readers(controllers: Located[ControllersSpec], sensors: dict[str, SensorSpe
         else:
             message = f"controller '{name}': neither robot nor task has a sensor '{read}'"
         yield Diagnostic("SENS111", message, place, did_you_mean(read, wrenches, kind="sensors"))
+
+
+def _reflexes(
+    task: Located[TaskSpec], controllers: ControllersSpec, sensors: dict[str, SensorSpec], robot: RobotModel
+) -> Iterator[Diagnostic]:
+    """Reflexes of a hand that does not feel shear."""
+    joints = tuple(name for name in Claims.of(controllers).hand if name in robot.joint_names)
+    links = moved_links(robot, joints) if joints else frozenset[str]()
+    for k, step in enumerate(task.spec.steps):
+        grasp, keys = (step.body.grasp, ("grasp",)) if isinstance(step.body, PickSpec) else (step.body, ())
+        if not isinstance(grasp, GraspSpec) or not grasp.reflex or hand_pads(sensors, robot, joints):
+            continue
+        place = task.place("steps", k, step.verb, *keys, "reflex")
+        blunt = [name for name, spec in sensors.items() if isinstance(spec, TactileSpec) and spec.link in links]
+        if blunt:
+            hint = f"add `shear: true` to the sensor '{blunt[0]}'"
+        else:
+            there = [link.name for link in robot.links if link.name in links and link.collisions]
+            hint = f"add a sensor of type `tactile` with `shear: true` on a link of the hand: {listed(there)}"
+        yield Diagnostic("SENS150", "the reflex feels no slip: no sensor with `shear` is on the hand", place, hint)
