@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from manipcli.conditions.condition import CheckContext, Problem, World
 from manipcli.conditions.robustness import Robustness, robustness
 from manipcli.conditions.sensed import Sensed
@@ -54,7 +56,9 @@ def of_readings(
     scale: float,
     describe: Callable[[float], str],
 ) -> Robustness:
-    """Margins of a value of the reading that holds at each tick; before the first arrival it does not apply.
+    """Margins of a value of the reading that holds at each tick.
+
+    It does not apply before the first arrival, nor where the value is NaN.
 
     Args:
         window, sensor: where the readings are.
@@ -65,13 +69,14 @@ def of_readings(
     """
     readings = window.readings[sensor]
     index, known = readings.at(window.times)
-    values = value(readings.values)[index] if len(readings.times) else 0.0 * window.times
+    values = value(readings.values)[index] if len(readings.times) else np.zeros(len(index))
+    touched = ~np.isnan(values)
     return robustness(
         margin(values),
         window.times,
         unit=unit,
         scale=scale,
         describe=lambda k: describe(float(values[k])),
-        applies=known,
-        idle=f"no measurement of sensor '{sensor}' has arrived",
+        applies=known & touched,
+        idle=f"no measurement of sensor '{sensor}' has arrived" if touched.all() else f"nothing touches '{sensor}'",
     )

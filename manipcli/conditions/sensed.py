@@ -6,7 +6,7 @@ A condition uses the last measurement that arrived: live from the sensors of the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -21,27 +21,35 @@ class Sensed:
 
     Attributes:
         type: the word under `type`.
-        suffix: of the topic /sensors/NAME with its readings.
-        message: ROS type of this topic.
-        fields: their fields that make up a reading, in order, each (name, float64 numbers). Empty for a camera.
+        fields: what makes up a reading, in order: (suffix of the topic /sensors/NAME, field, float64 numbers in it).
+            Empty for a camera.
+        picture: of a camera: suffix of the topic of its pictures of part numbers.
         parts: of a camera that tells parts apart: their names, by their number in a picture. A reading of a camera is
             the number of pixels of each part.
+        messages: suffix of a topic -> its ROS type.
         forces: of a sensor of touch: how many numbers at the start of a reading are normal forces [N].
+        shear: whether as many forces along x follow, then along y.
         threshold: of a switch: the force [N] that closes it.
     """
 
     type: str
-    suffix: str = ""
-    message: str = ""
-    fields: tuple[tuple[str, int], ...] = ()
+    fields: tuple[tuple[str, str, int], ...] = ()
+    picture: str = ""
     parts: tuple[str, ...] = ()
+    messages: Mapping[str, str] = field(default_factory=dict)
     forces: int = 0
+    shear: bool = False
     threshold: float | None = None
 
     @property
     def width(self) -> int:
         """Numbers in a reading."""
-        return len(self.parts) or sum(count for _, count in self.fields)
+        return len(self.parts) or sum(count for _, _, count in self.fields)
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """Of the topics with its readings."""
+        return (self.picture,) if self.parts else tuple(dict.fromkeys(suffix for suffix, _, _ in self.fields))
 
 
 NO_SENSORS: Final[Mapping[str, Sensed]] = {}

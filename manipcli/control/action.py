@@ -15,6 +15,7 @@ import numpy as np
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.plan.motion import Reflex
 
 GoalStatus = Literal["active", "succeeded", "aborted", "canceled"]
 FingerStop = Literal["contact", "stalled", "reached"]
@@ -163,9 +164,11 @@ class GripperGoal:
         force: [N] at which a finger stops; None: contact does not stop it (to open).
         max_effort: (n) N m or N, or one number for all, for this goal and after it; None: the controller's.
         fingers: joint indices of each finger, every joint in exactly one; empty: each joint is a finger.
+        reflex: pressing more against slip, while the hand holds; None: without. It needs taxels with shear.
     """
 
     target: Array | float
     force: float | None = None
     max_effort: Array | float | None = None
     fingers: tuple[tuple[int, ...], ...] = ()
+    reflex: Reflex | None = None

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal, refuse_inactive
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains, tune_pid
+from manipcli.control.grip_reflex import GripReflex
 from manipcli.control.tracking_error import TrackingError
 from manipcli.control.tunable_gains import TunableGains
 from manipcli.core.errors import InvalidArgument
@@ -41,6 +42,8 @@ class GripperController:
     effort cannot grow: each reference is at its target, or each effort at its maximum. It has *reached* when all its
     joints are within `goal_tolerance` and their references at the targets.
 
+    While it holds what a finger has contact with, the reflex of its goal may add to the efforts.
+
     A reference that is beyond its joint, seen from the target (it pressed on the object to release), begins at the
     joint.
 
@@ -62,6 +65,7 @@ class GripperController:
 
     Attributes:
         gains: of its PID, which may change; None without one.
+        reflex: does nothing without pads.
 
     Raises:
         InvalidArgument: duplicate joints, gains of an unknown joint or all zero, fingers that are not a partition of
@@ -113,9 +117,10 @@ class GripperController:
         self._effort = self._default_effort.copy()
         self._tracking = TrackingError(output.rows[:2])
         self._control = None
+        self.reflex = GripReflex(n)
         if self._pid is not None:
-            no_feed = np.zeros(n)
-            self._control = self._pid.loop(self._tracking.errors, self._command, feed=no_feed, effort=self._effort)
+            extra = self.reflex.extra
+            self._control = self._pid.loop(self._tracking.errors, self._command, feed=extra, effort=self._effort)
         self._step = np.zeros(n)
         self._measured: Array = np.zeros(n)
         self._activated = False
@@ -186,6 +191,7 @@ class GripperController:
         self._moving = np.ones(n)
         self._ticks_left = 0
         self._starts = True
+        self.reflex.begin(goal.reflex, goal.force)
         self._watch()
         self._goal = GoalHandle(cancel=self._cancel, feedback=self._feedback)
         return self._goal
@@ -241,7 +247,9 @@ class GripperController:
             return self.output
         if not self._tracking.update(measured, math.inf):
             refuse_not_finite(self.name, self.joints, measured, time)
-        self._control(period, False)
+        holds = self._goal is None and "contact" in self._stops
+        presses = holds and self.reflex.update(period, measured.position, self._command, self._effort)
+        self._control(period, presses)
         return self.output
 
     def _activate(self, measured: JointState) -> None:

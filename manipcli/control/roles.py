@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.controller import Controller
+from manipcli.control.grip_reflex import GripReflex
 from manipcli.control.jog import JogTarget
 from manipcli.control.speed_scaling import SpeedScaling
 from manipcli.control.trajectory_goal import TrajectoryGoal
@@ -92,6 +93,12 @@ class Scaled(Controller, Protocol):
     scaling: SpeedScaling
 
 
+class Reflexive(Controller, Protocol):
+    """A hand with a reflex against slip."""
+
+    reflex: GripReflex
+
+
 class SensorReader(Controller, Protocol):
     """Reads sensors."""
 
@@ -128,6 +135,11 @@ def is_referenced(controller: Controller) -> TypeGuard[Referenced]:
 def is_commanded(controller: Controller) -> TypeGuard[Commanded]:
     """Whether it has a topic for commands."""
     return hasattr(controller, "set_command")
+
+
+def has_reflex(controller: Controller) -> TypeGuard[Reflexive]:
+    """Whether it can press more against slip."""
+    return hasattr(controller, "reflex")
 
 
 def is_scaled(controller: Controller) -> TypeGuard[Scaled]:

@@ -15,6 +15,7 @@ from manipcli.conditions.sensed import Sensed
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
+from manipcli.judge.located import Correction, Corrections
 from manipcli.judge.self_contacts import SelfContact, SelfContacts
 from manipcli.judge.state_windows import Order, WindowsOfSpans, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
@@ -26,12 +27,13 @@ from manipcli.spec.condition import ExpectationSpec
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """The outcome of each expectation, the time [s] of the last recorded state, and the contacts of the robot with
-    itself."""
+    """The outcome of each expectation, the time [s] of the last recorded state, the contacts of the robot with itself,
+    and the corrections of what it believes."""
 
     outcomes: tuple[ExpectationOutcome, ...]
     end: float
     self_contacts: tuple[SelfContact, ...]
+    located: tuple[Correction, ...]
 
 
 def examine(
@@ -57,9 +59,10 @@ def examine(
     stateless = [all(seam[leaf.name].stateless for leaf in leaves(expectation.condition)) for expectation in expect]
     last: StateWindow | None = None
     end = judged = 0.0
-    self_contacts = SelfContacts()
+    self_contacts, located = SelfContacts(), Corrections(recording)
     for span in recording.spans:
         self_contacts.add(span.contacts)
+        located.add(span)
         if span.states.time.size == 0:
             continue
         end = float(span.states.time[-1])
@@ -94,9 +97,9 @@ def examine(
     names = labels(expect)
     if successive is None:
         missing = order if isinstance(order, NotEvaluated) else NotEvaluated("no tick was recorded")
-        return Examined(tuple(outcome(name, missing) for name in names), end, self_contacts.found())
+        return Examined(tuple(outcome(name, missing) for name in names), end, self_contacts.found(), located.found())
     found = (outcome(name, expected.found(judged)) for name, expected in zip(names, asked, strict=True))
-    return Examined(tuple(found), end, self_contacts.found())
+    return Examined(tuple(found), end, self_contacts.found(), located.found())
 
 
 def _period(times: Array, control: float) -> float:

@@ -92,6 +92,7 @@ def judge(
         drawn=_drawn(recording),
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
+        located=examined.located,
         holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
         part=part,
         blocks=block_outcomes(recording, interrupted=bool(errors)),

@@ -153,7 +153,7 @@ def simulate_live(
     replanning = 0.0
     try:
         with open_session(task, plan, manager, LiveSession) as session:
-            belief = belief_of(task, plan)
+            belief = belief_of(task, plan, session)
             live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
             runs = task.part.last is None
             observer = Observer(recorder, live, progress if runs else SILENT, session.period, belief)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
-from manipcli.perception.picture import Mask, Picture
+from manipcli.perception.picture import Mask, Picture, patches
 from manipcli.render.raster import Raster
 from manipcli.render.surface import Surface
 
@@ -44,6 +44,7 @@ class Comparison:
         missing: should show it, and show something behind it.
         covered: should show it, and show something unexpected in front of it, in the volume.
         beside: show something unexpected in the volume where the body is not.
+        against: missing, covered and beside pixels in patches, more than the single ones along edges.
         cost: truncated sum of squared depth errors, in standard deviations.
         residual: root mean square of the depth errors of explained pixels [m].
         spread: the same in standard deviations.
@@ -53,6 +54,7 @@ class Comparison:
     missing: int
     covered: int
     beside: int
+    against: int
     cost: float
     residual: float
     spread: float
@@ -82,10 +84,10 @@ class Fit:
         picture: what was measured.
         shown: the surface of the body in O.
         X_WO: believed pose.
-        prior: (4,) standard deviations of the state before; 0: known.
+        reach: (4,) the state is at most this before; 0: known. Rotations stay within it, pi: any.
     """
 
-    def __init__(self, picture: Picture, shown: Surface, X_WO: Transform, prior: Array) -> None:
+    def __init__(self, picture: Picture, shown: Surface, X_WO: Transform, reach: Array) -> None:
         self._picture = picture
         self._raster = Raster([shown], picture.lens)
         a, b, c = (shown.vertices[shown.faces[:, k]] for k in range(3))
@@ -93,8 +95,9 @@ class Fit:
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
         self._X_WO, self._R_CW = X_WO, picture.X_WC.R.T
         self._rays = picture.rays.reshape(-1, 3)
-        self.free = np.flatnonzero(prior > 0.0)
-        self._weight = np.diag(1.0 / np.square(prior[self.free]))
+        self.free = np.flatnonzero(reach > 0.0)
+        self._weight = np.diag(3.0 / np.square(reach[self.free]))  # of uniform distributions
+        self._rotation = float(reach[3]) if reach[3] < math.pi else math.inf
         self._seen = np.isfinite(picture.depth)
         self._radius = float(np.linalg.norm(shown.vertices, axis=1).max())
 
@@ -173,7 +176,9 @@ class Fit:
         whole[self.free] = step
         length, turn = float(np.linalg.norm(whole[:3])), abs(float(whole[3]))
         whole *= min(1.0, LONGEST / max(length, 1e-12), WIDEST / max(turn, 1e-12))
-        return state + whole, H
+        found = state + whole
+        found[3] = np.clip(found[3], -self._rotation, self._rotation)
+        return found, H
 
     def _edges(self, state: Array, rendered: _Rendered) -> tuple[Array, Array]:
         """Information matrix and gradient of edges: of outlines, and of what is in front of other parts of the body.
@@ -220,17 +225,18 @@ class Fit:
             explained = np.abs(error) <= allowed
             missing = error > allowed
         covered = seen & ~explained & ~missing & near
-        beside = int(picture.near.sum()) - int(near.sum())
+        wrong = picture.near.copy()
+        wrong.reshape(-1)[at] = missing | covered
+        bad, count = int(wrong.sum()), int(explained.sum())
         ratio = error[explained] / rendered.sigma[explained]
-        bad = int(missing.sum()) + int(covered.sum()) + beside
-        squares = float(np.square(ratio).sum())
-        count = int(explained.sum())
+        squares = np.square(ratio)
         return Comparison(
             explained=count,
             missing=int(missing.sum()),
             covered=int(covered.sum()),
-            beside=beside,
-            cost=float(np.minimum(np.square(ratio), most).sum()) + most * bad,
+            beside=int(picture.near.sum()) - int(near.sum()),
+            against=int(patches(wrong).sum()),
+            cost=float(np.minimum(squares, most).sum()) + most * bad,
             residual=math.sqrt(float(np.square(error[explained]).mean())) if count else 0.0,
-            spread=math.sqrt(squares / count) if count else 0.0,
+            spread=math.sqrt(float(squares.mean())) if count else 0.0,
         )

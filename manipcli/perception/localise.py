@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen, wrapped
-from manipcli.perception.fit import GATE, Comparison, Fit
+from manipcli.perception.fit import Comparison, Fit
 from manipcli.perception.picture import Mask, Picture, cut
-from manipcli.perception.seen_surface import looks_same_about, seen_surface
+from manipcli.perception.seen_surface import key, looks_same, seen_surface
 from manipcli.render.lens import Lens
 from manipcli.render.surface import Surface
 from manipcli.scene.scene import Body
@@ -31,10 +31,17 @@ COARSE, FINE = 48, 160
 """Most pixels along a side of the picture that starts and results are compared in."""
 YAWS = math.radians(20.0)
 """Largest angle between starts."""
-KEPT = 4
-"""Starts that are refined."""
-TIE = 0.02
-"""Share of its pixels by which a pose explains more than another one if it is better; else the believed one decides."""
+BEGUN, KEPT = 8, 4
+"""Starts that are followed after the first step, and that are compared in all pixels."""
+SLACK = 3e-3
+"""Depth error that does not count against a pose before it is refined [m]."""
+APART, APART_ROTATION = 2e-3, math.radians(4.0)
+"""Poses closer than this are the same [m], [rad]."""
+TIE = 25.0
+"""Difference of cost between poses that explain a picture equally well, in squared standard deviations."""
+SCAN, FLAT, ALIKE = math.radians(5.0), math.radians(15.0), 10
+"""Rotations are compared in such steps [rad]. Over such an angle or more [rad], it cannot be told which is right if at most
+this many pixels more speak against them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +127,7 @@ def localise(view: DepthView, prior: Prior, expected: Array) -> Localisation:
     shown = seen_surface(prior.body.geometries)
     if not len(shown.faces):
         raise NotSeen("it has no shape that a camera can see")
-    free = looks_same_about(prior.body.geometries, _key(prior.X_WO.R[2]))
+    free = looks_same(prior.body.geometries, key(prior.X_WO.R[2]))
     low, high = _volume(prior, shown)
     picture = cut(view.lens, view.X_WC, view.depth, view.noise, expected, low, high)
     if picture is None:
@@ -128,24 +135,18 @@ def localise(view: DepthView, prior: Prior, expected: Array) -> Localisation:
     pixels = int(picture.near.sum())
     if pixels < LEAST_PIXELS:
         raise NotSeen(f"{pixels} pixels show something unexpected in its region, at least {LEAST_PIXELS} are needed")
-    spread = np.append(np.asarray(prior.region, dtype=np.float64), 0.0 if free else prior.rotation) / math.sqrt(3.0)
-    side = max(picture.depth.shape)
-    small = picture.strided(-(-side // COARSE))
-    coarse = Fit(small, shown, prior.X_WO, spread)
-    fine = Fit(picture.strided(-(-side // FINE)), shown, prior.X_WO, spread)
-    begun = [_coarse(coarse, start, mask) for start, mask in _starts(small, 0.0 if free else prior.rotation)]
-    begun.sort(key=lambda pair: pair[0])
-    found = [_fine(fine, state) for _, state in begun[:KEPT]]
-    least = min(comparison.cost for comparison, _ in found)
-    room = TIE * GATE**2 * max(comparison.explained for comparison, _ in found)
-    equal = [pair for pair in found if pair[0].cost <= least + room]
-    comparison, state = min(equal, key=lambda pair: abs(float(wrapped(pair[1][3]))))
-    return _checked(fine, comparison, state, prior, free)
-
-
-def _key(axis: Array) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in np.round(axis, 6))
-    return x, y, z
+    reach = np.append(np.asarray(prior.region, dtype=np.float64), 0.0 if free else prior.rotation)
+    coarse = Fit(small := picture.strided(COARSE), shown, prior.X_WO, reach)
+    begun = [_begun(coarse, *start) for start in _starts(small, float(reach[3]))]
+    kept = _distinct([_coarse(coarse, each.state) for each in _best(begun, BEGUN)])
+    kept = kept[:KEPT]
+    body = np.concatenate([coarse.pose(each.state).apply(shown.corners) for each in kept])
+    fine = Fit(picture.around(body).strided(FINE), shown, prior.X_WO, reach)
+    found = _distinct([_fine(fine, each.state) for each in kept])
+    best = _best(found, 1)[0].comparison
+    equal = [each for each in found if each.comparison.cost <= best.cost + TIE * max(best.spread, 1.0) ** 2]
+    chosen = min(equal, key=lambda each: abs(float(wrapped(each.state[3]))))
+    return _checked(fine, chosen, [each.state for each in equal], prior, free)
 
 
 def _volume(prior: Prior, shown: Surface) -> tuple[Array, Array]:
@@ -177,26 +178,72 @@ def _starts(picture: Picture, rotation: float) -> Iterator[tuple[Array, Mask]]:
             yield np.array([0.0, 0.0, 0.0, yaw]), mask
 
 
-def _coarse(fit: Fit, start: Array, mask: Mask) -> tuple[float, Array]:
-    """A state after a few steps, and its cost."""
+@dataclass(frozen=True, slots=True)
+class _Hypothesis:
+    """A state of a fit, and how it explains the picture."""
+
+    state: Array
+    comparison: Comparison
+
+
+def _begun(fit: Fit, start: Array, mask: Mask) -> _Hypothesis:
     state = start
     for _ in range(2):
         state = fit.shifted(state, mask)
-    for gate in (0.03, 0.02, 0.01):
+    state, _ = fit.refined(state, 0.03)
+    return _Hypothesis(state, fit.compare(state, slack=SLACK))
+
+
+def _coarse(fit: Fit, state: Array) -> _Hypothesis:
+    for gate in (0.02, 0.01):
         state, _ = fit.refined(state, gate, edges=True)
-    return fit.compare(state, slack=3e-3).cost, state
+    return _Hypothesis(state, fit.compare(state, slack=SLACK))
 
 
-def _fine(fit: Fit, start: Array) -> tuple[Comparison, Array]:
-    """A state at a minimum, and how it explains the picture."""
-    state = start
-    for gate in (0.01, 0.005, 0.0, 0.0):
+def _fine(fit: Fit, state: Array) -> _Hypothesis:
+    for gate in (0.005, 0.0, 0.0):
         state, _ = fit.refined(state, gate, edges=True)
-    return fit.compare(state), state
+    return _Hypothesis(state, fit.compare(state))
 
 
-def _checked(fit: Fit, comparison: Comparison, state: Array, prior: Prior, free: bool) -> Localisation:
-    for _ in range(4):
+def _best(hypotheses: list[_Hypothesis], count: int) -> list[_Hypothesis]:
+    """Those with the least costs, the least first."""
+    return sorted(hypotheses, key=lambda each: each.comparison.cost)[:count]
+
+
+def _distinct(hypotheses: list[_Hypothesis]) -> list[_Hypothesis]:
+    """Of those that are nearly the same, the best."""
+    found: list[_Hypothesis] = []
+    for each in _best(hypotheses, len(hypotheses)):
+        apart = (each.state - other.state for other in found)
+        if all(np.linalg.norm(d[:3]) > APART or abs(float(wrapped(d[3]))) > APART_ROTATION for d in apart):
+            found.append(each)
+    return found
+
+
+def _centred(fit: Fit, chosen: _Hypothesis, rotation: float) -> tuple[Array, float]:
+    """The state in the middle of the rotations that explain the picture as well, such as those that hide a handle, and
+    the angle between the outermost ones [rad]."""
+    most = chosen.comparison.against + ALIKE
+    ends = []
+    for sign in (-1.0, 1.0):
+        state, count = chosen.state.copy(), 0
+        while count * SCAN < math.pi and (rotation >= math.pi or abs(state[3] + sign * SCAN) <= rotation):
+            state[3] += sign * SCAN
+            if fit.compare(state).against > most:
+                break
+            count += 1
+        ends.append(sign * count * SCAN)
+    state, width = chosen.state.copy(), ends[1] - ends[0]
+    if width < FLAT:
+        return state, 0.0
+    state[3] += (ends[0] + ends[1]) / 2.0
+    return state, width
+
+
+def _checked(fit: Fit, chosen: _Hypothesis, equal: list[Array], prior: Prior, free: bool) -> Localisation:
+    state, flat = _centred(fit, chosen, 0.0 if free else prior.rotation)
+    for _ in range(2):
         state, information = fit.refined(state, 0.0, edges=True)
     comparison = fit.compare(state)
     if comparison.explained < LEAST_PIXELS or comparison.inliers < LEAST_INLIERS:
@@ -208,6 +255,13 @@ def _checked(fit: Fit, comparison: Comparison, state: Array, prior: Prior, free:
     covariance = np.zeros((6, 6))
     index = np.array([0, 1, 2, 5])[fit.free]
     covariance[np.ix_(index, index)] = max(comparison.spread, 1.0) ** 2 * np.linalg.inv(information)
+    for other in equal:
+        # Poses that explain the picture as well, unless the body looks the same.
+        apart = np.append(other[:3] - chosen.state[:3], wrapped(other[3] - chosen.state[3]))[[0, 1, 2, 2, 2, 3]]
+        apart[3:5] = 0.0
+        if not looks_same(prior.body.geometries, key(prior.X_WO.R[2]), (float(apart[5]),)):
+            covariance += np.outer(apart, apart) / len(equal)
+    covariance[5, 5] += flat**2 / 12.0
     if free:
         covariance[5, 5] = prior.rotation**2 / 3.0
     reach = np.asarray(prior.region, dtype=np.float64)
@@ -219,7 +273,7 @@ def _checked(fit: Fit, comparison: Comparison, state: Array, prior: Prior, free:
             f"believed position along {'xyz'[worst]}, where at most {1e3 * reach[worst]:.1f} mm are possible"
         )
     state[:3] = np.clip(state[:3], -reach, reach)
-    state[3] = np.clip(wrapped(state[3]), -prior.rotation, prior.rotation)
+    state[3] = wrapped(state[3])
     return Localisation(
         X_WO=fit.pose(state),
         covariance=frozen(covariance),

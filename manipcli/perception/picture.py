@@ -20,6 +20,8 @@ NOTHING = 1e3
 """Depth where nothing is [m]."""
 NEIGHBOURS = 5
 """Least number of such pixels among 3 x 3; fewer are noise."""
+BORDER = 6
+"""Pixels around a part, for the blur of edges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +52,31 @@ class Picture:
     near: Mask
     pixel: Array
 
-    def strided(self, stride: int) -> Picture:
-        """Every `stride`-th pixel of it."""
-        if stride == 1:
-            return self
-        some = np.s_[::stride, ::stride]
-        depth = self.depth[some]
-        old, (height, width) = self.lens, depth.shape
-        lens = Lens(width, height, old.fx / stride, old.fy / stride, old.cx / stride, old.cy / stride)
-        arrays = (self.noise[some], self.expected[some], self.floor[some], self.shown[some], self.near[some])
-        return Picture(lens, self.X_WC, self.rays[some], depth, *arrays, self.pixel)
+    def some(self, rows: slice, columns: slice) -> Picture:
+        """The picture of these pixels: `start` and `step` of the slices must be given."""
+        at = (rows, columns)
+        depth, old = self.depth[at], self.lens
+        cx, cy = (old.cx - columns.start) / columns.step, (old.cy - rows.start) / rows.step
+        lens = Lens(depth.shape[1], depth.shape[0], old.fx / columns.step, old.fy / rows.step, cx, cy)
+        arrays = (self.noise[at], self.expected[at], self.floor[at], self.shown[at], self.near[at])
+        return Picture(lens, self.X_WC, self.rays[at], depth, *arrays, self.pixel)
+
+    def strided(self, most: int) -> Picture:
+        """Every n-th pixel, with the least n for which no side has more than `most`."""
+        step = -(-max(self.depth.shape) // most)
+        return self.some(slice(0, None, step), slice(0, None, step))
+
+    def around(self, points: Array) -> Picture:
+        """The part that shows what is unexpected, and points (n, 3) in the world."""
+        seen = np.argwhere(self.near)
+        corners = window(self.lens, self.X_WC.inverse().apply(points))
+        first, last = seen.min(axis=0), seen.max(axis=0)
+        if corners is not None:
+            first = np.minimum(first, [each.start for each in corners])
+            last = np.maximum(last, [each.stop for each in corners])
+        first = np.maximum(first - BORDER, 0)
+        rows, columns = (slice(int(a), int(b) + BORDER, 1) for a, b in zip(first, last, strict=True))
+        return self.some(rows, columns)
 
 
 def cut(
@@ -69,34 +86,34 @@ def cut(
 
     None if the volume is not in the picture.
     """
-    from scipy.ndimage import minimum_filter, uniform_filter
+    from scipy.ndimage import minimum_filter
 
     corners = np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
-    window = _window(lens, X_WC.inverse().apply(corners))
-    if window is None:
+    inside = window(lens, X_WC.inverse().apply(corners))
+    if inside is None:
         return None
-    rows, columns = window
-    z = np.array(depth[window], dtype=np.float64)
-    sigma = np.broadcast_to(np.asarray(noise, dtype=np.float64), depth.shape)[window]
+    rows, columns = inside
+    z = np.array(depth[inside], dtype=np.float64)
+    sigma = np.broadcast_to(np.asarray(noise, dtype=np.float64), depth.shape)[inside]
     sigma = np.maximum(np.where(np.isfinite(sigma), sigma, LEAST_NOISE), LEAST_NOISE)
     behind = np.minimum(np.asarray(expected, dtype=np.float64), NOTHING)
     z[~(z > 0.0) | ~np.isfinite(z)] = np.nan
-    z[np.isnan(z) & (behind[window] == NOTHING)] = NOTHING
+    z[np.isnan(z) & (behind[inside] == NOTHING)] = NOTHING
     part = Lens(z.shape[1], z.shape[0], lens.fx, lens.fy, lens.cx - columns.start, lens.cy - rows.start)
     rays = np.asarray(part.points(np.ones_like(z)))
     # A pixel may show what its neighbours were expected to show.
-    floor = minimum_filter(behind, size=3)[window] - NEARER * sigma
+    floor = minimum_filter(behind, size=3)[inside] - NEARER * sigma
     with np.errstate(invalid="ignore"):
         shown = z < floor
-    shown &= uniform_filter(shown.astype(np.float64), size=3, mode="nearest") * 9.0 > NEIGHBOURS - 0.5
+    shown = patches(shown)
     points = X_WC.apply(rays * np.where(shown, z, 0.0)[..., None])
     near = shown & ((points >= low) & (points <= high)).all(axis=-1)
     pixel = np.array([1.0 / lens.fx, 1.0 / lens.fy])
-    return Picture(part, X_WC, rays, z, sigma, behind[window], floor, shown, near, pixel)
+    return Picture(part, X_WC, rays, z, sigma, behind[inside], floor, shown, near, pixel)
 
 
-def _window(lens: Lens, corners: Array) -> tuple[slice, slice] | None:
-    """Rows and columns that can show the convex hull of corners (8, 3) in C; None without any."""
+def window(lens: Lens, corners: Array) -> tuple[slice, slice] | None:
+    """Rows and columns that can show the convex hull of points (n, 3) in C; None without any."""
     if corners[:, 2].max() <= 0.0:
         return None
     first, last = np.zeros(2, dtype=np.int64), np.array([lens.width, lens.height])
@@ -107,3 +124,11 @@ def _window(lens: Lens, corners: Array) -> tuple[slice, slice] | None:
     if (first >= last).any():
         return None
     return slice(int(first[1]), int(last[1])), slice(int(first[0]), int(last[0]))
+
+
+def patches(mask: Mask) -> Mask:
+    """The pixels (h, w) of a mask with at least NEIGHBOURS of it among the 3 x 3 about them."""
+    from scipy.ndimage import uniform_filter
+
+    found: Mask = mask & (uniform_filter(mask.astype(np.float32), size=3, mode="nearest") * 9.0 > NEIGHBOURS - 0.5)
+    return found

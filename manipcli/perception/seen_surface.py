@@ -6,6 +6,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from manipcli.core.geometry import Array, matrix_from_axis_angle
 from manipcli.render.drawing import shape_surfaces
@@ -20,7 +21,8 @@ PIXELS, AWAY = 64, 4.0
 """Of the pictures that sample what is visible: rows and columns, and the distance in radii of the body."""
 ELEVATIONS, AZIMUTHS = (-0.7, 0.7, 1.3), 12
 """[rad] Elevations of their cameras, and the number of azimuths."""
-ROTATIONS = 6
+ANY = tuple(k * math.pi * (3.0 - math.sqrt(5.0)) for k in range(1, 7))
+"""Multiples of the golden angle [rad]: no symmetry has two of them."""
 SAME, MOST_OTHER = 0.035, 0.01
 """A body looks the same if at most a share of MOST_OTHER of its points is off by more than SAME of its radius."""
 
@@ -45,21 +47,31 @@ def seen_surface(geometries: tuple[Geometry, ...]) -> Surface:
     return surface(np.concatenate(vertices), np.concatenate(faces))
 
 
-@lru_cache(maxsize=32)
-def looks_same_about(geometries: tuple[Geometry, ...], axis: tuple[float, float, float]) -> bool:
-    """Whether a body looks the same after any rotation about an axis through the origin of O."""
-    from scipy.spatial import KDTree
+def key(axis: Array) -> tuple[float, float, float]:
+    """An axis (3,) without rounding errors."""
+    x, y, z = (float(v) for v in np.round(axis, 6))
+    return x, y, z
 
-    shown = seen_surface(geometries)
-    radius = float(np.linalg.norm(shown.vertices, axis=1).max())
-    points = _visible_points(shown, radius)
-    tree, some = KDTree(points), points[:: max(1, len(points) // 1500)]
-    for k in range(1, ROTATIONS + 1):
-        angle = k * math.pi * (3.0 - math.sqrt(5.0))  # the golden angle: none repeats a symmetry of another one
-        far = tree.query(some @ matrix_from_axis_angle(axis, angle).T)[0] > SAME * radius
+
+def looks_same(
+    geometries: tuple[Geometry, ...], axis: tuple[float, float, float], angles: tuple[float, ...] = ANY
+) -> bool:
+    """Whether a body looks the same after rotations [rad] about an axis through the origin of O [default: after any]."""
+    points, tree, radius = _visible(geometries)
+    for angle in angles:
+        far = tree.query(points @ matrix_from_axis_angle(axis, angle).T)[0] > SAME * radius
         if far.mean() > MOST_OTHER:
             return False
     return True
+
+
+@lru_cache(maxsize=32)
+def _visible(geometries: tuple[Geometry, ...]) -> tuple[Array, KDTree, float]:
+    """Some visible points (n, 3), a tree of all, and the radius of the body about O [m]."""
+    shown = seen_surface(geometries)
+    radius = float(np.linalg.norm(shown.vertices, axis=1).max())
+    points = _visible_points(shown, radius)
+    return points[:: max(1, len(points) // 1500)], KDTree(points), radius
 
 
 def _visible_points(shown: Surface, radius: float) -> Array:

@@ -16,6 +16,9 @@ CLOSING = "close"
 OPENING = "open"
 """The phase of a step in which the hand opens."""
 
+LOOKING = "look"
+"""The phase of a step in which a camera takes a picture."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlanningState:
@@ -40,11 +43,27 @@ class PlanningState:
         return replace(self, position=position, at_start=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Reflex:
+    """Pressing more while the hand holds and its taxels report beginning slip.
+
+    Attributes:
+        friction: coefficient that the robot believes.
+        onset: share of the friction cone above which it presses more.
+        force: [N] most of each finger; None: what the hand can.
+    """
+
+    friction: float
+    onset: float
+    force: float | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Grip:
     """A goal of the hand: `joints` move to `target` (n) until each finger meets `force` [N] or arrives.
 
     With `must_hold`, closing on nothing is a failure; with `must_arrive`, so is being stopped before the target.
+    `reflex`: None without one.
     """
 
     joints: tuple[str, ...]
@@ -52,6 +71,7 @@ class Grip:
     force: float | None
     must_hold: bool = False
     must_arrive: bool = False
+    reflex: Reflex | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +106,14 @@ class GoalTolerances:
     goal_time: float
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The body `object` is located in the next picture of the camera `sensor`."""
+
+    object: str
+    sensor: str
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """Commands that start together; done when all goals are reached and `duration` [s] has passed.
@@ -104,6 +132,7 @@ class Motion:
         tolerances: of the trajectory, instead of the controller's.
         takes: the object that is attached to the tool at its end, for robots with a `holding`.
         lets_go: what is attached to the tool is freed at its beginning.
+        looks: what it locates; it ends when the picture has arrived.
     """
 
     label: str
@@ -119,6 +148,7 @@ class Motion:
     tolerances: GoalTolerances | None = None
     takes: str | None = None
     lets_go: bool = False
+    looks: Look | None = None
 
     @property
     def closes(self) -> bool:

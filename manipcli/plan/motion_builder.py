@@ -23,7 +23,7 @@ from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
-from manipcli.plan.motion import CLOSING, OPENING, Grip, Motion, PlanningState, StepPlan
+from manipcli.plan.motion import CLOSING, LOOKING, OPENING, Grip, Look, Motion, PlanningState, Reflex, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
@@ -123,16 +123,19 @@ class MotionBuilder:
         searched: bool = True,
         leaving: Leaving = "nothing",
         avoid: Sequence[Array] = (),
+        solver: InverseKinematics | None = None,
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
         Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
         path is. So are those near one of `avoid`, (n) each. Part of the orientation may be left open. Where no straight
-        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`).
+        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`). With a
+        `solver` for another frame, that frame moves to the pose instead of the tool.
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
-        solver = self._planner.solver.leaving(leaving)
+        line = X_WT if solver is None else None
+        solver = (self._planner.solver if solver is None else solver).leaving(leaving)
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid)
@@ -141,7 +144,7 @@ class MotionBuilder:
         def goals(rng: np.random.Generator) -> Array:
             return branches(solver, X_WT, goal, rng, query=self.query(), limits=limits)
 
-        self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=X_WT)
+        self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=line)
 
     def straight(
         self,
@@ -222,7 +225,10 @@ class MotionBuilder:
             timed.refuse_violation(self._planner, self._now, label, trajectory)
         self._add(label, trajectory, None)
 
-    def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
+    def close(
+        self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "",
+        reflex: Reflex | None = None,
+    ) -> None:  # fmt: skip
         """Close the hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
         The fingers are predicted to stop where the first link of each touches the body, or any if it is not known.
@@ -233,6 +239,7 @@ class MotionBuilder:
             must_hold: whether holding nothing is a failure.
             body: what it closes on, if known.
             roomier: the hint if the fingers are in collision: how to grasp where they have more room.
+            reflex: while the hand holds.
 
         Raises:
             NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and does not touch it.
@@ -244,6 +251,7 @@ class MotionBuilder:
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
+        grip = replace(grip, reflex=reflex)
         before, duration = self._now, grip_time(planner, self._now, grip)
         if body is None:
             self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)
@@ -297,6 +305,10 @@ class MotionBuilder:
     def dwell(self, label: str, duration: float) -> None:
         """Hold still for `duration` [s], and until the step's `until` holds."""
         self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=True))
+
+    def look(self, looks: Look, duration: float) -> None:
+        """Hold still until the picture in which a body is located has arrived, at most after `duration` [s]."""
+        self._motions.append(Motion(LOOKING, trajectory=None, grip=None, duration=duration, looks=looks))
 
     def spill(self, into: str) -> None:
         """Predict the contents of the carried object on the floor of the container `into`."""

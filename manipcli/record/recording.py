@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from manipcli.conditions.sensed import Readings
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.state import Contact, WorldState
 
 
@@ -74,6 +74,19 @@ class Span:
     readings: Mapping[str, Readings] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class BeliefSnapshot:
+    """What the robot believed about an uncertain body from `time` [s] on.
+
+    `X_WO`, and the covariance (6, 6) of position [m2] and rotation [rad2] about the axes of the world.
+    """
+
+    time: float
+    body: str
+    X_WO: Transform
+    covariance: Array
+
+
 EMBEDDED = "embedded_meshes"
 """Name of the metadata record of embedded meshes: URI -> name of the attachment."""
 
@@ -97,6 +110,7 @@ class Recording:
             before.
         believed_names: bodies with believed poses of their own.
         sensors: whose readings are in the spans.
+        beliefs: what the robot believed at the start, and wherever it looked.
 
     `states`, `controllers` and `contacts` cover all spans and need a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
@@ -114,6 +128,7 @@ class Recording:
     silent: tuple[str, ...] = ()
     believed_names: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
+    beliefs: tuple[BeliefSnapshot, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The embedded mesh files by the URI in URDF and scene, with the material files of OBJ meshes; empty unless the

@@ -1,28 +1,23 @@
-"""Pictures of robots and scenes with Bullet's TinyRenderer: no window, no GPU, reproducible bytes.
-
-Bullet renders at twice the size, and the average of four pixels smooths the edges.
-"""
+"""Pictures of robots and scenes, by the renderer of the cameras: no window, no GPU, reproducible bytes."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.core.geometry import Array, matrix_from_quat
 from manipcli.model.configuration import configuration
 from manipcli.model.robot import RobotModel
 from manipcli.render.drawing import Drawable, Drawing, draw
 from manipcli.render.placing import Placing, Poses
-from manipcli.render.surface import Surface, surface
+from manipcli.render.raster import Fragments, Raster
+from manipcli.render.shading import TO_LIGHT, shaded
 from manipcli.replay.camera import Camera, framing
-from manipcli.simulate.rasterizer import Light, Rasterizer, View
 
 Image = npt.NDArray[np.uint8]
 """(height, width, 3) red, green, blue; row 0 is the top."""
@@ -33,14 +28,6 @@ SIZE = (960, 720)
 """Default size of a picture [pixel]."""
 FINER = 2
 """Factor of supersampling."""
-MAX_VERTICES = 60_000
-"""Most vertices of one surface in Bullet; its commands hold a little more than twice as many."""
-
-
-TO_LIGHT = (0.35, 0.55, 1.0)
-"""Direction towards the light in the world."""
-AMBIENT, DIFFUSE, SPECULAR = 0.62, 0.42, 0.08
-"""Ambient, diffuse and specular brightness."""
 
 
 def sky(height: int) -> Image:
@@ -69,7 +56,7 @@ def webp_bytes(image: Image, *, quality: int) -> bytes:
 
 
 class Renderer:
-    """Renders a drawing in Bullet clients. A context manager that ends the clients.
+    """Renders a drawing; a picture is rendered at twice its size, and the average of four pixels smooths the edges.
 
     Args:
         drawing: the drawing.
@@ -80,35 +67,31 @@ class Renderer:
 
     def __init__(self, drawing: Drawing, *, size: tuple[int, int] = SIZE, still: frozenset[str] = frozenset()) -> None:
         self._size = size
-        shown = [drawable for drawable in drawing.layer("visual") if drawable.rgba[3] > 0.0]
-        self._still = _Client(drawing, [drawable for drawable in shown if drawable.frame in still])
-        self._moving = _Client(drawing, [drawable for drawable in shown if drawable.frame not in still])
-        self._before: tuple[Camera, _Raster, Image] | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._still.close()
-        self._moving.close()
+        shown = [each for each in drawing.layer("visual") if each.rgba[3] > 0.0 and len(each.surface.faces)]
+        self._still = _Layer(drawing, [drawable for drawable in shown if drawable.frame in still])
+        self._moving = _Layer(drawing, [drawable for drawable in shown if drawable.frame not in still])
+        self._before: tuple[Camera, Image, Array, Image] | None = None
 
     def picture(self, poses: Poses, camera: Camera) -> Image:
         """The picture of one state, with the background."""
         whole = Window(0, 0, FINER * self._size[0], FINER * self._size[1])
         if self._before is None or self._before[0] != camera:
-            raster = self._still.render(poses, camera, whole, whole)
-            self._before = (camera, raster, _averaged(raster.rgb))
-        _, behind, image = self._before
+            fine = np.repeat(sky(whole.bottom), whole.right, axis=1)
+            seen = self._still.see(poses, camera, whole)
+            there = seen.face >= 0
+            fine[there] = self._still.coloured(seen, there)
+            self._before = (camera, fine, seen.depth.copy(), _averaged(fine))
+        _, behind, depth, image = self._before
+        image = image.copy()
         window = self._moving.window(poses, camera, whole)
         if window is None:
-            return image.copy()
-        front = self._moving.render(poses, camera, whole, window)
-        rows, columns = window.slices
-        nearer = front.depth <= behind.depth[rows, columns]
-        rgb = np.where(nearer[..., None], front.rgb, behind.rgb[rows, columns])
-        image = image.copy()
-        rows, columns = window.divided(FINER).slices
-        image[rows, columns] = _averaged(rgb)
+            return image
+        part = window.slices
+        seen = self._moving.see(poses, camera, whole).part(part)
+        nearer = (seen.face >= 0) & (seen.depth <= depth[part])
+        fine = behind[part].copy()
+        fine[nearer] = self._moving.coloured(seen, nearer)
+        image[window.divided(FINER).slices] = _averaged(fine)
         return image
 
 
@@ -131,37 +114,18 @@ class Window:
         return Window(self.left // by, self.top // by, self.right // by, self.bottom // by)
 
 
-@dataclass(frozen=True, slots=True)
-class _Raster:
-    """Colours (h, w, 3) and depth buffer (h, w), infinite where nothing is drawn."""
-
-    rgb: Image
-    depth: npt.NDArray[np.float32]
-
-
-class _Client:
-    """Some drawables in a rasterizer of their own."""
+class _Layer:
+    """Some drawables, and their depth buffer for one camera."""
 
     def __init__(self, drawing: Drawing, drawables: Sequence[Drawable]) -> None:
         frames = {name: k for k, name in enumerate(drawing.frames)}
-        self._raster = Rasterizer()
-        self._bodies = [
-            (self._add(part, drawable), frames[drawable.frame])
-            for drawable in drawables
-            for part in _parts(drawable.surface)
-        ]
-        self._corners = [
-            (frames[drawable.frame], drawable.surface.corners)
-            for drawable in drawables
-            if len(drawable.surface.vertices)
-        ]
-
-    def close(self) -> None:
-        """End the client."""
-        self._raster.close()
-
-    def _add(self, part: Surface, drawable: Drawable) -> int:
-        return self._raster.add(part.vertices, part.faces, part.normals, drawable.rgba)
+        self._surfaces = [drawable.surface for drawable in drawables]
+        self._frames = np.array([frames[drawable.frame] for drawable in drawables], dtype=np.int64)
+        rgb = np.array([drawable.rgba[:3] for drawable in drawables]).reshape(-1, 3)
+        counts = [len(surface.faces) for surface in self._surfaces]
+        self._colours = (255.0 * np.repeat(rgb, counts, axis=0)).astype(np.float32)
+        self._corners = [(k, surface.corners) for k, surface in zip(self._frames.tolist(), self._surfaces, strict=True)]
+        self._bound: tuple[Camera, Raster] | None = None
 
     def window(self, poses: Poses, camera: Camera, whole: Window) -> Window | None:
         """The part of a picture that the drawables can cover; None if they are outside it."""
@@ -182,29 +146,17 @@ class _Client:
         )
         return found if found.left < found.right and found.top < found.bottom else None
 
-    def render(self, poses: Poses, camera: Camera, whole: Window, part: Window) -> _Raster:
-        """The raster of a part of the picture."""
-        for body, k in self._bodies:
-            self._raster.place(body, poses.position[k], poses.quat_xyzw[k])
-        up = camera.near * math.tan(math.radians(camera.field) / 2.0)
-        across = up * whole.right / whole.bottom
-        rgb, depth, there = self._raster.render(
-            (part.right - part.left, part.bottom - part.top),
-            View(
-                eye=camera.eye,
-                target=camera.target,
-                up=camera.up,
-                left=across * (2.0 * part.left / whole.right - 1.0),
-                right=across * (2.0 * part.right / whole.right - 1.0),
-                bottom=up * (1.0 - 2.0 * part.bottom / whole.bottom),
-                top=up * (1.0 - 2.0 * part.top / whole.bottom),
-                near=camera.near,
-                far=camera.far,
-            ),
-            Light(TO_LIGHT, ambient=AMBIENT, diffuse=DIFFUSE, specular=SPECULAR),
-        )
-        behind = sky(whole.bottom)[part.top : part.bottom]
-        return _Raster(np.where(there[..., None], rgb, behind), np.where(there, depth, np.inf))
+    def see(self, poses: Poses, camera: Camera, whole: Window) -> Fragments:
+        """What the camera sees of the drawables; overwritten by the next call."""
+        if self._bound is None or self._bound[0] != camera:
+            self._bound = camera, Raster(self._surfaces, camera.lens((whole.right, whole.bottom)), camera.near)
+        X_CW = camera.X_WC.inverse()
+        rotation = X_CW.R @ matrix_from_quat(poses.quat_xyzw[self._frames])
+        return self._bound[1].see(rotation, X_CW.apply(poses.position[self._frames]), X_CW.R @ TO_LIGHT)
+
+    def coloured(self, seen: Fragments, where: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+        """(n, 3) colours of the pixels in a mask."""
+        return shaded(self._colours[seen.face[where]], seen.shade[where])
 
 
 def _averaged(fine: Image) -> Image:
@@ -217,17 +169,6 @@ def _averaged(fine: Image) -> Image:
     return (total // (FINER * FINER)).astype(np.uint8)
 
 
-def _parts(whole: Surface) -> list[Surface]:
-    """A surface in pieces that fit into one Bullet command."""
-    if len(whole.vertices) <= MAX_VERTICES:
-        return [whole]
-    parts = []
-    for first in range(0, len(whole.faces), MAX_VERTICES // 3):
-        used, faces = np.unique(whole.faces[first : first + MAX_VERTICES // 3], return_inverse=True)
-        parts.append(surface(whole.vertices[used], faces))
-    return parts
-
-
 def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
     """Write a PNG picture of a robot at `home`, or at zero if it has no `home`.
 
@@ -235,6 +176,6 @@ def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
         Parts that cannot be drawn, one line each.
     """
     drawing, poses = draw(robot), Placing(robot).start(configuration(robot))
-    with Renderer(drawing) as renderer:
-        path.write_bytes(png_bytes(renderer.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))))
+    picture = Renderer(drawing).picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))
+    path.write_bytes(png_bytes(picture))
     return drawing.missing

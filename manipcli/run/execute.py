@@ -24,7 +24,7 @@ from manipcli.run.blocks import BlockLoop
 from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
-from manipcli.run.restore import restore_controllers, scene_at
+from manipcli.run.restore import restore_belief, restore_controllers, scene_at
 from manipcli.run.saturation_counts import saturations_of
 from manipcli.run.step_loop import StepLoop
 from manipcli.scene.drop_test import SETTLED_SHIFT
@@ -101,7 +101,7 @@ def _run_steps(
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
     with open_session(task, plan, manager, Session) as session:
-        belief = belief_of(task, plan)
+        belief = belief_of(task, plan, session)
         live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
         observer = Observer(recorder, live, progress, session.period, belief)
         session.restart_clock(observer)
@@ -163,9 +163,13 @@ def record_sensors(session: Session, recorder: Recorder, live: Live) -> None:
     session.sensors.deliver = deliver
 
 
-def belief_of(task: Task, plan: Plan) -> Belief:
-    """What the robot believes at the start of a run."""
-    return Belief(task.scene, task.true.scene, plan.planner.kinematics)
+def belief_of(task: Task, plan: Plan, session: Session) -> Belief:
+    """What the robot believes at the start of a run, or of a part of it."""
+    planner, state = plan.planner, task.part.state
+    belief = Belief(task.scene, task.true.scene, planner.kinematics)
+    if state is not None:
+        restore_belief(belief, state, planner, session)
+    return belief
 
 
 def record_belief(belief: Belief, recorder: Recorder) -> None:

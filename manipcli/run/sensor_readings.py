@@ -68,7 +68,7 @@ class SensorReadings:
     def picture(self, time: float, name: str, picture: Picture) -> None:
         """Keep a message of a camera that arrives at this tick."""
         sensed = self._sensed.get(name)
-        if sensed is None or not sensed.parts or picture.suffix != sensed.suffix:
+        if sensed is None or not sensed.parts or picture.suffix != sensed.picture:
             return
         self._pictures[name] = picture
         if name in self._followed:

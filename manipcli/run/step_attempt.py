@@ -13,12 +13,14 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
 from manipcli.model.state import WorldState
-from manipcli.plan.motion import Motion, PlanningState
+from manipcli.plan.motion import Look, Motion, PlanningState, StepPlan
+from manipcli.plan.prediction import put
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
 from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
+from manipcli.run.looking import Looking
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
@@ -45,6 +47,7 @@ class StepAttempt:
 
     Attributes:
         failed: whether the next step is re-planned, because one failed before it.
+        located: whether a believed pose was corrected since this was last reset: plans made before it do not hold.
         margin: of the last step that ended, and its unit; None where it has none.
         on_phase: called with the name of each motion that begins.
 
@@ -98,6 +101,8 @@ class StepAttempt:
         self._over = False
         self._at: PlannedStep | None = None
         self._attaching = Attaching(session, self._event)
+        self._looking = Looking(session, plan.planner, belief)
+        self.located = False
 
     def _look(self, state: WorldState) -> str:
         """At every tick: update the grasp and return the alarm."""
@@ -212,7 +217,10 @@ class StepAttempt:
                 over = deadline
                 if motion.awaits and until is not None and step.timeout is None:
                     over = _sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
-                end = yield from executor.running(motion, until=until, deadline=over)
+                if motion.looks is not None:
+                    end = yield from self._look_at(motion.looks, planned, over)
+                else:
+                    end = yield from executor.running(motion, until=until, deadline=over)
                 if end.outcome != "done":
                     held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
                     text = f"{motion.label}: {end.text}{missing(end, probe)}{f'; {held}' if held else ''}"
@@ -230,7 +238,7 @@ class StepAttempt:
                     self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
                 texts += [end.text + _no_longer(motion, probe)] if end.text else []
-            self._believed = planned.plan.end
+            self._believed = self._corrected(planned.plan)
             if awaited and until is not None:
                 if step.timeout is None:
                     deadline = _sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
@@ -245,6 +253,23 @@ class StepAttempt:
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
+        """Locate a body; its believed pose is then corrected and recorded."""
+        found = yield from self._looking.look(looks, lambda: self._measured.situation(self._believed), deadline)
+        if found.failure:
+            return MotionEnd("failed", found.failure)
+        self.located = True
+        name, tick = looks.object, self._session.ticks
+        self._recorder.believed(tick, name, self._belief.pose(name), self._belief.covariance(name))
+        self._event("located", planned, name, found.text)
+        self._report(found.text, detail=False)
+        return MotionEnd("done", found.text)
+
+    def _corrected(self, plan: StepPlan) -> PlanningState:
+        """The state after a plan, with what it located at its new pose."""
+        located = {motion.looks.object for motion in plan.motions if motion.looks is not None}
+        return put(self._plan.planner, plan.end, {name: self._belief.pose(name) for name in located})
 
     @contextmanager
     def _awaited(self, step: StepSpec) -> Iterator[Probe | None]:
@@ -366,7 +391,9 @@ def _sooner(a: float | None, b: float | None) -> float | None:
 
 def _moves(planned: PlannedStep) -> bool:
     """Whether a step has motions that depend on the state."""
-    return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
+    return any(
+        one is not None for motion in planned.plan.motions for one in (motion.trajectory, motion.grip, motion.looks)
+    )
 
 
 def missing(end: MotionEnd, probe: Probe | None) -> str:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
+from manipcli.control.roles import has_reflex
 from manipcli.core.errors import NotPlannable
 from manipcli.judge.verdict import StepOutcome, StepWord
 from manipcli.plan.block_tree import Unit
@@ -275,10 +276,12 @@ class StepLoop(StepAttempt):
             self._event("step_planned", planned, "", repr(planned.plan.duration))
 
     def _ended(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
-        """The end of an attempt, recorded; with the joints that lack effort, if it failed."""
+        """The end of an attempt, recorded; with what a reflex did, and the joints that lack effort if it failed."""
         if end.outcome != "done" and self._physics:
             short = effort_shortage(self._session, self._task.scene.gravity)
             end = replace(end, text=f"{short}; {end.text}") if short else end
+        pressed = [c.reflex.report() for c in self._session.manager.controllers if has_reflex(c)]
+        end = replace(end, text="; ".join(filter(None, (end.text, *pressed))))
         self._event("step_ended", planned, end.outcome, end.text)
         return end
 

@@ -164,6 +164,11 @@ class _Builder:
         if spec.cup is not None:
             if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
                 raise ValueError(f"wall of {spec.cup.wall:g} m is too thick: the cup has no interior")
+            handle = spec.cup.handle
+            if handle is not None and handle.height > spec.cup.height:
+                raise ValueError(f"handle of {handle.height:g} m is higher than the cup, {spec.cup.height:g} m")
+            if handle is not None and handle.thickness >= min(handle.reach, handle.height / 2.0):
+                raise ValueError(f"thickness of {handle.thickness:g} m leaves no room in the handle")
             return body_shapes.cup(spec.cup, rgba)
         if spec.tray is not None:
             x, y, z = spec.tray.size

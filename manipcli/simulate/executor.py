@@ -383,4 +383,5 @@ def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> Motio
 
 
 def _gripper_goal(gripper: Hand, grip: Grip) -> GripperGoal:
-    return GripperGoal(target=grip.target[[grip.joints.index(name) for name in gripper.joints]], force=grip.force)
+    target = grip.target[[grip.joints.index(name) for name in gripper.joints]]
+    return GripperGoal(target=target, force=grip.force, reflex=grip.reflex)

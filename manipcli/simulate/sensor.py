@@ -150,7 +150,7 @@ class SensorMember(Generic[S]):
             `velocity` and `effort` of these.
         remembers: the probe reads `SensorContext.before`, and on a body its velocities at every tick.
         needs_link: it must be on a link, not on a frame of the scene.
-        sensed: (spec, robot, scene) -> what conditions get of it, without `message`; None: no condition asks for it.
+        sensed: (spec, robot, scene) -> what conditions get of it, without `messages`; None: no condition asks for it.
     """
 
     name: str

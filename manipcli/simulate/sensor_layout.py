@@ -73,8 +73,8 @@ def sensed_by_name(sensors: Mapping[str, SensorSpec], robot: RobotModel, scene: 
         found[name] = Sensed(spec.type)
         if member.sensed is not None:
             sensed = member.sensed(spec, robot, scene)
-            types = {topic.suffix: topic.type for topic in member.topics(spec, robot)}
-            found[name] = replace(sensed, message=types.get(sensed.suffix, ""))
+            messages = {topic.suffix: topic.type for topic in member.topics(spec, robot)}
+            found[name] = replace(sensed, messages=messages)
     return found
 
 

@@ -18,9 +18,10 @@ import numpy as np
 from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
+from manipcli.control.grip_reflex import Pad
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager, JointVectors
-from manipcli.control.roles import is_hand, reads_sensors
+from manipcli.control.roles import has_reflex, is_hand, reads_sensors
 from manipcli.control.saturation import EFFORT, MotorLimits
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
@@ -29,6 +30,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import Engine
+from manipcli.simulate.hand_pads import hand_pads
 from manipcli.simulate.holder import Holder
 from manipcli.simulate.sensor_bank import NO_SENSORS, SensorBank
 from manipcli.spec.sensors import SensorSpec
@@ -108,6 +110,9 @@ class Session:
             if reads_sensors(controller):
                 asked = controller.sensors
                 controller.attach([bank.reading(r.sensor) if r.sensor else engine.sense_wrench(r.joint) for r in asked])
+            if has_reflex(controller) and (pads := hand_pads(sensors, robot, controller.joints)):
+                felt = [Pad(link, spec.at.transform.R, bank.reading(name)) for name, spec, link in pads]
+                controller.reflex.attach(robot, controller.joints, felt)
         n = len(robot.joint_names)
         self._contact_force = np.zeros(n)
         self._joint_of_part, self._followers = _joint_of_part(robot)

@@ -35,6 +35,14 @@ class CylinderSpec(Model):
     height: Size = Field(description="Height [m], 1 um to 100 m.")
 
 
+class HandleSpec(Model):
+    """A handle of three bars in the plane y = 0, on the side of x, half-way up."""
+
+    reach: Size = Field(description="From the outer radius of the cup to its outer side [m], 1 um to 100 m.")
+    height: Size = Field(description="Outer height [m], up to that of the cup.")
+    thickness: Size = Field(0.008, description="Thickness of the bars [m], less than half the height. Default 8 mm.")
+
+
 class CupSpec(Model):
     """An open cup: a floor disc and a ring of `segments` wall boxes; its frame is in the middle of its bottom."""
 
@@ -42,6 +50,9 @@ class CupSpec(Model):
     height: Size = Field(description="Outer height [m], 1 um to 100 m.")
     wall: Size = Field(0.004, description="Thickness of wall and floor [m], 1 um to 100 m. Default 4 mm.")
     segments: Annotated[int, Field(ge=6, le=64, description="Wall boxes, 6 to 64. Default 16.")] = 16
+    handle: HandleSpec | None = Field(
+        None, description="Handle; steps treat the cup as if it had none, but for collisions. Default: none."
+    )
 
 
 class TraySpec(Model):

@@ -30,7 +30,7 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
     """
     find = finder(path, package_path=package_path, allow_outside=allow_outside)
     source, _ = task_source(path, model=task_spec(), find=find)
-    names = {**_of_scene(source), "step": _steps(source)}
+    names = {**_of_scene(source), "step": _steps(source), "sensor": _keys(source, "sensors")}
     robot_file = _named(source, path, "robot")
     args = None
     if robot_file is not None:
@@ -46,6 +46,7 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
             names["link"] = {link.name for link in robot.links}
             names["group"] = {group.name for group in robot.groups}
             names["pose"] = {pose.name for pose in robot.poses}
+            names["sensor"] |= {*(file.spec.sensors or {})}
             names["part"] = {*names["body"], "robot", *links}
             names["frame"] |= {*links}
     controllers_file = _named(source, path, "controllers")
@@ -92,7 +93,7 @@ def _of_scene(source: Source) -> dict[NameKind, set[str]]:
 
 
 def _keys(source: Source, key: str) -> set[str]:
-    """The keys of a block of the task."""
+    """The keys of a mapping of the task."""
     node = child(source.root, key)
     return {*node.entries} if isinstance(node, MappingNode) else set()
 

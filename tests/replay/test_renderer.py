@@ -44,8 +44,8 @@ def test_a_png_file_holds_the_image() -> None:
 
 
 def test_bodies_are_where_the_camera_sees_them_in_their_colours() -> None:
-    with Renderer(draw(None, SCENE), size=(160, 120)) as renderer:
-        image = renderer.picture(Placing(None, SCENE).start(), FRONT)
+    renderer = Renderer(draw(None, SCENE), size=(160, 120))
+    image = renderer.picture(Placing(None, SCENE).start(), FRONT)
     assert image.shape == (120, 160, 3)
     # 2 m away, 40 deg from top to bottom: 120 pixels are 1.456 m, so y = 0.3 is 25 pixels to the right of the middle.
     assert image[60, 80 - 25].argmax() == 0  # seen from +x with z up, -y is to the left
@@ -62,8 +62,8 @@ def test_a_body_that_moved_is_drawn_where_it_is_now() -> None:
     swapped = placing.at(
         np.zeros(0), np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]]), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
     )
-    with Renderer(draw(None, SCENE), size=(160, 120)) as renderer:
-        image = renderer.picture(swapped, FRONT)
+    renderer = Renderer(draw(None, SCENE), size=(160, 120))
+    image = renderer.picture(swapped, FRONT)
     assert image[60, 80 + 25].argmax() == 0
     assert image[60, 80 - 25].argmax() == 2
 
@@ -80,8 +80,8 @@ def test_the_framing_has_everything_in_view_and_not_much_more(tmp_path: Path) ->
         camera = framing(drawing, poses)
         # Its distance is at least 0.1 m, so that the smallest things do not fill the picture.
         if scale >= 1.0:
-            with Renderer(drawing, size=(160, 120)) as renderer:
-                image = renderer.picture(poses, camera)
+            renderer = Renderer(drawing, size=(160, 120))
+            image = renderer.picture(poses, camera)
             strange = np.abs(image.astype(int) - sky(120)).max(axis=2) > 20
             rows, columns = np.flatnonzero(strange.any(axis=1)), np.flatnonzero(strange.any(axis=0))
             assert rows[0] > 1 and rows[-1] < 118 and columns[0] > 1 and columns[-1] < 158
@@ -91,16 +91,6 @@ def test_the_framing_has_everything_in_view_and_not_much_more(tmp_path: Path) ->
 def test_the_same_picture_is_the_same_bytes() -> None:
     drawn = []
     for _ in range(2):
-        with Renderer(draw(None, SCENE), size=(80, 60)) as renderer:
-            drawn.append(png_bytes(renderer.picture(Placing(None, SCENE).start(), FRONT)))
+        renderer = Renderer(draw(None, SCENE), size=(80, 60))
+        drawn.append(png_bytes(renderer.picture(Placing(None, SCENE).start(), FRONT)))
     assert drawn[0] == drawn[1]
-
-
-def test_a_surface_too_large_for_one_command_is_drawn_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    with Renderer(draw(None, SCENE), size=(80, 60)) as renderer:
-        whole = renderer.picture(Placing(None, SCENE).start(), FRONT)
-    monkeypatch.setattr("manipcli.replay.renderer.MAX_VERTICES", 900)  # the ball has 1106
-    with Renderer(draw(None, SCENE), size=(80, 60)) as renderer:
-        parts = renderer.picture(Placing(None, SCENE).start(), FRONT)
-    # The same outline; only the shading along the seam differs.
-    assert np.abs(whole.astype(int) - parts).max() < 40

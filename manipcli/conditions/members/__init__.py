@@ -21,6 +21,7 @@ from manipcli.conditions.members.rests_on import RESTS_ON
 from manipcli.conditions.members.saturation import SATURATION
 from manipcli.conditions.members.sees import SEES
 from manipcli.conditions.members.slip import SLIP
+from manipcli.conditions.members.slips import SLIPS
 from manipcli.conditions.members.step_done import STEP_DONE
 from manipcli.conditions.members.tool_speed import TOOL_SPEED
 from manipcli.conditions.members.touches import TOUCHES
@@ -35,6 +36,6 @@ CONDITIONS: Seam[Condition[Any]] = Seam(
     members=(
         INSIDE, OUTSIDE, UPRIGHT, NEAR, ABOVE, RESTS_ON, AT_REST, MOVED, UNMOVED, GRASPED, SLIP, CONTACT_FORCE,
         COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, SATURATION, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
-        TOUCHES, WRENCH, SEES,
+        TOUCHES, WRENCH, SEES, SLIPS,
     ),
 )  # fmt: skip

@@ -37,7 +37,7 @@ from manipcli.plan.planner import CLEARANCE, NOTHING, Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.reached_frames import reached_frames
 from manipcli.plan.step import StepMember
-from manipcli.plan.steps.grasp import GraspSpec
+from manipcli.plan.steps.grasp import GraspSpec, close, pressing_more, ungripped
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
@@ -230,13 +230,7 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             if bent.reason == "line":
                 lines.setdefault(frame, (distance, slope, builder.now.position))
             raise
-        builder.close(
-            spec.grasp.posture,
-            force=spec.grasp.force,
-            must_hold=spec.grasp.until == "contact",
-            body=spec.object,
-            roomier=_HIGHER,
-        )
+        close(builder, spec.grasp, planner, spec.object, roomier=_HIGHER)
         planned = builder.plan()
         planned = replace(planned, motions=(*before.motions, *planned.motions))
         if spec.grasp.until == "contact" and len(weak) < WEAK and not carries(planner, planned):
@@ -379,6 +373,7 @@ def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
         unmoved_tool(claims, robot, ("object",))
         + unmoved_hand(claims, robot, spec.grasp.posture, ("grasp", "posture"))
         + unmoved_hand(claims, robot, spec.open, ("open",))
+        + ungripped(spec.grasp, robot, claims, ("grasp", "reflex"))
     )
 
 
@@ -391,7 +386,7 @@ def clause(spec: PickSpec, robot: RobotModel) -> str:
         f"pick {named(spec.object)}{part}{approached(approach.from_, approach.pitch, approach.yaw, approach.frame)}: "
         f"open the hand (pose {named(spec.open)}), approach straight over {between(approach.distance, 'm')}, and close "
         f"the hand (pose {named(grasp.posture)}){height} until each finger presses with {amount(grasp.force, 'N')}"
-        f"{until}{at_share(spec.velocity_scaling, 1.0)}"
+        f"{until}{pressing_more(spec.grasp)}{at_share(spec.velocity_scaling, 1.0)}"
     )
 
 

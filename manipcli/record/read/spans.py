@@ -31,7 +31,7 @@ from manipcli.record.read.columns import (
 from manipcli.record.read.contacts import read_contacts
 from manipcli.record.read.differences import body_velocities
 from manipcli.record.read.scan import Record, chunk_at, guarded, readable
-from manipcli.record.read.sensed import SensedTopic, reading_topic
+from manipcli.record.read.sensed import SensedTopics, reading_topics
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span
 from manipcli.record.selection import common_stride
 
@@ -115,7 +115,7 @@ def with_readings(recording: Recording, sensors: Mapping[str, Sensed]) -> Record
     if not sensors or not isinstance(spans, FileSpans):
         return recording
     there = {*spans.channels.values()}
-    read = {name: sensed for name, sensed in sensors.items() if reading_topic(name, sensed) in there}
+    read = {name: sensed for name, sensed in sensors.items() if there.issuperset(reading_topics(name, sensed))}
     return replace(recording, spans=replace(spans, sensors=read), sensors=tuple(read))
 
 
@@ -196,8 +196,10 @@ class _SpanReader:
         self._grid_ns = common_stride(strides) * contents.period * 1e9
         self._strided = len(set(strides.values())) > 1
         self._contacts: list[ContactSnapshot] = []
-        self._sensors = {name: reading_topic(name, sensed) for name, sensed in sensors.items()}
-        self._sensed = {self._sensors[name]: SensedTopic(self._sensors[name], each) for name, each in sensors.items()}
+        self._sensors = {name: SensedTopics(name, sensed) for name, sensed in sensors.items()}
+        self._sensed = {
+            topic: self._sensors[name] for name, sensed in sensors.items() for topic in reading_topics(name, sensed)
+        }
         self._gaps = gaps
         self._points, self._skip = points, skip
         self._last = -1
@@ -234,7 +236,7 @@ class _SpanReader:
                 ]
             elif topic in self._sensed:
                 self._follow(topic, sequences(data, found))
-                self._sensed[topic].add(data, found)
+                self._sensed[topic].add(topic, data, found)
 
     def _follow(self, topic: str, numbers: Int) -> None:
         """Detect missing messages by their sequence numbers, which another program can restart at 0 or set to 0."""
@@ -278,10 +280,7 @@ class _SpanReader:
             ),
             contacts=self._contacts_until(time[-1] if ticks else np.inf),
             believed=_settled(believed),
-            readings={
-                name: self._sensed[topic].until(float(ns[-1]) if ticks else np.inf)
-                for name, topic in self._sensors.items()
-            },
+            readings={name: each.until(float(ns[-1]) if ticks else np.inf) for name, each in self._sensors.items()},
         )
 
     def _trace(self, topic: str, ns: Int, position: Array) -> list[Array]:

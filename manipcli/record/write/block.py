@@ -204,7 +204,7 @@ class Block:
         for stride in sorted(set(strides)):
             mine = [source for source, every in zip(sources, strides, strict=True) if every == stride]
             self._groups.append(_Group(stride, mine, capacity))
-        self._measured = np.zeros((capacity, max((s.first + s.width for s in sensors if s.filled), default=0)))
+        self._measured = np.zeros((capacity, max((s.first + s.width for s in sensors if s.width), default=0)))
         self._sensed: Array | None = None
         self._arrivals = [Arrivals(same, self._ids, capacity) for same in together(sensors, self._ids)]
 

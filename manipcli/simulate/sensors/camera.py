@@ -127,7 +127,7 @@ def frames(spec: CameraSpec) -> Mapping[str, Transform]:
 
 def sensed(spec: CameraSpec, robot: RobotModel, scene: Scene) -> Sensed:
     """How many pixels show each part, if it tells them apart."""
-    return Sensed("camera", messages.SEGMENTATION, parts=frame_names(robot, scene) if spec.segmentation else ())
+    return Sensed("camera", picture=messages.SEGMENTATION, parts=frame_names(robot, scene) if spec.segmentation else ())
 
 
 class CameraExposure:

@@ -84,7 +84,7 @@ def _check(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
 
 
 def _sensed(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Sensed:
-    return Sensed("contact", fields=(("force", 1),), forces=1, threshold=spec.threshold)
+    return Sensed("contact", fields=(("", "force", 1),), forces=1, threshold=spec.threshold)
 
 
 MEMBER = SensorMember(

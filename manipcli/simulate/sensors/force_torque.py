@@ -87,5 +87,5 @@ MEMBER = SensorMember(
     open=ForceTorque,
     check=_check,
     needs_link=True,
-    sensed=lambda spec, robot, scene: Sensed("force_torque", fields=(("wrench", 6),)),
+    sensed=lambda spec, robot, scene: Sensed("force_torque", fields=(("", "wrench", 6),)),
 )

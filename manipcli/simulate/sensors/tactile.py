@@ -152,7 +152,8 @@ def _check(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
 
 def _sensed(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Sensed:
     cells = spec.rows * spec.columns
-    return Sensed("tactile", fields=(("force", cells),), forces=cells)
+    fields = (("", "force", cells), ("/shear", "x", cells), ("/shear", "y", cells))
+    return Sensed("tactile", fields=fields if spec.shear else fields[:1], forces=cells, shear=bool(spec.shear))
 
 
 MEMBER = SensorMember(
