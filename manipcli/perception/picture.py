@@ -100,7 +100,7 @@ def cut(
     z[~(z > 0.0) | ~np.isfinite(z)] = np.nan
     z[np.isnan(z) & (behind[inside] == NOTHING)] = NOTHING
     part = Lens(z.shape[1], z.shape[0], lens.fx, lens.fy, lens.cx - columns.start, lens.cy - rows.start)
-    rays = np.asarray(part.points(np.ones_like(z)))
+    rays = np.asarray(part.points(np.ones_like(z)), dtype=np.float64)
     # A pixel may show what its neighbours were expected to show.
     floor = minimum_filter(behind, size=3)[inside] - NEARER * sigma
     with np.errstate(invalid="ignore"):

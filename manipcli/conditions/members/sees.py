@@ -26,7 +26,7 @@ class SeesSpec(Model):
         description="The camera, with `segmentation: true`; its last picture that arrived counts."
     )
     object: PartName = Field(description="A body, `robot` or `robot/LINK`.")
-    pixels: Annotated[int, Field(ge=1)] = Field(1, description="Least number of pixels, 1 or more.")
+    pixels: Annotated[int, Field(ge=1)] = Field(1, description="Least number of pixels, 1 or more. Default 1.")
 
 
 def monitor(spec: SeesSpec, world: World) -> Monitor:

@@ -76,8 +76,12 @@ class WrenchSpec(Model):
     """What a `force_torque` sensor measures, in its frame, is `below` and/or `above` a limit."""
 
     sensor: SensorRef = Field(description="The sensor; its last measurement that arrived counts.")
-    force: ForceLimits | None = Field(None, description="Limits of the force or of one of its components.")
-    torque: TorqueLimits | None = Field(None, description="Limits of the torque or of one of its components.")
+    force: ForceLimits | None = Field(
+        None,
+        description="`below` and/or `above` [N], and `axis`: `x`, `y` or `z` of the sensor frame, or `magnitude`. "
+        "Default: no limits.",
+    )
+    torque: TorqueLimits | None = Field(None, description="The same for the torque [N m]. Default: no limits.")
 
     @model_validator(mode="after")
     def _whole(self) -> WrenchSpec:

@@ -193,6 +193,8 @@ function furnishSenses() {
     label.title = remarks.join("\n") || "distances that range finders measured";
     shows.rays = true;
   }
+  // For scripts and tests.
+  root.beams = (t) => rays.map((finder) => [...(beams(finder, t) || [])]);
 }
 
 build = ((before) => () => { furnishSenses(); before(); })(build);
