@@ -21,6 +21,7 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.sensor import AnySensor
 from manipcli.simulate.sensor_bank import SensorBank
+from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.load import load_robot
 from manipcli.spec.sensors import SensorSpec
@@ -28,7 +29,7 @@ from manipcli.spec.sensors import SensorSpec
 ROBOT = Path(__file__).parents[2] / "robots" / "arm7_hand3" / "robot.yaml"
 NEEDED: dict[str, dict[str, Any]] = {
     "contact": {"threshold": 1.0},
-    "tactile": {"size": (0.1, 0.1), "rows": 2, "columns": 3},
+    "tactile": {"size": (0.1, 0.1), "rows": 2, "columns": 3, "shear": True},
 }
 """Keys without a default."""
 every_sensor = pytest.mark.parametrize("member", SENSORS.members, ids=SENSORS.names)
@@ -96,6 +97,16 @@ def test_its_message_takes_the_numbers_of_a_reading(member: AnySensor) -> None:
         assert message.header.frame_id == "place"
         found = [number for path in topic.filled for number in _numbers(getattr(message, path))]
         np.testing.assert_allclose(found, wanted[:first])
+
+
+@every_sensor
+def test_conditions_get_all_numbers_of_a_reading(member: AnySensor) -> None:
+    spec, nothing = spec_of(member), Scene(bodies=(), frames=(), gravity=np.zeros(3))
+    sensed = sensed_by_name({"it": spec}, robot(), nothing)["it"]
+    assert sensed.type == member.name
+    if member.sensed is not None:
+        assert sensed.width == sum(q.width for q in member.quantities(spec, robot()))
+        assert {*sensed.suffixes} <= {*sensed.messages}
 
 
 def _numbers(value: Any) -> list[float]:
