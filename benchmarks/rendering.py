@@ -29,8 +29,6 @@ from manipcli.render.scene_camera import SceneCamera, View
 from manipcli.render.stage import Stage
 from manipcli.simulate.camera_messages import points
 from manipcli.simulate.depth_noise import CameraLimits, CameraNoise, DepthMeasurement
-from manipcli.simulate.rasterizer import Light, Rasterizer
-from manipcli.simulate.rasterizer import View as Frustum
 from manipcli.task.load_task import load_task
 
 LENS = Lens.of_field(320, 240, math.radians(70.0))
@@ -95,24 +93,35 @@ def own(stage: Stage, state: WorldState, X_WC: Transform) -> Iterator[Row]:
 
 def tiny(stage: Stage, view: View, depth: Array) -> Iterator[Row]:
     """PyBullet's software renderer; the surfaces are placed in the optical frame."""
-    raster, near, far = Rasterizer(), 0.05, 10.0
-    meshes = [
-        raster.add(each.vertices, each.faces, each.normals, (*colour, 1.0))
-        for each, colour in zip(stage.surfaces, stage.colours, strict=True)
-    ]
-    quats = [Transform.of(R=R).quat_xyzw for R in view.rotation]
+    import pybullet
+
+    client, near, far = pybullet.connect(pybullet.DIRECT), 0.05, 10.0
+    meshes = []
+    for each, colour in zip(stage.surfaces, stage.colours, strict=True):
+        visual = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=each.vertices.tolist(),
+            indices=each.faces.ravel().tolist(),
+            normals=each.normals.tolist(),
+            rgbaColor=[*colour, 1.0],
+            physicsClientId=client,
+        )
+        meshes.append(pybullet.createMultiBody(0.0, -1, visual, physicsClientId=client))
+    quats = [Transform.of(R=R).quat_xyzw.tolist() for R in view.rotation]
     right, up = near * 160.0 / LENS.fx, near * 120.0 / LENS.fy
-    frustum = Frustum((0, 0, 0), (0, 0, 1), (0, -1, 0), -right, right, -up, up, near, far)
+    views = pybullet.computeViewMatrix((0, 0, 0), (0, 0, 1), (0, -1, 0))
+    projection = pybullet.computeProjectionMatrix(-right, right, -up, up, near, far)
 
     def work() -> Any:
-        for mesh, p, quat in zip(meshes, view.position, quats, strict=True):
-            raster.place(mesh, p, quat)
-        return raster.render((320, 240), frustum, Light((0.35, 0.55, 1.0), 0.62, 0.42, 0.08))
+        for mesh, p, quat in zip(meshes, view.position.tolist(), quats, strict=True):
+            pybullet.resetBasePositionAndOrientation(mesh, p, quat, physicsClientId=client)
+        tiny = pybullet.ER_TINY_RENDERER
+        return pybullet.getCameraImage(320, 240, views, projection, shadow=0, renderer=tiny, physicsClientId=client)
 
-    _, buffer, seen = work()
-    found = np.where(seen, far * near / (far - (far - near) * buffer), np.inf)
+    buffer, seen = (np.reshape(each, (240, 320)) for each in work()[3:5])
+    found = np.where(seen >= 0, far * near / (far - (far - near) * buffer), np.inf)
     yield "PyBullet's TinyRenderer, with the placing of the meshes", milliseconds(work), difference(depth, found)
-    raster.close()
+    pybullet.disconnect(client)
 
 
 def embree(vertices: Array, faces: Array, depth: Array) -> Iterator[Row]:

@@ -98,8 +98,8 @@ def draw(
         ManipcliError: the log has nothing to draw, or a mesh is missing.
     """
     playback = open_playback(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
-    with Frames(playback, size=SIZE) as frames:
-        image = frames.at(playback.end if at is None else min(max(at, playback.start), playback.end))
+    frames = Frames(playback, size=SIZE)
+    image = frames.at(playback.end if at is None else min(max(at, playback.start), playback.end))
     write_whole(picture, png_bytes(image))
 
 

@@ -104,11 +104,9 @@ class Pictures:
         from manipcli.replay.renderer import SIZE, png_bytes
 
         when = moment(playback, self.at or "end")
-        with (
-            whole_file(path) as partial,
-            Frames(playback, size=self._size(SIZE), towards=self._towards()) as frames,
-        ):
-            console.not_drawn(frames.missing)
+        frames = Frames(playback, size=self._size(SIZE), towards=self._towards())
+        console.not_drawn(frames.missing)
+        with whole_file(path) as partial:
             partial.write_bytes(png_bytes(frames.at(when)))
 
     def _sheet(self, path: Path, playback: Playback) -> None:
@@ -127,13 +125,13 @@ class Pictures:
         fps, speed = self._pace
         video = Video.of(playback, fps=fps, speed=speed)
         began = time.monotonic()
-        with Frames(playback, size=self._size(SIZE), towards=self._towards()) as frames:
-            console.not_drawn(frames.missing)
-            try:
-                write_video(path, frames, video, progress=_progress_line(began) if console.is_live() else None)
-            finally:
-                if console.is_live():
-                    console.redraw("")
+        frames = Frames(playback, size=self._size(SIZE), towards=self._towards())
+        console.not_drawn(frames.missing)
+        try:
+            write_video(path, frames, video, progress=_progress_line(began) if console.is_live() else None)
+        finally:
+            if console.is_live():
+                console.redraw("")
         rate = len(video.times) / max(time.monotonic() - began, 1e-9)
         console.talk(f"{len(video.times)} frames, {video.duration:.2f} s, drawn at {rate:.1f} frames/s")
 

@@ -16,6 +16,8 @@ def condition_clause(spec: ConditionSpec, robot: RobotModel, seam: Seams) -> str
     inner = [condition_clause(member, robot, seam) for member in spec.members]
     if spec.name == "not":
         return f"it is not true that {inner[0]}"
+    if spec.name == "believed":
+        return f"the robot believes that {inner[0]}"
     if len(inner) == 1:
         return inner[0]
     if any(len(member.members) > 1 for member in spec.members):

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.sensed import NO_SENSORS, Sensed
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc, Severity
 from manipcli.core.text import did_you_mean
@@ -28,7 +29,7 @@ S = TypeVar("S", bound=Model)
 Scope = Literal["end", "always"]
 """Default time of an expectation: up to the end of the run, or all the time."""
 
-Seen = Literal["bodies", "contacts", "references"]
+Seen = Literal["bodies", "contacts", "references", "sensors"]
 """What `record:` can leave out of a log."""
 
 Monitor = Callable[[StateWindow], Robustness]
@@ -45,10 +46,12 @@ class World:
         scene: body arrays of the state have its body order.
         start: the state at time 0 (no leading axes), for words such as `to: start`.
         physics: False for an engine without motion of bodies and without contacts.
-        unrecorded: reason why motions of bodies, contacts or references are not in the log.
+        unrecorded: reason why motions of bodies, contacts, references or readings of sensors are not in the log.
         referenced: joints with a recorded reference.
         steps: ids of the steps.
         period: [s] between two ticks in a state window.
+        belief: the world as the robot believes it, for windows of `StateWindow.belief`; None: it is this one.
+        sensors: whose readings are in the state windows if a condition asks for them.
     """
 
     robot: RobotModel
@@ -59,6 +62,8 @@ class World:
     referenced: frozenset[str] = frozenset()
     steps: tuple[str, ...] = ()
     period: float = 0.0
+    belief: World | None = None
+    sensors: Mapping[str, Sensed] = field(default_factory=lambda: NO_SENSORS)
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -78,6 +83,7 @@ class CheckContext:
         in_order: True if `steps` is complete and in order; else it holds every possible id, unordered.
         self_collision: whether links of the robot collide with each other in the simulation.
         blocks: the ids of its blocks.
+        sensors: of the task and its robot; None: unknown.
     """
 
     robot: RobotModel
@@ -86,6 +92,7 @@ class CheckContext:
     in_order: bool = True
     self_collision: bool = True
     blocks: tuple[str, ...] = ()
+    sensors: Mapping[str, Sensed] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +133,7 @@ class Condition(Generic[S]):
         stateless: True if it uses only contacts and steps, which are known at every tick, also in a log with fewer
             states than ticks.
         live: False if it is known only from a recording: then it is for `expect` alone.
+        sensor: spec -> the sensor whose readings it asks for; None for a condition on no sensor.
     """
 
     name: str
@@ -139,6 +147,7 @@ class Condition(Generic[S]):
     scope: Scope = "end"
     stateless: bool = False
     live: bool = True
+    sensor: Callable[[S], str] | None = None
 
 
 def unmoving(world: World, bodies: Sequence[str]) -> str | None:

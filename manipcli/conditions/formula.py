@@ -1,4 +1,4 @@
-"""Combinations of conditions: monitors, checks and scopes of formulas with `all`, `any` and `not`.
+"""Combinations of conditions: monitors, checks and scopes of formulas with `all`, `any`, `not` and `believed`.
 
 all: [{upright: {...}}, {any: [{near: {...}}, {not: {inside: {...}}}]}]
 """
@@ -13,7 +13,7 @@ from manipcli.conditions.robustness import Robustness, greatest, least, named, o
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc
 from manipcli.core.registry import Seam
-from manipcli.spec.condition import ConditionSpec
+from manipcli.spec.condition import SINGLE, ConditionSpec
 
 # Any: the members of a seam have different specs; each is called with its own.
 Seams = Seam[Condition[Any]]
@@ -25,6 +25,8 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
         member = seam[spec.name]
         monitor: Monitor = member.open(spec.body, world)
         return monitor
+    if spec.name == "believed":
+        return believing(spec.members[0], world, seam)
     members = [_named(member, opened(member, world, seam)) for member in spec.members]
 
     def look(window: StateWindow) -> Robustness:
@@ -34,6 +36,13 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
         return least(readings) if spec.name == "all" else greatest(readings)
 
     return look
+
+
+def believing(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
+    """The monitor of a condition on what the robot believes."""
+    monitor = opened(spec, world.belief or world, seam)
+    named_so = _named(spec, monitor)
+    return lambda window: named_so(window.belief or window)
 
 
 def _named(spec: ConditionSpec, monitor: Monitor) -> Monitor:
@@ -55,7 +64,7 @@ def problems(spec: ConditionSpec, context: CheckContext, seam: Seams) -> tuple[P
     found: list[Problem] = []
     if spec.combines:
         for k, member in enumerate(spec.members):
-            loc: Loc = (spec.name,) if spec.name == "not" else (spec.name, k)
+            loc: Loc = (spec.name,) if spec.name in SINGLE else (spec.name, k)
             found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(member, context, seam)]
         return tuple(found)
     own = seam[spec.name].check(spec.body, context)
@@ -73,6 +82,12 @@ def scopes(spec: ConditionSpec, seam: Seams) -> dict[Scope, str]:
 def units_of(spec: ConditionSpec, seam: Seams) -> tuple[str, ...]:
     """The SI units that its margin can have, without duplicates."""
     return tuple(dict.fromkeys(unit for leaf in leaves(spec) for unit in seam[leaf.name].units))
+
+
+def sensors_of(spec: ConditionSpec, seam: Seams) -> tuple[str, ...]:
+    """The sensors whose readings it asks for, without duplicates."""
+    asked = ((seam[leaf.name].sensor, leaf.body) for leaf in leaves(spec))
+    return tuple(dict.fromkeys(sensor(body) for sensor, body in asked if sensor is not None))
 
 
 def leaves(spec: ConditionSpec) -> Iterator[ConditionSpec]:

@@ -6,12 +6,13 @@ condition gives the same margins in both cases.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.conditions.sensed import Readings
 from manipcli.core.geometry import Array, rotation_between
 from manipcli.model.state import Contact, WorldState
 
@@ -55,6 +56,8 @@ class StateWindow:
         references: of every recorded controller.
         contacts: changes of the contacts, in order; the first may be older than the first tick and is valid there.
         steps: all steps of the task.
+        belief: the same ticks with the body poses that the robot believes; None: they are those of this window.
+        readings: of the sensors that conditions ask for, by name; the first may be older than the first tick.
     """
 
     states: WorldState
@@ -62,6 +65,8 @@ class StateWindow:
     references: tuple[Reference, ...]
     contacts: tuple[Touching, ...]
     steps: tuple[StepTime, ...]
+    belief: StateWindow | None = None
+    readings: Mapping[str, Readings] = field(default_factory=dict)
 
     @property
     def times(self) -> Array:
@@ -79,6 +84,7 @@ class StateWindow:
             before=self.states.map(lambda a: a[first - 1]) if first > 0 else self.before,
             references=tuple(Reference(r.joints, r.position[first:last]) for r in self.references),
             contacts=self.contacts[max(valid, 0) :],
+            belief=None if self.belief is None else self.belief.part(first, last),
         )
 
     def touching(self, k: int) -> tuple[Contact, ...]:

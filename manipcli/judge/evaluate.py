@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -11,9 +11,11 @@ import numpy as np
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import Seams, leaves
 from manipcli.conditions.robustness import NotEvaluated
+from manipcli.conditions.sensed import Sensed
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
+from manipcli.judge.located import Correction, Corrections
 from manipcli.judge.self_contacts import SelfContact, SelfContacts
 from manipcli.judge.state_windows import Order, WindowsOfSpans, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
@@ -25,12 +27,13 @@ from manipcli.spec.condition import ExpectationSpec
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """The outcome of each expectation, the time [s] of the last recorded state, and the contacts of the robot with
-    itself."""
+    """The outcome of each expectation, the time [s] of the last recorded state, the contacts of the robot with itself,
+    and the corrections of what it believes."""
 
     outcomes: tuple[ExpectationOutcome, ...]
     end: float
     self_contacts: tuple[SelfContact, ...]
+    located: tuple[Correction, ...]
 
 
 def examine(
@@ -42,9 +45,10 @@ def examine(
     seam: Seams,
     physics: bool,
     steps: tuple[StepOutcome, ...],
+    sensors: Mapping[str, Sensed],
     until: float = inf,
 ) -> Examined:
-    """The outcomes of `expect` before the time `until` [s].
+    """The outcomes of `expect` before the time `until` [s]; `sensors`: of the task.
 
     Every span is read, even without expectations, so damage anywhere in the file is detected. Only the last half second
     is kept in memory.
@@ -55,9 +59,10 @@ def examine(
     stateless = [all(seam[leaf.name].stateless for leaf in leaves(expectation.condition)) for expectation in expect]
     last: StateWindow | None = None
     end = judged = 0.0
-    self_contacts = SelfContacts()
+    self_contacts, located = SelfContacts(), Corrections(recording)
     for span in recording.spans:
         self_contacts.add(span.contacts)
+        located.add(span)
         if span.states.time.size == 0:
             continue
         end = float(span.states.time[-1])
@@ -65,16 +70,21 @@ def examine(
             continue
         if successive is None:
             successive = WindowsOfSpans(order, steps)
+            states = order.applied(span.states)
+            believed = order.belief(states, span.believed)
             world = World(
                 robot,
                 scene,
-                start=order.applied(span.states).map(lambda a: a[0]),
+                start=states.map(lambda a: a[0]),
                 physics=physics,
                 unrecorded=unrecorded(recording),
                 referenced=frozenset(name for trace in span.controllers for name in trace.joints),
                 steps=tuple(step.id for step in steps),
                 period=_period(span.states.time, recording.period),
+                sensors={name: sensors[name] for name in recording.sensors},
             )
+            if believed is not None:
+                world = replace(world, belief=replace(world, start=believed.map(lambda a: a[0])))
             asked = [Expected(expectation, world, steps, seam) for expectation in expect]
         window = successive.next(span)
         if window.times[0] >= until - ROUNDING:
@@ -87,9 +97,9 @@ def examine(
     names = labels(expect)
     if successive is None:
         missing = order if isinstance(order, NotEvaluated) else NotEvaluated("no tick was recorded")
-        return Examined(tuple(outcome(name, missing) for name in names), end, self_contacts.found())
+        return Examined(tuple(outcome(name, missing) for name in names), end, self_contacts.found(), located.found())
     found = (outcome(name, expected.found(judged)) for name, expected in zip(names, asked, strict=True))
-    return Examined(tuple(found), end, self_contacts.found())
+    return Examined(tuple(found), end, self_contacts.found(), located.found())
 
 
 def _period(times: Array, control: float) -> float:

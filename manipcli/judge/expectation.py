@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manipcli.conditions.condition import CheckContext, Problem, World
-from manipcli.conditions.formula import Seams, absent, leaves, opened, problems, scopes
+from manipcli.conditions.formula import Seams, absent, believing, leaves, opened, problems, scopes
 from manipcli.conditions.members.step_done import StepDoneSpec
 from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Robustness, never
 from manipcli.conditions.state_window import ROUNDING, StateWindow
@@ -102,7 +102,8 @@ class Expected:
             self._never = found
             return
         self._when = found
-        self._monitor = opened(spec.condition, world, seam)
+        about = believing if isinstance(spec, WatchSpec) else opened  # a watch is asked of the robot, during the run
+        self._monitor = about(spec.condition, world, seam)
 
     def look(self, window: StateWindow) -> None:
         """Evaluate the next ticks."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
 
 from manipcli.conditions.members import CONDITIONS
+from manipcli.conditions.sensed import NO_SENSORS, Sensed
 from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
@@ -35,6 +36,7 @@ def judge(
     robot: RobotModel,
     scene: Scene,
     implied: Sequence[ExpectationSpec] = (),
+    sensors: Mapping[str, Sensed] = NO_SENSORS,
 ) -> Verdict:
     """Judge a recording against the expectations of its task.
 
@@ -50,6 +52,7 @@ def judge(
         robot, scene: built from the attachments of the log.
         implied: expectations that the task does not write; they fail the run, but are not part of its expectations.
             One that cannot be evaluated is dropped.
+        sensors: of the task, whose readings the recording has.
     """
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")
@@ -63,6 +66,7 @@ def judge(
         scene=scene,
         seam=CONDITIONS,
         physics=run.get("physics", "") == "full",
+        sensors=sensors,
         steps=tuple(step for step in steps if not step.excused or step.started is None),  # without those of clients
         until=next((event.time for event in recording.events if event.kind == STEPS_ENDED), inf),
     )
@@ -88,6 +92,7 @@ def judge(
         drawn=_drawn(recording),
         saturations=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
         self_contacts=examined.self_contacts,
+        located=examined.located,
         holding=tuple(dict.fromkeys(event.text for event in recording.events if event.kind == "attached")),
         part=part,
         blocks=block_outcomes(recording, interrupted=bool(errors)),

@@ -9,6 +9,7 @@ from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Diagnostic
 from manipcli.core.refused_candidates import RefusedCandidates
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.located import Correction
 from manipcli.judge.part import RunPart
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.self_contacts import SelfContact
@@ -166,6 +167,7 @@ class Verdict:
         drawn: the sample of the task's `vary:`; None: the task as written.
         saturations: saturation of joints and actuators.
         self_contacts: the pairs of links of the robot that pressed on each other.
+        located: corrections of the believed poses of bodies.
         holding: what held objects by an attachment instead of friction, one text per object and kind.
         candidates: the refused candidates of a task without a plan.
         implied: outcomes of the expectations that every task has unless it sets them otherwise (`saturation`).
@@ -185,6 +187,7 @@ class Verdict:
     drawn: Drawn | None = None
     saturations: Saturations = field(default_factory=Saturations)
     self_contacts: tuple[SelfContact, ...] = ()
+    located: tuple[Correction, ...] = ()
     holding: tuple[str, ...] = ()
     candidates: tuple[RefusedCandidates, ...] = ()
     implied: tuple[ExpectationOutcome, ...] = ()

@@ -21,7 +21,7 @@ from manipcli.live.interfaces import (
 )
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.record import schemas
-from manipcli.record.channels import LIVE_COMMANDS, Recorded, channel_table
+from manipcli.record.channels import LIVE_COMMANDS, MeasuredChannel, Recorded, channel_table
 from manipcli.task.task import Task
 
 INTERFACES: Final = (
@@ -44,9 +44,11 @@ def endpoints_of(task: Task, loaded: Sequence[Controller]) -> tuple[Endpoint, ..
     return tuple(endpoint for interface in INTERFACES for endpoint in interface(task, loaded))
 
 
-def offer_of(endpoints: Iterable[Endpoint], recorded: Sequence[Recorded]) -> Offer:
-    """The offer with these endpoints; `recorded`: channels of controllers in the log."""
-    table = [channel for channel in channel_table(recorded) if channel.topic != LIVE_COMMANDS]
+def offer_of(
+    endpoints: Iterable[Endpoint], recorded: Sequence[Recorded], sensors: Sequence[MeasuredChannel] = ()
+) -> Offer:
+    """The offer with these endpoints; `recorded`, `sensors`: channels of controllers and of sensors in the log."""
+    table = [channel for channel in channel_table(recorded, sensors=sensors) if channel.topic != LIVE_COMMANDS]
     names: dict[str, dict[str, str]] = {"topic": {}, "action": {}, "service": {}}
     for endpoint in endpoints:
         names[endpoint.kind][endpoint.name] = endpoint.type
@@ -57,4 +59,5 @@ def offer_of(endpoints: Iterable[Endpoint], recorded: Sequence[Recorded]) -> Off
         actions=names["action"],
         services=names["service"],
         readers=frozenset(endpoint.name for endpoint in endpoints if endpoint.reads),
+        pictures=tuple(sensor.topic for sensor in sensors if not sensor.filled),
     )

@@ -20,22 +20,24 @@ from typing import Final
 
 from manipcli.live.command import SEND_GOAL, Answer, Command, nobody
 from manipcli.live.lanes import left_after, stop_first
+from manipcli.live.pictures import MAX_PICTURE, PictureQueue
 
 HEAD: Final = struct.Struct("<I")
-TICK, TAKEN, SENT, WANTED = range(4)
+TICK, TAKEN, SENT, WANTED, SENSED = range(5)
 """Shared numbers: the last tick and the commands taken, of the loop; the commands sent, and whether somebody wants
-samples, of the network."""
+samples, and in them the measurements of sensors, of the network. See also `pictures.py`."""
 WAITING: Final = 1000
 """Most commands that wait for the next tick, besides those that change nothing."""
 KEPT_SAMPLES: Final = 50
 KEPT_MESSAGES: Final = 1000
 """Samples, and messages of events, that wait for the socket; the oldest are dropped."""
 SAMPLE, EVENT, ANSWER, CLOSE, DROPPED = "sample", "event", "answer", "close", "dropped"
+PICTURE, TOO_LARGE = "picture", "too large"
 
 
 def shared_numbers(descriptor: int) -> memoryview:
-    """The shared numbers in the file of a descriptor of at least one page."""
-    return memoryview(mmap.mmap(descriptor, mmap.PAGESIZE)).cast("q")
+    """The shared numbers in the file of a descriptor, all of it."""
+    return memoryview(mmap.mmap(descriptor, 0)).cast("q")
 
 
 def framed(body: bytes) -> bytes:
@@ -61,13 +63,14 @@ class Link:
     Args:
         end: of the socket.
         numbers: see `shared_numbers`.
+        pictures: topics of cameras.
 
     Attributes:
         lost: whether the process of the network has ended.
         dropped: samples and messages that the network did not take in time.
     """
 
-    def __init__(self, end: socket.socket, numbers: memoryview) -> None:
+    def __init__(self, end: socket.socket, numbers: memoryview, pictures: Sequence[str] = ()) -> None:
         end.setblocking(False)
         self.numbers = numbers
         self.lost = False
@@ -76,6 +79,7 @@ class Link:
         self._answers: deque[bytes] = deque()
         self._events: deque[bytes] = deque()
         self._samples: deque[bytes] = deque()
+        self._pictures = PictureQueue(pictures, numbers)
         self._rest = memoryview(b"")
         self._waits = False
         self._received = bytearray()
@@ -84,9 +88,19 @@ class Link:
         self._batch: list[Command] = []
         self._reads: deque[Command] = deque()
 
-    def sample(self, tick: int, numbers: object, outputs: Sequence[object]) -> None:
+    def sample(self, tick: int, numbers: object, outputs: Sequence[object], sensed: object = None) -> None:
         """Send the state of a tick: see `Sample`."""
-        self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, outputs))
+        self._put(self._samples, KEPT_SAMPLES, (SAMPLE, tick, numbers, outputs, sensed))
+
+    def picture(self, topic: str, ns: int, data: bytes) -> None:
+        """Send a message of a camera, as `event`, if the network asked for it and it is not too large."""
+        if not self._pictures.wants(topic, ns):
+            return
+        if len(data) > MAX_PICTURE:
+            self._put(self._events, KEPT_MESSAGES, (TOO_LARGE, topic, len(data)))
+            return
+        self._pictures.put(topic, ns, data)
+        self._waits = True
 
     def event(self, topic: str, ns: int, data: bytes) -> None:
         """Send a message of the log; `ns`: simulated time [ns]; `data`: CDR.
@@ -99,7 +113,8 @@ class Link:
         self._put(self._events, KEPT_MESSAGES, (EVENT, topic, ns, data))
 
     def close(self) -> None:
-        """Let the process of the network end; what waits is sent before, for one second."""
+        """Let the process of the network end; what waits but for pictures is sent before, for one second."""
+        self._pictures.clear()
         self._put(self._events, KEPT_MESSAGES, (CLOSE,))
         until = time.monotonic() + 1.0
         while self._waits and not self.lost and time.monotonic() < until:
@@ -175,16 +190,20 @@ class Link:
         self._flush()
 
     def _flush(self) -> None:
-        """Send what the socket takes: answers, events, samples."""
-        self._waits = True
+        """Send what the socket takes: answers, events, samples, one part of a picture."""
+        self._waits, parts = True, 1
         try:
             while not self.lost:
                 if not self._rest:
                     queue = self._answers or self._events or self._samples
-                    if not queue:
-                        self._waits = False
+                    if queue:
+                        self._rest = memoryview(queue.popleft())
+                    elif parts and self._pictures:
+                        parts -= 1
+                        self._rest = memoryview(framed(pickle.dumps((PICTURE, *self._pictures.part()), 5)))
+                    else:
+                        self._waits = bool(self._pictures)
                         return
-                    self._rest = memoryview(queue.popleft())
                 self._rest = self._rest[self._end.send(self._rest, socket.MSG_NOSIGNAL) :]
         except BlockingIOError:
             pass

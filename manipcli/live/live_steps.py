@@ -240,7 +240,7 @@ class LiveSteps:
         if self._loop is None:
             self._loop = StepLoop(
                 task, plan, self._session, self._recorder, self._live, self._progress, on_goal=self._observer.goal,
-                replanning=self.planning,
+                replanning=self.planning, belief=self._observer.belief,
             )  # fmt: skip
         else:
             self._loop.turn_to(task, plan)

@@ -24,7 +24,15 @@ from manipcli.live.pace import Pace, Share
 from manipcli.live.play_state import Reset
 from manipcli.live.source import Source
 from manipcli.record.write.recorder import Recorder
-from manipcli.run.execute import SimulationEnd, live_world, open_session, record_saturations, record_sensors
+from manipcli.run.execute import (
+    SimulationEnd,
+    belief_of,
+    live_world,
+    open_session,
+    record_belief,
+    record_saturations,
+    record_sensors,
+)
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import SILENT, Observer, Progress
 from manipcli.simulate.quiet import original_stdout
@@ -145,12 +153,15 @@ def simulate_live(
     replanning = 0.0
     try:
         with open_session(task, plan, manager, LiveSession) as session:
-            live = Live(live_world(task, plan, session), manager.controllers, session.period)
+            belief = belief_of(task, plan, session)
+            live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
             runs = task.part.last is None
-            observer = Observer(recorder, live, progress if runs else SILENT, session.period)
+            observer = Observer(recorder, live, progress if runs else SILENT, session.period, belief)
             outside.feed.observer = observer
             session.restart_clock(outside.feed)
-            record_sensors(session, recorder)
+            record_sensors(session, recorder, live)
+            record_belief(belief, recorder)
+            outside.feed.attach(session.sensors.numbers)
             recorder.listener = outside.feed.message
             recorder.event(0, kind="session_started", step="", verb="", outcome="", text=STARTED, place="")
             steps = LiveSteps(task, plan, session, recorder, live, observer, progress, outside.pace)

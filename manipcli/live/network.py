@@ -12,6 +12,7 @@ import json
 import pickle
 import socket
 import sys
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AsyncExitStack, contextmanager
@@ -20,20 +21,36 @@ from functools import partial
 from typing import Any, Final
 
 from manipcli.core.errors import InvalidInput
+from manipcli.core.geometry import Transform
 from manipcli.live.access import Access
 from manipcli.live.command import Command
 from manipcli.live.connection import Services
 from manipcli.live.drops import drop_line
-from manipcli.live.link import ANSWER, DROPPED, EVENT, HEAD, SAMPLE, TICK, WANTED, complete, framed, shared_numbers
+from manipcli.live.link import (
+    ANSWER,
+    DROPPED,
+    EVENT,
+    HEAD,
+    PICTURE,
+    SAMPLE,
+    SENSED,
+    TICK,
+    TOO_LARGE,
+    WANTED,
+    complete,
+    framed,
+    shared_numbers,
+)
 from manipcli.live.offer import Offer
 from manipcli.live.outlet import Network, Outlet, OutletOptions
 from manipcli.live.pending import Pending
+from manipcli.live.pictures import MAX_PICTURE, PictureRequests
 from manipcli.live.publisher import Publisher
 from manipcli.live.rosapi import Rosapi
 from manipcli.live.sample import Event, Sample
 from manipcli.live.server import LiveServer
 from manipcli.model.robot import RobotModel
-from manipcli.record.channels import ROSOUT, Recorded
+from manipcli.record.channels import ROSOUT, MeasuredChannel, Recorded
 from manipcli.scene.scene import Scene
 
 KEPT: Final = 20
@@ -53,6 +70,8 @@ class Setup:
     port: int
     outlets: Sequence[OutletOptions] = ()
     title: str = ""
+    sensors: Sequence[MeasuredChannel] = ()
+    frames: Sequence[tuple[str, str, Transform]] = ()
 
 
 class _Stream(asyncio.Protocol):
@@ -61,11 +80,13 @@ class _Stream(asyncio.Protocol):
     def __init__(self) -> None:
         self.events: deque[Event] = deque()
         self.samples: deque[Sample] = deque(maxlen=KEPT)
+        self.pictures: deque[Event] = deque()
+        self.too_large: dict[str, int] = {}
         self.something = asyncio.Event()
         self.over = asyncio.Event()
         self.dropped = 0
         self.answered: Callable[..., None] = lambda *_: None
-        self._received = bytearray()
+        self._received, self._picture = bytearray(), bytearray()
 
     def data_received(self, data: bytes) -> None:
         self._received += data
@@ -76,6 +97,10 @@ class _Stream(asyncio.Protocol):
                 self.samples.append(Sample(*values))
             elif kind == EVENT:
                 self.events.append(Event(*values))
+            elif kind == PICTURE:
+                self._part(*values)
+            elif kind == TOO_LARGE:
+                self.too_large[values[0]] = values[1]
             elif kind == DROPPED:
                 self.dropped += values[0]
             elif kind == ANSWER:
@@ -84,6 +109,12 @@ class _Stream(asyncio.Protocol):
             else:
                 self.over.set()
         self.something.set()
+
+    def _part(self, topic: str, ns: int, part: bytes, last: bool) -> None:
+        self._picture += part
+        if last:
+            self.pictures.append(Event(topic, ns, bytes(self._picture)))
+            self._picture.clear()
 
     def connection_lost(self, error: Exception | None) -> None:
         self.over.set()
@@ -102,12 +133,13 @@ def reported(consequence: str, drop: Callable[[], object] = lambda: None) -> Ite
 class Hub:
     """Hands samples and events to the server and the outlets; an outlet that raises is dropped."""
 
-    def __init__(self, publisher: Publisher, stream: _Stream, numbers: memoryview) -> None:
+    def __init__(self, publisher: Publisher, stream: _Stream, numbers: memoryview, requests: PictureRequests) -> None:
         self._publisher, self._stream, self._numbers = publisher, stream, numbers
         self._texts = {topic: publisher.text(topic, data) for topic, data in publisher.latched.items()}
         self.server: LiveServer | None = None
         self.outlets: list[Outlet] = []
         self._wanted: set[str] = set()
+        self._requests = requests
 
     def latched(self, topic: str) -> str | None:
         """The last text of a latched topic; None before its first message."""
@@ -124,6 +156,8 @@ class Hub:
 
         self._for_outlets(ask)
         self._numbers[WANTED] = any(watches) or not self._publisher.sampled.isdisjoint(self._wanted)
+        self._numbers[SENSED] = not self._publisher.sensed.topics.isdisjoint(self._wanted)
+        self._requests.want(self._wanted)
 
     async def run(self) -> None:
         """Make each message once, for all who take it."""
@@ -138,14 +172,43 @@ class Hub:
             while stream.samples:
                 self._sample(stream.samples.popleft())
                 await asyncio.sleep(0)
+            if stream.pictures:
+                self._picture(stream.pictures.popleft())
+                stream.something.set()
+            if stream.too_large:
+                self._refuse(*stream.too_large.popitem())
+                stream.something.set()
+
+    def _picture(self, event: Event) -> None:
+        """A message of a camera, for those who take it now."""
+        topic, takers = event.topic, 0
+        if self.server is not None and topic in self.server.due():
+            takers = self.server.publish(topic, self._publisher.text(topic, event.data))
+
+        def hand(outlet: Outlet) -> None:
+            nonlocal takers
+            if topic in outlet.wanted():
+                takers += 1
+                outlet.message(topic, event.ns, event.data)
+
+        self._for_outlets(hand)
+        self._requests.handled(topic, max(1, takers) * len(event.data))
+
+    def _refuse(self, topic: str, size: int) -> None:
+        """Report a message of a camera that nobody gets."""
+        text = f"{topic}: {1e-6 * size:.1f} MB are too large for clients, more than {1e-6 * MAX_PICTURE:.1f} MB"
+        self._report(f"{text}; lower the resolution, or read the log")
+        self._requests.handled(topic, size)
+
+    def _report(self, text: str) -> None:
+        if self.server is not None:
+            self.server.publish(ROSOUT, drop_line(text, self._publisher.clock(self._numbers[TICK])))
 
     def _report_drops(self) -> None:
         """With the next event: what the network was too slow to take."""
         count, self._stream.dropped = self._stream.dropped, 0
-        if count and self.server is not None:
-            stamp = self._publisher.clock(self._numbers[TICK])
-            text = f"{count} samples and messages of the session were dropped: the server is too slow"
-            self.server.publish(ROSOUT, drop_line(text, stamp))
+        if count:
+            self._report(f"{count} samples and messages of the session were dropped: the server is too slow")
 
     def _event(self, event: Event) -> None:
         topic, latched = event.topic, event.topic in self._publisher.offer.latched
@@ -205,9 +268,12 @@ def main(socket_descriptor: int, numbers_descriptor: int) -> None:
 
 async def _serve(setup: Setup, end: socket.socket, numbers: memoryview) -> None:
     loop = asyncio.get_running_loop()
-    publisher = Publisher(setup.offer, setup.robot, setup.scene, setup.recorded, setup.period)
+    publisher = Publisher(
+        setup.offer, setup.robot, setup.scene, setup.recorded, setup.period, setup.sensors, setup.frames
+    )
     stream = _Stream()
-    hub = Hub(publisher, stream, numbers)
+    requests = PictureRequests(setup.offer.pictures, numbers, time.monotonic, loop.call_later)
+    hub = Hub(publisher, stream, numbers, requests)
     transport, _ = await loop.create_unix_connection(lambda: stream, sock=end)
     pending = Pending(numbers, transport.write, setup.offer.readers)
     stream.answered = pending.answer

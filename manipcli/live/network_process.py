@@ -13,12 +13,12 @@ import struct
 import subprocess
 import sys
 from contextlib import suppress
-from mmap import PAGESIZE
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, ManipcliError
 from manipcli.live.link import HEAD, Link, framed, shared_numbers
+from manipcli.live.pictures import numbers_for
 
 if TYPE_CHECKING:
     from manipcli.live.network import Setup
@@ -62,7 +62,7 @@ class NetworkProcess:
         ours, theirs = socket.socketpair()
         descriptor = os.memfd_create("manipcli")
         try:
-            os.ftruncate(descriptor, PAGESIZE)
+            os.ftruncate(descriptor, 8 * numbers_for(setup.offer.pictures))
             numbers = shared_numbers(descriptor)
             program = PROGRAM.format(path=sys.path, socket=theirs.fileno(), numbers=descriptor)
             self._process = subprocess.Popen(
@@ -81,7 +81,7 @@ class NetworkProcess:
         except BaseException:
             self._kill()
             raise
-        self.link = Link(ours, numbers)
+        self.link = Link(ours, numbers, setup.offer.pictures)
 
     def _started(self, setup: Setup) -> tuple[int, list[str]]:
         self._end.settimeout(PATIENCE)

@@ -22,6 +22,7 @@ class Offer:
         actions: action servers.
         services: services that the control loop answers.
         readers: those of them that change nothing.
+        pictures: topics of cameras, with large messages; see `pictures.py`.
     """
 
     published: Mapping[str, str]
@@ -30,6 +31,7 @@ class Offer:
     actions: Mapping[str, str]
     services: Mapping[str, str]
     readers: frozenset[str]
+    pictures: tuple[str, ...] = ()
 
     @property
     def topics(self) -> dict[str, str]:

@@ -73,11 +73,13 @@ class Outbox:
             self._answers.append(text)
         self.ready.set()
 
-    def publish(self, topic: str, text: str, now: float) -> None:
-        """Queue a message for a subscriber."""
+    def publish(self, topic: str, text: str, now: float) -> bool:
+        """Queue a message for a subscriber; False if there is none, or it comes too early."""
         subscription = self.subscriptions.get(topic)
-        if subscription is not None and subscription.offer(text, now):
+        taken = subscription is not None and subscription.offer(text, now)
+        if taken:
             self.ready.set()
+        return taken
 
     def take(self) -> list[str]:
         """All answers, and the next message of each topic."""

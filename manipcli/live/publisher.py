@@ -7,15 +7,16 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.live.offer import CLOCK, Offer
 from manipcli.live.sample import Sample
+from manipcli.live.sensed import SensedMessages
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
 from manipcli.record.cdr import NS_PER_S, CdrWriter
-from manipcli.record.channels import ControllerChannel, Recorded, channel_table
+from manipcli.record.channels import ControllerChannel, MeasuredChannel, Recorded, channel_table
 from manipcli.record.definition import read_definition
 from manipcli.record.json_message import compact, definition, to_json
 from manipcli.record.records import MESSAGE_HEAD, PAYLOAD
@@ -32,22 +33,32 @@ class Publisher:
         robot, scene: of the session.
         recorded: channels of its controllers.
         period: [s] of its control loop.
+        sensors: channels of its sensors.
+        frames: (parent, child, X_PC) of their frames.
 
     Attributes:
         state: of the last sample.
         outputs: of the controllers in the last sample.
         latched: the last message of each latched topic, in CDR.
+        sensed: messages of sensors of numbers.
     """
 
     def __init__(
-        self, offer: Offer, robot: RobotModel, scene: Scene, recorded: Sequence[Recorded], period: float
+        self,
+        offer: Offer,
+        robot: RobotModel,
+        scene: Scene,
+        recorded: Sequence[Recorded],
+        period: float,
+        sensors: Sequence[MeasuredChannel] = (),
+        frames: Sequence[tuple[str, str, Transform]] = (),
     ) -> None:
         self.offer = offer
         self.robot, self.scene, self.recorded, self.period = robot, scene, recorded, period
         self.state = WorldState.room(len(robot.moving_joints), len(scene.movable))
         self.outputs: Sequence[tuple[Array, Array] | None] = ()
-        self.latched = dict(begin_messages(robot, scene, recorded))
-        self._table = {channel.topic: channel for channel in channel_table(recorded)}
+        self.latched = dict(begin_messages(robot, scene, recorded, frames))
+        self._table = {channel.topic: channel for channel in channel_table(recorded, sensors=sensors)}
         self._names = {channel.id: topic for topic, channel in self._table.items()}
         self._kinds = {
             topic: read_definition(kind, self._table[topic].definition)
@@ -55,13 +66,19 @@ class Publisher:
             else definition(kind)
             for topic, kind in offer.published.items()
         }
+        self.sensed = SensedMessages(sensors, period)
         self._topics: frozenset[str] = frozenset()
         self._block: Block | None = None
 
     @cached_property
     def sampled(self) -> frozenset[str]:
         """Topics with messages at ticks; others only have them at events."""
-        return self._made(self._table).topics | {CLOCK}
+        return self._states | {CLOCK} | self.sensed.topics
+
+    @cached_property
+    def _states(self) -> frozenset[str]:
+        """Topics of the state and of controllers."""
+        return self._made([topic for topic in self._table if topic not in self.sensed.topics]).topics
 
     def ns(self, tick: int) -> int:
         """The simulated time [ns] of a tick."""
@@ -80,7 +97,9 @@ class Publisher:
         self.outputs = sample.outputs
         if CLOCK in wanted:
             found[CLOCK] = clock_message(self.ns(sample.tick))
-        own = {*wanted} & self.sampled - {CLOCK}
+        if sample.sensed is not None:
+            found |= self.sensed.new(sample.sensed, wanted)
+        own = {*wanted} & self._states
         if not own:
             return found
         content = self._encoded(own, sample)
@@ -113,14 +132,20 @@ class Publisher:
         return compact({"op": "publish", "topic": topic, "msg": message})
 
 
-def begin_messages(robot: RobotModel, scene: Scene, recorded: Sequence[Recorded]) -> tuple[tuple[str, bytes], ...]:
-    """The latched topics at the begin of a session, with their messages: there are no goals yet."""
+def begin_messages(
+    robot: RobotModel, scene: Scene, recorded: Sequence[Recorded], frames: Sequence[tuple[str, str, Transform]] = ()
+) -> tuple[tuple[str, bytes], ...]:
+    """The latched topics at the begin of a session, with their messages: there are no goals yet.
+
+    Args:
+        robot, scene, recorded, frames: as of a `Publisher`.
+    """
     no_goals = CdrWriter()
     no_goals.u32(0)
     actions = [each for each in recorded if isinstance(each, ControllerChannel) and each.action]
     return (
         (topics.ROBOT_DESCRIPTION, messages.string_message(robot.urdf)),
-        (topics.TF_STATIC, messages.tf_message(messages.static_transforms(robot, scene), 0)),
+        (topics.TF_STATIC, messages.tf_message((*messages.static_transforms(robot, scene), *frames), 0)),
         (topics.MARKERS, messages.marker_message(scene, 0)),
         *((each.status_topic, no_goals.data) for each in actions),
     )

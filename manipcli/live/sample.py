@@ -16,11 +16,13 @@ class Sample:
         tick: of the control loop.
         numbers: those of a `WorldState`.
         outputs: rows and speed of each controller's output; None while it is inactive.
+        sensed: see `Sensed`; None while nobody wants it.
     """
 
     tick: int
     numbers: Array
     outputs: Sequence[tuple[Array, Array] | None]
+    sensed: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,11 +183,10 @@ class LiveServer:
         subscriptions = (one for client in self._clients.values() for one in client.outbox.subscriptions.values())
         return {one.topic for one in subscriptions if now >= one.next}
 
-    def publish(self, topic: str, text: str) -> None:
-        """Queue a message for all its subscribers."""
+    def publish(self, topic: str, text: str) -> int:
+        """Queue a message for all its subscribers; returns how many take it."""
         now = time.monotonic()
-        for client in self._clients.values():
-            client.outbox.publish(topic, text, now)
+        return sum(client.outbox.publish(topic, text, now) for client in self._clients.values())
 
 
 def _status(code: int) -> Any:

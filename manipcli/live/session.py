@@ -21,7 +21,8 @@ from manipcli.live.offer import CLOCK
 from manipcli.live.pace import Pace
 from manipcli.live.source import recorded_commands
 from manipcli.record.recording import Recording
-from manipcli.run.run_log import recorded
+from manipcli.run.run_log import measured_channels, recorded
+from manipcli.simulate.sensor_layout import sensor_frames
 from manipcli.task.task import Task
 
 if TYPE_CHECKING:
@@ -85,14 +86,18 @@ def served(
     period = task.spec.simulation.control_period
     robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
-    offer = offer_of(endpoints_of(task, manager.controllers), channels)
+    sensors = measured_channels(task.true.sensors, task.true.robot, period)
+    frames = sensor_frames(task.true.sensors, task.true.robot)
+    offer = offer_of(endpoints_of(task, manager.controllers), channels, sensors)
     title = " · ".join(dict.fromkeys((task.spec.task, robot.name)))
-    setup = Setup(offer, robot, scene, channels, period, options.access, options.port, options.outlets, title)
+    setup = Setup(
+        offer, robot, scene, channels, period, options.access, options.port, options.outlets, title, sensors, frames
+    )
     pace = Pace(period, speed=options.speed, lasting=options.lasting, late=late)
     with NetworkProcess(setup) as network:
         least = FAST_PERIOD if options.speed is None else 0.0
-        again = (*begin_messages(robot, scene, channels), (CLOCK, clock_message(0)))
-        feed = Feed(period, network.link, topics=offer.published, again=again, least=least)
+        again = (*begin_messages(robot, scene, channels, frames), (CLOCK, clock_message(0)))
+        feed = Feed(period, network.link, topics=offer.published, sensors=sensors, again=again, least=least)
         left = 0
 
         def ready() -> None:

@@ -105,7 +105,8 @@ class TopicOperations:
             subscriptions.pop(topic, None)
             del self._asked[topic]
         else:
-            length = max(each.length for each in asked)
+            pictures = self._connection.offer.pictures
+            length = 1 if topic in pictures else max(each.length for each in asked)
             before = subscriptions.get(topic)
             kept = () if before is None else before.waiting
             dropped = 0 if before is None else before.dropped + max(0, len(kept) - length)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +20,7 @@ from manipcli.description.elements import Joint
 from manipcli.description.expanded import unread_description
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.logs.mesh_search import MeshSearch
+from manipcli.logs.sensed import read_sensed
 from manipcli.model.build_robot import bare_robot
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
@@ -97,7 +99,7 @@ class _Log:
         self.unshown = [name for name in known if name not in wanted]
         there = {meaning.usual for name, meaning in known.items() if space is None or name in wanted}
         self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
-        begin = self._first(topics, wanted)
+        self.begin = begin = self._first(topics, wanted)
         for topic, data, places in topics.messages(wanted):
             try:
                 for ns, reader in singly(data, places):
@@ -205,6 +207,7 @@ def open_other(
         contact_times=((),) * len(times),
         lost=topics.lost,
         notes=tuple(notes),
+        sensed=partial(read_sensed, path, begin=log.begin, end=float(times[-1])),
     )
 
 

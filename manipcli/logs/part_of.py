@@ -142,6 +142,13 @@ class _StateOf:
         order = [recording.joint_names.index(name) for name in joints]
         bodies = tuple(body.name for body in self.task.scene.movable)
         rows = [recording.body_names.index(name) for name in bodies]
+        poses = np.concatenate((states.body_position, states.body_quat_xyzw), axis=1)
+        latest = {each.body: each for each in recording.beliefs if each.time <= time + ROUNDING}
+        known = {name for name, body in self.task.spec.scene.items() if body.known is not None}
+        uncertain = tuple(name for name in recording.believed_names if name in latest and name in known)
+        believed = poses.copy()
+        if uncertain:
+            believed[[recording.body_names.index(name) for name in recording.believed_names]] = span.believed[at]
         state = StartState(
             log=self.log.name,
             sha256=hashlib.sha256(self.log.read_bytes()).hexdigest(),
@@ -152,12 +159,15 @@ class _StateOf:
             velocity=frozen(states.velocity[order]),
             reference=frozen(reference[order]),
             bodies=bodies,
-            poses=frozen(np.concatenate((states.body_position, states.body_quat_xyzw), axis=1)[rows]),
+            poses=frozen(poses[rows]),
             twists=frozen(np.concatenate((states.body_linear, states.body_angular), axis=1)[rows]),
             active=active,
             inactive=inactive,
             held=_held(recording, contacts, time, bodies) if closed else "",
             closed=closed,
+            uncertain=uncertain,
+            believed=frozen(believed[rows if uncertain else []]),
+            covariances=frozen(np.reshape([latest[name].covariance for name in uncertain], (-1, 36))),
         )
         if state.damage:
             raise _damaged(self.log, f"has a damaged state at {time:.3f} s: {state.damage}")
@@ -188,6 +198,12 @@ class _StateOf:
         bodies = {body.name for body in task.scene.movable}
         found = [*_unlike("joint", set(task.robot.joint_names), set(recording.joint_names))]
         found += _unlike("movable body", bodies, set(recording.body_names))
+        unknown = [name for name, body in task.spec.scene.items() if body.known is not None]
+        found += [
+            f"the log has no belief about '{name}'"
+            for name in unknown
+            if TF not in recording.absent and all(each.body != name for each in recording.beliefs)
+        ]
         if TF in recording.absent:
             found.append(f"the log has no {TF}: its task excludes it from `record:`")
         if found:

@@ -31,8 +31,10 @@ from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
+from manipcli.task.believed_scene import believing
 from manipcli.task.consistency import disagreements
 from manipcli.task.sample import sampled
+from manipcli.task.sensor_checks import sensed
 from manipcli.task.task import Task
 from manipcli.task.vary import bind
 
@@ -91,7 +93,7 @@ def recorded_task(
         )  # the recorded gravity is the sampled one
 
     scene = scene_of(task)
-    found = disagreements(task, controllers, robot, scene)
+    found = disagreements(task, controllers, robot, scene, sensed(task, robot_file, robot, scene))
     if any(finding.severity == "error" for finding in found):
         raise InvalidInput(found)
     made = Task(
@@ -113,6 +115,8 @@ def recorded_task(
             robot_of=lambda file: meshes.robot(robot_of(recording, path, file.spec)),
             scene_of=scene_of,
         )
+    else:
+        made = believing(made)
     files = mesh_files(made)
     _check_there(files, path, meshes)
     unlike = (*_versions(recording, path, made), *_meshes(recording, path, files))

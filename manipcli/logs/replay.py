@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.other_log import open_other
 from manipcli.logs.recorded_files import recorded_packages, recorded_robot, recorded_scene
+from manipcli.logs.sensed import read_sensed
 from manipcli.record.channels import TF
 from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.foreign.origin import is_own
@@ -105,6 +107,7 @@ def _open_own(
         verdict=verdict,
         lost=recording.lost,
         notes=notes,
+        sensed=partial(read_sensed, path, begin=0, end=float(states.time[-1])),
         keep=meshes.folder,
     )
 

@@ -71,9 +71,9 @@ def log_page(
     assert verdict is not None, "a log of manipcli has a verdict"
     page = _page(recording, path, verdict, end=playback.end)
     worst = page.causes[0].at if page.causes else None
-    with Frames(playback, size=PICTURE, captions=False) as frames:
-        pictures = {step.id: _picture(frames, clearest_time(playback, step)) for step in playback.steps}
-        moment = _picture(frames, worst) if worst is not None else None
+    frames = Frames(playback, size=PICTURE, captions=False)
+    pictures = {step.id: _picture(frames, clearest_time(playback, step)) for step in playback.steps}
+    moment = _picture(frames, worst) if worst is not None else None
     return replace(
         page,
         facts=run_facts(recording, recorded_robot(recording, path), recorded_scene(recording, path), verdict.steps),

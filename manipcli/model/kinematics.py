@@ -20,8 +20,6 @@ from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     import pinocchio
 
 
@@ -132,10 +130,6 @@ class Kinematics:
         linear: Array = V.linear
         return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
 
-    def place(self, link: str, X_LS: Transform, gravity: Array) -> MovingPlace:
-        """A frame S at `X_LS` in a link, whose motion is computed often; `gravity` (3,) [m/s2] in the world."""
-        return MovingPlace(self._pin, self._model, self._frames[link], X_LS, gravity)
-
     def carrying(self, link: str, loads: Iterable[tuple[float, Transform, Array]]) -> Kinematics:
         """The same robot with rigid `loads` on a link: mass [kg], X_LI of its inertial frame, inertia (3, 3) in I."""
         other = copy(self)
@@ -161,40 +155,3 @@ class Kinematics:
         """M(q) (n, n), symmetric."""
         upper = np.triu(self._pin.crba(self._model, self._data, q))
         return np.asarray(upper + np.triu(upper, 1).T)
-
-
-class MovingPlace:
-    """The motion of a frame S that is fixed in a link.
-
-    Args:
-        pin: Pinocchio.
-        model: the robot; it is not changed.
-        frame: of the link.
-        X_LS: pose of S in the link.
-        gravity: (3,) [m/s2] in the world.
-    """
-
-    def __init__(self, pin: ModuleType, model: pinocchio.Model, frame: int, X_LS: Transform, gravity: Array) -> None:
-        self._model = model = model.copy()
-        link = model.frames[frame]
-        placement = link.placement * pin.SE3(np.array(X_LS.R), np.array(X_LS.p))
-        self._frame = model.addFrame(pin.Frame("S", link.parentJoint, frame, placement, pin.FrameType.OP_FRAME), False)
-        self._data = model.createData()
-        self._local = pin.ReferenceFrame.LOCAL
-        self._up = pin.Motion(-np.asarray(gravity), np.zeros(3))
-        self._forward, self._place = pin.forwardKinematics, pin.updateFramePlacement
-        self._velocity, self._acceleration = pin.getFrameVelocity, pin.getFrameClassicalAcceleration
-
-    def motion(self, q: Array, v: Array, a: Array, out: Array) -> None:
-        """Write into `out` (6) the angular velocity [rad/s] of S and its acceleration less gravity [m/s2], in S.
-
-        Args:
-            q, v, a: (n) positions, velocities and accelerations of the joints.
-            out: see above.
-        """
-        model, data, frame = self._model, self._data, self._frame
-        self._forward(model, data, q, v, a)
-        acceleration = self._acceleration(model, data, frame, self._local)
-        acceleration += self._place(model, data, frame).actInv(self._up)
-        out[:3] = self._velocity(model, data, frame, self._local).angular
-        out[3:] = acceleration.linear

@@ -100,8 +100,12 @@ def unknown_controller(claims: Claims, name: str, loc: Loc) -> tuple[Problem, ..
 
 def arm_joints(robot: RobotModel, hand: Sequence[str]) -> tuple[str, ...]:
     """The independent joints from the root to the tool, without the hand's; empty for a robot without a tool."""
+    return above(robot, "" if robot.tool is None else robot.tool.link, hand)
+
+
+def above(robot: RobotModel, link: str, hand: Sequence[str]) -> tuple[str, ...]:
+    """The independent joints from the root to a link, without the hand's."""
     by_child = {joint.child: joint for joint in robot.joints}
-    link = "" if robot.tool is None else robot.tool.link
     found = []
     while link in by_child:
         joint = by_child[link]

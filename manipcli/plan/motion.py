@@ -16,6 +16,9 @@ CLOSING = "close"
 OPENING = "open"
 """The phase of a step in which the hand opens."""
 
+LOOKING = "look"
+"""The phase of a step in which a camera takes a picture."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlanningState:
@@ -103,6 +106,14 @@ class GoalTolerances:
     goal_time: float
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The body `object` is located in the next picture of the camera `sensor`."""
+
+    object: str
+    sensor: str
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """Commands that start together; done when all goals are reached and `duration` [s] has passed.
@@ -121,6 +132,7 @@ class Motion:
         tolerances: of the trajectory, instead of the controller's.
         takes: the object that is attached to the tool at its end, for robots with a `holding`.
         lets_go: what is attached to the tool is freed at its beginning.
+        looks: what it locates; it ends when the picture has arrived.
     """
 
     label: str
@@ -136,6 +148,7 @@ class Motion:
     tolerances: GoalTolerances | None = None
     takes: str | None = None
     lets_go: bool = False
+    looks: Look | None = None
 
     @property
     def closes(self) -> bool:

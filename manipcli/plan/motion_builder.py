@@ -23,7 +23,7 @@ from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
-from manipcli.plan.motion import CLOSING, OPENING, Grip, Motion, PlanningState, Reflex, StepPlan
+from manipcli.plan.motion import CLOSING, LOOKING, OPENING, Grip, Look, Motion, PlanningState, Reflex, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
@@ -123,16 +123,19 @@ class MotionBuilder:
         searched: bool = True,
         leaving: Leaving = "nothing",
         avoid: Sequence[Array] = (),
+        solver: InverseKinematics | None = None,
     ) -> None:
         """Move the tool to a pose, straight in joint space, and the hand to its pose `hand` at the same time.
 
         Configurations of the arm that are in collision are skipped; with `free`, also those whose straight joint-space
         path is. So are those near one of `avoid`, (n) each. Part of the orientation may be left open. Where no straight
-        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`).
+        path is free, one is searched to any configuration, unless the arm must take the nearest (`searched`). With a
+        `solver` for another frame, that frame moves to the pose instead of the tool.
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
-        solver = self._planner.solver.leaving(leaving)
+        line = X_WT if solver is None else None
+        solver = (self._planner.solver if solver is None else solver).leaving(leaving)
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._labelled(label):
             goal = self._solved(X_WT, grip, solver, free=free, avoid=avoid)
@@ -141,7 +144,7 @@ class MotionBuilder:
         def goals(rng: np.random.Generator) -> Array:
             return branches(solver, X_WT, goal, rng, query=self.query(), limits=limits)
 
-        self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=X_WT)
+        self._free(label, limits, goal[list(solver.columns)], grip, goals if searched else None, line=line)
 
     def straight(
         self,
@@ -303,6 +306,10 @@ class MotionBuilder:
         """Hold still for `duration` [s], and until the step's `until` holds."""
         self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=True))
 
+    def look(self, looks: Look, duration: float) -> None:
+        """Hold still until the picture in which a body is located has arrived, at most after `duration` [s]."""
+        self._motions.append(Motion(LOOKING, trajectory=None, grip=None, duration=duration, looks=looks))
+
     def spill(self, into: str) -> None:
         """Predict the contents of the carried object on the floor of the container `into`."""
         self._now = spilled(self._planner, self._now, into)
@@ -386,11 +393,18 @@ class MotionBuilder:
         q[self._planner.robot.indices(tuple(names))] = values
         return with_mimics(self._planner.robot, q)
 
-    def _grip(self, targets: dict[str, float], *, force: float | None = None, **must: bool) -> Grip | None:
-        """A goal for the joints of the gripper controller, or None if no target is one of them; `must`: see `Grip`."""
+    def _grip(
+        self,
+        targets: dict[str, float],
+        *,
+        force: float | None = None,
+        must_hold: bool = False,
+        must_arrive: bool = False,
+    ) -> Grip | None:
+        """A goal for the joints of the gripper controller, or None if no target is one of them."""
         joints = self._planner.gripper_joints
         if not any(name in targets for name in joints):
             return None
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
-        return Grip(joints=joints, target=target, force=force, **must)
+        return Grip(joints, target, force, must_hold=must_hold, must_arrive=must_arrive)

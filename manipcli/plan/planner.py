@@ -25,6 +25,7 @@ from manipcli.plan.links_apart import links_apart
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.path_planners.rrt_connect import RrtConnectSpec
 from manipcli.plan.path_search import PathSearch
+from manipcli.plan.sight import Sight
 from manipcli.scene.scene import Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.spec.keep import KeepSpec
@@ -72,6 +73,7 @@ class Planner:
         clearance: float = CLEARANCE,
         clearances: Mapping[frozenset[str], float] = {},
         paths: PlannerSpec | None = None,
+        sights: Mapping[str, Sight] = {},
     ) -> None:
         """
         Args:
@@ -83,9 +85,13 @@ class Planner:
             clearance: distance [m] that parts keep which must not touch.
             clearances: the same for single pairs of parts.
             paths: settings of the search for paths around obstacles; None: the defaults.
+            sights: the depth cameras by name.
         """
         self.clearance = clearance
         self.clearances = clearances
+        self.sights = sights
+        self.starts: dict[str, Transform] = {}
+        """Poses at the start of bodies that were located before anything moved them."""
         self.allowed = NOTHING
         self.robot = robot
         self.scene = scene

@@ -22,6 +22,10 @@ MARKERS = "/markers"
 LIVE_COMMANDS = "/live/commands"
 SENSORS = "/sensors"
 """Above the topics of sensors."""
+BELIEF = "/belief"
+"""Above the topics of believed poses: those of `uncertain` bodies, each with its covariance, and `BELIEF_TF`."""
+BELIEF_TF = f"{BELIEF}/tf"
+"""The poses that the robot believes, in frames of their own; at the ticks of `/tf`."""
 
 # A quality of service profile as rosbag2 stores it: the last message is kept for late subscribers.
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
@@ -130,6 +134,27 @@ class MeasuredChannel:
     derive: Callable[[Array], Array] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class BeliefChannels:
+    """Topics of what the robot believes.
+
+    Attributes:
+        bodies: those of `BELIEF_TF`, in the order of the scene.
+        uncertain: those with a topic of their own.
+    """
+
+    bodies: tuple[str, ...] = ()
+    uncertain: tuple[str, ...] = ()
+
+
+NO_BELIEF = BeliefChannels()
+
+
+def believed_frame(body: str) -> str:
+    """The frame of the believed pose of a body."""
+    return f"believed/{body}"
+
+
 Recorded = ControllerChannel | SensorChannel | None
 """Recorded channels of a loaded controller; None: not recorded."""
 
@@ -149,7 +174,11 @@ class Channel:
 
 
 def channel_table(
-    controllers: Sequence[Recorded], *, live: bool = False, sensors: Sequence[MeasuredChannel] = ()
+    controllers: Sequence[Recorded],
+    *,
+    live: bool = False,
+    sensors: Sequence[MeasuredChannel] = (),
+    belief: BeliefChannels = NO_BELIEF,
 ) -> tuple[Channel, ...]:
     """All channels of a recording, in the order of their ids; `live`: also that of the commands of a live session."""
     rows: list[tuple[str, str, bool]] = [
@@ -181,6 +210,9 @@ def channel_table(
                 (controller.result_topic, result, False),
             ]
     rows += [(sensor.topic, sensor.message, False) for sensor in sensors]
+    if belief.bodies:
+        rows.append((BELIEF_TF, schemas.TF_MESSAGE, False))
+        rows += [(f"{BELIEF}/{name}", schemas.POSE_WITH_COVARIANCE, True) for name in belief.uncertain]
     if live:
         rows.append((LIVE_COMMANDS, schemas.LIVE_COMMAND, False))
     own = {sensor.topic: sensor.definition for sensor in controllers if isinstance(sensor, SensorChannel)}

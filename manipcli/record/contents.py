@@ -38,6 +38,7 @@ class Contents:
         absent: topics that the task excludes from the recording.
         inactive: when a controller is inactive and writes no messages: from a time [s] on, up to but without another,
             or None for the end; controllers that are always active are left out.
+        believed: the bodies with believed poses of their own.
     """
 
     period: float
@@ -47,6 +48,7 @@ class Contents:
     strides: dict[str, int] = field(default_factory=dict)
     absent: tuple[str, ...] = ()
     inactive: dict[str, tuple[Interval, ...]] = field(default_factory=dict)
+    believed: tuple[str, ...] = ()
 
     def metadata(self) -> dict[str, str]:
         strides = {topic: stride for topic, stride in self.strides.items() if stride != 1}
@@ -59,6 +61,7 @@ class Contents:
             **({"strides": json.dumps(strides)} if strides else {}),
             **({"absent": json.dumps(self.absent)} if self.absent else {}),
             **({"inactive": json.dumps(self.inactive)} if self.inactive else {}),
+            **({"believed": json.dumps(self.believed)} if self.believed else {}),
         }
 
 
@@ -76,19 +79,21 @@ def contents(values: Mapping[str, str]) -> Contents:
     try:
         period = float(values["period"])
         joints, bodies, controllers = (json.loads(values[key]) for key in ("joints", "bodies", "controllers"))
-        strides, absent, inactive = (
-            json.loads(values.get(key, none)) for key, none in (("strides", "{}"), ("absent", "[]"), ("inactive", "{}"))
+        strides, absent, inactive, believed = (
+            json.loads(values.get(key, none))
+            for key, none in (("strides", "{}"), ("absent", "[]"), ("inactive", "{}"), ("believed", "[]"))
         )
     except (KeyError, ValueError, RecursionError) as error:
         raise ValueError(f"has a damaged metadata record '{RECORD}'") from error
     whole = isinstance(strides, dict) and all(
         type(stride) is int and 0 < stride <= MAX_STRIDE for stride in strides.values()
     )
-    groups = [joints, bodies, absent, *(controllers.values() if isinstance(controllers, dict) else [None])]
+    groups = [joints, bodies, absent, believed, *(controllers.values() if isinstance(controllers, dict) else [None])]
     timed = isinstance(inactive, dict) and all(map(_are_intervals, inactive.values()))
     if not (math.isfinite(period) and period > 0 and whole and timed) or not all(map(_is_names, groups)):
         raise ValueError(f"has a damaged metadata record '{RECORD}'")
-    if not all(set(controllers.get(name, ())) <= set(joints) for name in inactive):
+    known = all(set(controllers.get(name, ())) <= set(joints) for name in inactive)
+    if not (known and set(believed) <= set(bodies)):
         raise ValueError(f"has a damaged metadata record '{RECORD}'")
     return Contents(
         period=period,
@@ -98,6 +103,7 @@ def contents(values: Mapping[str, str]) -> Contents:
         strides=strides,
         absent=tuple(absent),
         inactive={name: tuple((start, end) for start, end in spans) for name, spans in inactive.items()},
+        believed=tuple(believed),
     )
 
 

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.record.cdr import NS_PER_S, CdrWriter
@@ -48,6 +48,14 @@ def tf_message(transforms: Sequence[tuple[str, str, Transform]], ns: int) -> byt
         writer.header(ns, parent)
         writer.text(child)
         writer.f64s((*X_PC.p, *X_PC.quat_xyzw))
+    return writer.data
+
+
+def pose_with_covariance(X_WO: Transform, covariance: Array, ns: int) -> bytes:
+    """geometry_msgs/PoseWithCovarianceStamped in the world."""
+    writer = CdrWriter()
+    writer.header(ns, WORLD)
+    writer.f64s((*X_WO.p, *X_WO.quat_xyzw, *covariance.flat))
     return writer.data
 
 

@@ -6,10 +6,13 @@ Small parts are read at once. States are read span by span, so that the memory d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
-from manipcli.core.geometry import Array
+import numpy as np
+
+from manipcli.conditions.sensed import Readings
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.state import Contact, WorldState
 
 
@@ -60,12 +63,28 @@ class Span:
     """Successive control ticks with complete data.
 
     `states` has a leading time axis T, the traces of the controllers are on the same ticks, and `contacts` are the
-    changes of contacts during the span.
+    changes of contacts during the span. `believed` (T, k, 7): position and quaternion of the bodies with believed poses
+    of their own. `readings`: those that arrived during the span, of the sensors that are read.
     """
 
     states: WorldState
     controllers: tuple[ControllerTrace, ...]
     contacts: tuple[ContactSnapshot, ...]
+    believed: Array = field(default_factory=lambda: np.zeros((0, 0, 7)))
+    readings: Mapping[str, Readings] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class BeliefSnapshot:
+    """What the robot believed about an uncertain body from `time` [s] on.
+
+    `X_WO`, and the covariance (6, 6) of position [m2] and rotation [rad2] about the axes of the world.
+    """
+
+    time: float
+    body: str
+    X_WO: Transform
+    covariance: Array
 
 
 EMBEDDED = "embedded_meshes"
@@ -89,6 +108,9 @@ class Recording:
             absent has no trace.
         silent: topics without a message although a run records them: another program removed them, or the run ended
             before.
+        believed_names: bodies with believed poses of their own.
+        sensors: whose readings are in the spans.
+        beliefs: what the robot believed at the start, and wherever it looked.
 
     `states`, `controllers` and `contacts` cover all spans and need a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
@@ -104,6 +126,9 @@ class Recording:
     period: float = 0.0
     absent: tuple[str, ...] = ()
     silent: tuple[str, ...] = ()
+    believed_names: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
+    beliefs: tuple[BeliefSnapshot, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The embedded mesh files by the URI in URDF and scene, with the material files of OBJ meshes; empty unless the
@@ -152,16 +177,24 @@ def joined(spans: Iterable[Span]) -> Span:
         return first
     tables = [_Growing(array) for array in _arrays(first)]
     contacts = [*first.contacts]
+    readings = {name: [each] for name, each in first.readings.items()}
     while following is not None:
         for table, array in zip(tables, _arrays(following), strict=True):
             table.append(array)
         contacts += following.contacts
+        for name, more in following.readings.items():
+            readings[name].append(more)
         following = next(iterator, None)
     arrays = (table.take() for table in tables)
     return Span(
         states=first.states.map(lambda _: next(arrays)),
         controllers=tuple(trace.map(lambda _: next(arrays)) for trace in first.controllers),
         contacts=tuple(contacts),
+        believed=next(arrays),
+        readings={
+            name: Readings(np.concatenate([each.times for each in parts]), np.concatenate([e.values for e in parts]))
+            for name, parts in readings.items()
+        },
     )
 
 
@@ -176,7 +209,7 @@ def _arrays(span: Span) -> list[Array]:
     span.states.map(keep)
     for trace in span.controllers:
         found += trace.arrays
-    return found
+    return [*found, span.believed]
 
 
 class _Growing:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Final
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import escape
 
+_BELIEF: Final = ("uncertain", "believed", "covariances")
 START_STATE: Final = "start_state.json"
 """The attachment of a run that begins with the state of another run."""
 LARGEST: Final = 1e6
@@ -38,6 +39,9 @@ class StartState:
         active: names of the active controllers that command joints; `inactive`: of the others.
         held: the body in the hand; "" without one.
         closed: the hand was closed to hold something, and not opened since.
+        uncertain: names of the uncertain bodies; () if all poses are known exactly.
+        believed: (m, 7) the poses of all bodies as the robot believes them; (0, 7) without uncertain ones.
+        covariances: (u, 36) of the beliefs about the uncertain ones, see `Belief`.
     """
 
     log: str
@@ -55,10 +59,19 @@ class StartState:
     inactive: tuple[str, ...]
     held: str
     closed: bool
+    uncertain: tuple[str, ...] = ()
+    believed: Array = field(default_factory=lambda: np.zeros((0, 7)))
+    covariances: Array = field(default_factory=lambda: np.zeros((0, 36)))
+
+    @property
+    def planned(self) -> Array:
+        """(m, 7) the poses of all bodies for planning: the believed ones."""
+        return self.believed if self.uncertain else self.poses
 
     def to_json(self) -> bytes:
         """The attachment; numbers are exact, and an unknown reference is null."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        names = [each.name for each in fields(self) if self.uncertain or each.name not in _BELIEF]
+        values = {name: getattr(self, name) for name in names}
         return json.dumps({name: _plain(value) for name, value in values.items()}, indent=1).encode()
 
     @staticmethod
@@ -86,6 +99,9 @@ class StartState:
                 inactive=tuple(map(str, read["inactive"])),
                 held=str(read["held"]),
                 closed=bool(read["closed"]),
+                uncertain=tuple(map(str, read.get("uncertain", ()))),
+                believed=_array(read.get("believed", ())).reshape(-1, 7),
+                covariances=_array(read.get("covariances", ())).reshape(-1, 36),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise ValueError(f"has a damaged {START_STATE}") from error
@@ -96,10 +112,11 @@ class StartState:
     @property
     def damage(self) -> str:
         """Why no run can begin with it: sizes, or numbers that no run reaches; "" if one can."""
-        n, m = len(self.joints), len(self.bodies)
+        n, m, u = len(self.joints), len(self.bodies), len(self.uncertain)
         sizes: list[tuple[Array, tuple[int, ...]]] = [
             (self.position, (n,)), (self.velocity, (n,)), (self.reference, (n,)),
             (self.poses, (m, 7)), (self.twists, (m, 6)),
+            (self.believed, (m if u else 0, 7)), (self.covariances, (u, 36)),
         ]  # fmt: skip
         if any(values.shape != size for values, size in sizes):
             return "its lists have different lengths"
@@ -108,8 +125,10 @@ class StartState:
             return "a number is missing or not finite"
         if any((np.abs(values) > LARGEST).any() for values, _ in sizes):
             return f"a number is above {LARGEST:g}"
-        if (np.abs(np.linalg.norm(self.poses[:, 3:], axis=1) - 1.0) > UNIT).any():
+        if any((np.abs(np.linalg.norm(a[:, 3:], axis=1) - 1.0) > UNIT).any() for a in (self.poses, self.believed)):
             return "a quaternion is not of length 1"
+        if not set(self.uncertain) <= set(self.bodies):
+            return "an uncertain body is not one of its bodies"
         if self.held and self.held not in self.bodies:
             return f"it holds '{escape(self.held)}', which is not one of its bodies"
         return ""

@@ -94,6 +94,13 @@ def link_frame(link: str) -> str:
     return f"robot/{link}"
 
 
+def frame_names(robot: RobotModel | None, scene: Scene | None) -> tuple[str, ...]:
+    """`frames` of the drawing of a robot, a scene, or both."""
+    links = () if robot is None else (link_frame(link.name) for link in robot.links)
+    bodies = () if scene is None else (body.name for body in scene.bodies)
+    return (WORLD, *links, *bodies)
+
+
 def draw(robot: RobotModel | None, scene: Scene | None = None, *, deviation: float | None = None) -> Drawing:
     """The drawing of a robot, a scene, or both; spheres and cylinders within `deviation` [m] [default: for the eye].
 
@@ -101,13 +108,11 @@ def draw(robot: RobotModel | None, scene: Scene | None = None, *, deviation: flo
     shapes is drawn with its collision shapes, and a link without either with bones.
     """
     missing: list[str] = []
-    frames: list[str] = [WORLD]
     drawables: list[Drawable] = []
     marks: list[Mark] = []
     if robot is not None:
         bare: list[str] = []
         for link in robot.links:
-            frames.append(link_frame(link.name))
             shown = tuple(_link(link, missing, deviation))
             drawables += shown
             if (link.visuals or link.collisions) and not any(drawable.layer == "visual" for drawable in shown):
@@ -123,10 +128,9 @@ def draw(robot: RobotModel | None, scene: Scene | None = None, *, deviation: flo
             marks.append(Mark("tool", link_frame(robot.tool.link), robot.tool.X_LT))
     if scene is not None:
         for body in scene.bodies:
-            frames.append(body.name)
             drawables += _body(body, missing, deviation)
         marks += [Mark(frame.name, frame.parent, frame.X_PF) for frame in scene.frames]
-    return Drawing(tuple(frames), tuple(drawables), tuple(marks), tuple(dict.fromkeys(missing)))
+    return Drawing(frame_names(robot, scene), tuple(drawables), tuple(marks), tuple(dict.fromkeys(missing)))
 
 
 def _link(link: Link, missing: list[str], deviation: float | None) -> Iterator[Drawable]:

@@ -40,6 +40,10 @@ class Fragments:
     shade: Array
     slope: Array
 
+    def part(self, of: tuple[slice, slice]) -> Fragments:
+        """Some rows and columns."""
+        return Fragments(self.depth[of], self.face[of], self.shade[of], self.slope[of])
+
 
 class Raster:
     """Surfaces, bound once, and their depth buffer for any poses.

@@ -11,12 +11,9 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.state import WorldState
 from manipcli.render.lens import Lens
 from manipcli.render.raster import Fragments, Raster
+from manipcli.render.shading import TO_LIGHT, shaded
 from manipcli.render.stage import Stage
 
-TO_LIGHT = np.array([0.35, 0.55, 1.0]) / np.linalg.norm([0.35, 0.55, 1.0])
-"""Unit vector towards the light in the world."""
-AMBIENT, DIFFUSE = 0.62, 0.42
-"""Brightness without and with the light."""
 SKY = (225, 231, 237)
 """Colour where nothing is."""
 
@@ -80,7 +77,6 @@ class SceneCamera:
         )
 
     def _coloured(self, seen: Fragments) -> npt.NDArray[np.uint8]:
-        bright = (AMBIENT + DIFFUSE * np.maximum(seen.shade, 0.0)).astype(np.float32)
-        bright[seen.face < 0] = 1.0
-        colour = self._colour[seen.face] * bright[..., None]
-        return np.minimum(colour, 255.0).astype(np.uint8)
+        found = shaded(self._colour[seen.face], seen.shade)
+        found[seen.face < 0] = SKY
+        return found

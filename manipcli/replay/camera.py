@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.errors import InvalidArgument
-from manipcli.core.geometry import Array, rotate
+from manipcli.core.geometry import Array, Transform, rotate
 from manipcli.core.text import shorten
 from manipcli.render.drawing import Drawing
+from manipcli.render.lens import Lens
 from manipcli.render.placing import Poses
 
 Vector = tuple[float, float, float]
@@ -64,16 +65,26 @@ class Camera:
             x to the right and y down [pixel] from the upper left corner, and the depth [m] along the line of sight;
             x and y are meaningless if the depth is not positive.
         """
+        local = self.X_WC.inverse().apply(points)
+        depth = local[..., 2]
+        focal = self.lens(size).fy
+        ahead = np.where(depth > 0.0, depth, np.nan)
+        x, y = (size[k] / 2.0 + focal * local[..., k] / ahead for k in range(2))
+        return x, y, depth
+
+    @property
+    def X_WC(self) -> Transform:
+        """Pose of the optical frame (z forward, x right, y down) in the world."""
         forward = np.subtract(self.target, self.eye) / self.distance
         right = np.cross(forward, self.up)
         right /= np.linalg.norm(right)
-        local = np.asarray(points) - np.asarray(self.eye)
-        depth = local @ forward
-        scale = size[1] / 2.0 / math.tan(math.radians(self.field) / 2.0)
-        ahead = np.where(depth > 0.0, depth, np.nan)
-        x = size[0] / 2.0 + scale * (local @ right) / ahead
-        y = size[1] / 2.0 - scale * (local @ np.cross(right, forward)) / ahead
-        return x, y, depth
+        return Transform.of(xyz=self.eye, R=np.stack([right, np.cross(forward, right), forward], axis=1))
+
+    def lens(self, size: tuple[int, int]) -> Lens:
+        """The pinhole of a picture of this width and height [pixel]."""
+        width, height = size
+        focal = height / 2.0 / math.tan(math.radians(self.field) / 2.0)
+        return Lens(width, height, focal, focal, (width - 1) / 2.0, (height - 1) / 2.0)
 
     def further(self, factor: float) -> Camera:
         """The camera at `factor` times its distance from the target."""

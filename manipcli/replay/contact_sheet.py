@@ -72,17 +72,17 @@ def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: 
     whole = PillowImage.new("RGB", (columns * (size[0] + GAP) + GAP, head + rows * (high + GAP)), PAPER)
     pen = Drawing.Draw(whole)
     _heading(pen, playback, whole.width, head, letter)
-    with Frames(playback, size=size, towards=towards, captions=False) as frames:
-        for k, tile in enumerate(shown):
-            row, column = divmod(k, columns)
-            left, top = GAP + column * (size[0] + GAP), head + row * (high + GAP)
-            if tile.time is None:
-                pen.rectangle((left, top, left + size[0] - 1, top + size[1] - 1), fill=(240, 242, 245))
-                middle = (left + size[0] / 2, top + size[1] / 2)
-                pen.text(middle, "not started", fill=QUIET, font=font(letter), anchor="mm")
-            else:
-                whole.paste(PillowImage.fromarray(frames.at(tile.time)), (left, top))
-            _label(pen, tile, k + 1, (left, top + size[1], size[0], strip), letter)
+    frames = Frames(playback, size=size, towards=towards, captions=False)
+    for k, tile in enumerate(shown):
+        row, column = divmod(k, columns)
+        left, top = GAP + column * (size[0] + GAP), head + row * (high + GAP)
+        if tile.time is None:
+            pen.rectangle((left, top, left + size[0] - 1, top + size[1] - 1), fill=(240, 242, 245))
+            middle = (left + size[0] / 2, top + size[1] / 2)
+            pen.text(middle, "not started", fill=QUIET, font=font(letter), anchor="mm")
+        else:
+            whole.paste(PillowImage.fromarray(frames.at(tile.time)), (left, top))
+        _label(pen, tile, k + 1, (left, top + size[1], size[0], strip), letter)
     return np.asarray(whole)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,6 +15,7 @@ from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.render.placing import Placing, Poses
+from manipcli.replay.sensed import Sensed
 from manipcli.scene.scene import Scene
 
 RATE = 50.0
@@ -82,6 +84,7 @@ class Playback:
         verdict: the verdict; None if the log cannot be judged.
         lost: why the end of the log is missing, or None.
         notes: what is missing or differs from the run, one sentence each.
+        sensed: reads what the sensors measured, for a drawing with these frames.
         keep: owner of resources with the same lifetime: the folder of embedded meshes.
     """
 
@@ -102,6 +105,7 @@ class Playback:
     verdict: Verdict | None = None
     lost: str | None = None
     notes: tuple[str, ...] = ()
+    sensed: Callable[[Collection[str]], Sensed] = field(repr=False, default=lambda frames: Sensed())
     keep: object = field(repr=False, default=None)
 
     @property

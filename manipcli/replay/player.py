@@ -6,16 +6,13 @@ joint positions at every time, and computes the kinematics itself.
 
 from __future__ import annotations
 
-import base64
 import html
 import json
-import zlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from importlib.resources import files
 
 import numpy as np
-import numpy.typing as npt
 
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
@@ -25,42 +22,14 @@ from manipcli.render.surface import Surface
 from manipcli.replay.camera import framing
 from manipcli.replay.forces import LONGEST, Forces
 from manipcli.replay.ghost import Ghost
+from manipcli.replay.pack import Json, Pack
 from manipcli.replay.playback import Playback
+from manipcli.replay.sensed_json import sensed_json
 from manipcli.scene.scene import Scene
-
-Json = dict[str, object]
-Reference = tuple[str, int, int]
-"""Number type, offset [byte] and count of an array in the pack."""
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 """Content-Security-Policy of a whole page: it loads nothing."""
-LEVEL = 9
 _PAGE = files("manipcli.replay").joinpath("page")
-_LARGEST = float(np.finfo(np.float32).max)
-
-
-@dataclass(slots=True)
-class _Pack:
-    """Concatenated arrays, each aligned to four bytes."""
-
-    parts: list[bytes] = field(default_factory=list)
-    length: int = 0
-
-    def add(self, values: npt.ArrayLike, kind: str) -> Reference:
-        """`kind`: f float32, H uint16, I uint32, b int8."""
-        if kind == "f":
-            # Values beyond float32 are clipped.
-            values = np.clip(values, -_LARGEST, _LARGEST)
-        array = np.ascontiguousarray(values, dtype={"f": "<f4", "H": "<u2", "I": "<u4", "b": "i1"}[kind])
-        data = array.tobytes()
-        reference = (kind, self.length, array.size)
-        data += bytes(-len(data) % 4)
-        self.parts.append(data)
-        self.length += len(data)
-        return reference
-
-    def text(self) -> str:
-        return base64.b64encode(zlib.compress(b"".join(self.parts), LEVEL)).decode()
 
 
 def player_html(playback: Playback, *, ghosts: Sequence[Ghost] = (), whole_page: bool = False) -> str:
@@ -71,11 +40,14 @@ def player_html(playback: Playback, *, ghosts: Sequence[Ghost] = (), whole_page:
         ghosts: other runs of the same task, drawn over it.
         whole_page: the element is alone on its page and takes the keyboard.
     """
-    head, data = _contents(playback, ghosts)
+    head, data, senses = _contents(playback, ghosts)
     script = "".join(map(_read, sorted(file.name for file in _PAGE.iterdir() if file.name.endswith(".js"))))
+    style = _read("player.css")
+    if senses:
+        script, style = script + _read("sensors/sensors.js"), style + _read("sensors/sensors.css")
     return (
         f'<div class="mc-player"{" data-page=1" if whole_page else ""}>\n'
-        f"<style>\n{_read('player.css')}</style>\n"
+        f"<style>\n{style}</style>\n"
         f"{_read('player.html')}"
         f'<script type="application/json" data-part="head">{head}</script>\n'
         f'<script type="text/plain" data-part="data">{data}</script>\n'
@@ -110,9 +82,10 @@ def _read(name: str) -> str:
     return _PAGE.joinpath(name).read_text("utf-8")
 
 
-def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str]:
-    """Input of the script: the head as JSON that is safe in a script element, and the packed arrays."""
-    pack = _Pack()
+def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str, bool]:
+    """Input of the script: the head as JSON that is safe in a script element, the packed arrays, and whether there is
+    anything of sensors."""
+    pack = Pack()
     drawing = draw(playback.robot, playback.scene)
     poses = playback.poses()
     frames, order = _frames(drawing, playback.robot, playback.scene)
@@ -153,10 +126,13 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str]:
             {"name": ghost.name, "position": pack.add(ghost.position, "f"), "body": pack.add(ghost.body, "f")}
             for ghost in ghosts
         ]
+    sensed = playback.sensed(drawing.frames)
+    if sensed:
+        head["senses"] = sensed_json(sensed, index, pack)
     text = json.dumps(head, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     # These three occur only in JSON strings; a name must not end the script element.
     safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
-    return safe, pack.text()
+    return safe, pack.text(), bool(sensed)
 
 
 def _skipped(playback: Playback) -> list[Json]:
@@ -214,7 +190,7 @@ def _axes(drawing: Drawing, index: dict[str, int], floors: frozenset[str]) -> li
 
 
 def _drawables(
-    drawing: Drawing, index: dict[str, int], floors: frozenset[str], pack: _Pack
+    drawing: Drawing, index: dict[str, int], floors: frozenset[str], pack: Pack
 ) -> tuple[list[Json], list[Json]]:
     """Distinct surfaces, and the drawables that use them."""
     surfaces: list[Json] = []
@@ -232,7 +208,7 @@ def _drawables(
     return surfaces, drawables
 
 
-def _surface(surface: Surface, pack: _Pack) -> Json:
+def _surface(surface: Surface, pack: Pack) -> Json:
     """Vertices as 1/65535 of their box (5 um for a link of 0.3 m), normals as 1/127, four numbers per row."""
     low = surface.vertices.min(axis=0)
     size = np.maximum(np.ptp(surface.vertices, axis=0), 1e-9)
@@ -250,7 +226,7 @@ def _surface(surface: Surface, pack: _Pack) -> Json:
     }
 
 
-def _pushes(playback: Playback, poses: Poses, pack: _Pack) -> Json | None:
+def _pushes(playback: Playback, poses: Poses, pack: Pack) -> Json | None:
     """Rows of point, normal force and friction, and the first row of each time."""
     forces = Forces(playback, poses)
     if not forces.scale:

@@ -80,12 +80,21 @@ def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json)
     """The object of `run` and `judge`, with all its keys in a fixed order."""
     empty = "task verdict text seed engine sample part simulated_time wall_time real_time_factor log timing"
     found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
-    found |= {"self_contacts": [], "holding": [], "steps": [], "blocks": [], "expectations": [], "implied": []}
+    found |= {
+        "self_contacts": [],
+        "located": [],
+        "holding": [],
+        "steps": [],
+        "blocks": [],
+        "expectations": [],
+        "implied": [],
+    }
     found |= {"candidates": []}
     if judged is not None:
         found |= picked(judged, "task verdict text seed engine simulated_time")
         found["saturated"] = saturated_object(judged.saturations)
         found["self_contacts"] = plain(judged.self_contacts)
+        found["located"] = plain(judged.located)
         found["holding"] = plain(judged.holding)
         found["steps"] = [step_object(step) for step in judged.steps]
         for key, outcomes in (("expectations", judged.expectations), ("implied", judged.implied)):

@@ -12,6 +12,7 @@ from manipcli.core.text import number_of, one_line
 from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import quantity
+from manipcli.report.located import LOCATED, located_rows
 from manipcli.report.nesting import MARKS, block_line, nested
 from manipcli.report.rounds import first_of_rounds, round_of_finding
 from manipcli.report.run_report import RunReport
@@ -107,6 +108,8 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
             lines += [*choices, ""]
     if verdict.expectations:
         lines += [_expectations(verdict.expectations), ""]
+    if verdict.located:
+        lines += [table(LOCATED, located_rows(verdict.located)), ""]
     mark = PASS if verdict.verdict == "passed" else FAIL
     lines.append(f"{mark} {verdict.task} {verdict.verdict}: {verdict.text or _summary(verdict)}")
     if cut := str(verdict.saturations):

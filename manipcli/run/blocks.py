@@ -1,12 +1,13 @@
 """The order of the steps of a running task: sequences and their retries, choices, and steps at the same time.
 
-The plan of a branch that was not planned before the run is made when its first step is reached, for all steps up to
-the next choice.
+The plan of a branch that was not planned before the run, and of the steps after a `locate`, is made when its first step
+is reached, for all steps up to the next choice.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.units import readable
@@ -35,6 +36,7 @@ class BlockLoop:
         self._loop = loop
         self._outcomes: Outcomes = ()
         self._planned = {step.index: step for step in plan.branches.get((), plan.steps)}
+        self._forgotten = 0
         self._last: dict[int, StepOutcome] = {}
         """The outcome of every step that was reached or skipped in the present attempt at its block."""
 
@@ -64,16 +66,26 @@ class BlockLoop:
         planned = [self._planned[k] for k in unit]
         outcomes = (loop.step(planned[0], limit),) if len(unit) == 1 else loop.pair(planned, limit)
         self._last |= dict(zip(unit, outcomes, strict=True))
+        if loop.located:
+            self._forget()
         return all(outcome.outcome == "done" or outcome.tolerated for outcome in outcomes)
+
+    def _forget(self) -> None:
+        """Drop all plans, which were made before a body was located: every step is planned again when it is reached."""
+        self._loop.located = False
+        self._planned.clear()
+        self._plan = replace(self._plan, branches={})
+        self._forgotten += 1
 
     def _block(self, group: Group, limit: float | None) -> bool:
         """All attempts at a block; whether the task goes on."""
         spec, loop = group.spec, self._loop
         retry = spec.on_fail if isinstance(spec.on_fail, RetrySpec) else None
         attempts = 1 if retry is None else 1 + retry.retry
-        outcomes, before = self._outcomes, dict(self._planned)
+        outcomes, before, forgotten = self._outcomes, dict(self._planned), self._forgotten
         for attempt in range(1, attempts + 1):
-            if attempt > 1 and not self._again(group, outcomes, before):
+            stale = self._forgotten > forgotten
+            if attempt > 1 and not self._again(group, outcomes, before, stale=stale):
                 break
             loop.block_event("block_started", group.index, "", _nth(attempt, attempts))
             began = loop.time
@@ -126,12 +138,18 @@ class BlockLoop:
             self._last[k] = loop.skipped(k, f"'{spec.id}' took {word}")
         return taken
 
-    def _again(self, group: Group, outcomes: Outcomes, before: dict[int, PlannedStep]) -> bool:
-        """Prepare another attempt at a block: plan its steps from the measured state; whether they have a plan."""
+    def _again(self, group: Group, outcomes: Outcomes, before: dict[int, PlannedStep], *, stale: bool = False) -> bool:
+        """Prepare another attempt at a block: plan its steps from the measured state; whether they have a plan.
+
+        With `stale`, the steps behind it are planned again, too.
+        """
         inside = steps_of((group,))
         self._loop.begin_again(inside)
         self._last = {k: outcome for k, outcome in self._last.items() if k not in inside}
-        self._outcomes, self._planned = outcomes, {k: step for k, step in before.items() if k not in inside}
+        self._outcomes, self._planned = (
+            outcomes,
+            {k: step for k, step in before.items() if k not in inside and not stale},
+        )
         units = [unit for unit in stretch(self._plan.items, outcomes).units if unit[0] in inside]
         if not units:
             return True  # it begins with a choice

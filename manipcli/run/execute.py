@@ -19,11 +19,12 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.plan.from_motion import stopped
 from manipcli.record.channels import SENSORS
 from manipcli.record.write.recorder import Recorder
+from manipcli.run.belief import Belief
 from manipcli.run.blocks import BlockLoop
 from manipcli.run.engine_settings import engine_settings
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
-from manipcli.run.restore import restore_controllers, scene_at
+from manipcli.run.restore import restore_belief, restore_controllers, scene_at
 from manipcli.run.saturation_counts import saturations_of
 from manipcli.run.step_loop import StepLoop
 from manipcli.scene.drop_test import SETTLED_SHIFT
@@ -31,6 +32,7 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.sensor import Picture
+from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.session import Session
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
@@ -99,11 +101,15 @@ def _run_steps(
         SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
     with open_session(task, plan, manager, Session) as session:
-        live = Live(live_world(task, plan, session), manager.controllers, session.period)
-        observer = Observer(recorder, live, progress, session.period)
+        belief = belief_of(task, plan, session)
+        live = Live(live_world(task, session, belief), manager.controllers, session.period, session.sensors)
+        observer = Observer(recorder, live, progress, session.period, belief)
         session.restart_clock(observer)
-        record_sensors(session, recorder)
-        run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
+        record_sensors(session, recorder, live)
+        record_belief(belief, recorder)
+        run = StepLoop(
+            task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning, belief=belief
+        )
         try:
             BlockLoop(plan, run).run()
         finally:
@@ -134,7 +140,7 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
                 engine=engine,
                 manager=manager,
                 period=simulation.control_period,
-                sensors=task.sensors,
+                sensors=true.sensors,
                 seed=simulation.seed,
             )
             if state is None:
@@ -146,14 +152,32 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
         engine.close()
 
 
-def record_sensors(session: Session, recorder: Recorder) -> None:
-    """Record what the sensors of a session measure from now on."""
+def record_sensors(session: Session, recorder: Recorder, live: Live) -> None:
+    """Record what the sensors of a session measure from now on; conditions get the pictures."""
 
     def deliver(tick: int, taken: int, name: str, picture: Picture) -> None:
+        live.picture(tick, name, picture)
         recorder.measured(tick, taken, f"{SENSORS}/{name}{picture.suffix}", picture.fields)
 
     recorder.attach(session.sensors.numbers)
     session.sensors.deliver = deliver
+
+
+def belief_of(task: Task, plan: Plan, session: Session) -> Belief:
+    """What the robot believes at the start of a run, or of a part of it."""
+    planner, state = plan.planner, task.part.state
+    belief = Belief(task.scene, task.true.scene, planner.kinematics)
+    if state is not None:
+        restore_belief(belief, state, planner, session)
+    return belief
+
+
+def record_belief(belief: Belief, recorder: Recorder) -> None:
+    """Record what the robot believes from now on."""
+    if belief.names:
+        recorder.believe(belief.poses)
+        for name in belief.uncertain:
+            recorder.believed(0, name, belief.pose(name), belief.covariance(name))
 
 
 def record_saturations(session: Session, recorder: Recorder) -> None:
@@ -162,16 +186,17 @@ def record_saturations(session: Session, recorder: Recorder) -> None:
         recorder.metadata(kind, counts)
 
 
-def live_world(task: Task, plan: Plan, session: Session) -> World:
-    """The world of live conditions, equal to the one that judging builds from the log; now is time 0."""
+def live_world(task: Task, session: Session, belief: Belief) -> World:
+    """The world of live conditions, equal to the believed one that judging builds from the log; now is time 0."""
     return World(
         task.robot,
         task.true.scene,
-        start=session.engine.read().map(np.copy),
+        start=belief.look(session.engine.read()).map(np.copy),
         physics=ENGINES[task.spec.simulation.engine].physics == "full",
         referenced=frozenset(name for c in session.manager.controllers if c.interfaces for name in c.joints),
         steps=tuple(str(step.id) for step in task.spec.steps),
         period=task.spec.simulation.control_period,
+        sensors=sensed_by_name(task.sensors, task.true.robot, task.true.scene),
     )
 
 
@@ -188,7 +213,7 @@ def _settle(task: Task, session: Session) -> None:
         cause = f"{what} while settling before the start{mark}{advice}"
         raise SimulationFailed(cause, time=failed.time) from failed
     state = session.engine.read()
-    for k, body in enumerate(task.scene.movable):
+    for k, body in enumerate(task.true.scene.movable):
         shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))
         speed = float(np.linalg.norm(state.body_linear[k]))
         if not shift < SETTLED_SHIFT:

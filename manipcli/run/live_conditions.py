@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.conditions.condition import World
-from manipcli.conditions.formula import absent, opened
+from manipcli.conditions.formula import absent, opened, sensors_of
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.robustness import EDGE, Robustness
 from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
@@ -21,6 +21,9 @@ from manipcli.core.units import readable
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
 from manipcli.run.run_log import recorded
+from manipcli.run.sensor_readings import SensorReadings
+from manipcli.simulate.sensor import Picture
+from manipcli.simulate.sensor_bank import SensorBank
 from manipcli.simulate.session import SLOW
 from manipcli.spec.condition import ConditionSpec
 
@@ -102,9 +105,10 @@ class Live:
         world: of the run.
         controllers: in the order of the outputs given to `tick`.
         period: [s] control period.
+        sensors: of the session.
     """
 
-    def __init__(self, world: World, controllers: Sequence[Controller], period: float) -> None:
+    def __init__(self, world: World, controllers: Sequence[Controller], period: float, sensors: SensorBank) -> None:
         self._world = world
         self._period = period
         self._probes: list[Probe] = []
@@ -121,6 +125,7 @@ class Live:
             for k, controller in enumerate(controllers)
             if isinstance(recorded(controller), ControllerChannel)
         ]
+        self._sensors = SensorReadings(sensors, world.sensors)
         self._listens = False
         self._count = 0
         self._next = 0
@@ -133,6 +138,8 @@ class Live:
             for index, reference in self._references:
                 output = outputs[index]
                 reference.position[k] = np.nan if output is None else output.position
+        if self._sensors.follows:
+            self._sensors.tick(self._time(tick))
         self._count, self._next = k + 1, tick + 1
         if self._count == ROOM or (self._listens and self._next % SLOW == 0):
             self._ask()
@@ -140,6 +147,10 @@ class Live:
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
         """Add a change of the recorded contacts, before its tick."""
         self._contacts.append(Touching(self._time(tick), tuple(contacts)))
+
+    def picture(self, tick: int, name: str, picture: Picture) -> None:
+        """Add a message of a camera, before its tick."""
+        self._sensors.picture(self._time(tick), name, picture)
 
     def step_started(self, step: str) -> None:
         """The next tick is the first of a step, or of another attempt at it with the steps around it."""
@@ -168,6 +179,8 @@ class Live:
             callback: called with every evaluation.
         """
         self._ask()
+        for sensor in sensors_of(spec, CONDITIONS):
+            self._sensors.follow(sensor, self._time(self._next - 1) if self._next else None)
         probe = Probe(spec, self._world, self._next, callback, self._ask)
         self._probes.append(probe)
         self._listens = self._listens or callback is not None
@@ -190,6 +203,7 @@ class Live:
                 probe.look(window, start)
         self._numbers[0] = self._numbers[self._count]
         del self._contacts[:-1]
+        self._sensors.forget()
         self._count, self._first = 0, False
 
     def _window(self) -> StateWindow:
@@ -204,6 +218,7 @@ class Live:
             ),
             contacts=tuple(self._contacts),
             steps=tuple(self._steps.values()),
+            readings=self._sensors.readings(),
         )
 
     def _time(self, tick: int) -> float:

@@ -14,6 +14,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.write.contact_filter import ContactFilter
 from manipcli.record.write.recorder import Recorder
+from manipcli.run.belief import Belief
 from manipcli.run.live_conditions import Live
 from manipcli.task.plan_steps import PlannedStep
 
@@ -73,11 +74,12 @@ class _Goal:
 
 
 class Observer:
-    """Feeds every tick to the recorder and to live conditions, and the time to the progress display."""
+    """Feeds every tick to the recorder, to live conditions as the robot believes it, and the time to the display."""
 
-    def __init__(self, recorder: Recorder, live: Live, progress: Progress, period: float) -> None:
+    def __init__(self, recorder: Recorder, live: Live, progress: Progress, period: float, belief: Belief) -> None:
         self._recorder = recorder
         self._live = live
+        self.belief = belief
         self._progress = progress
         self._period = period
         self._began = wall_clock.perf_counter()
@@ -87,8 +89,9 @@ class Observer:
         self._goals: list[_Goal] = []
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
+        believed = self.belief.look(state)  # before the recorder copies its poses
         self._recorder.tick(tick, state, outputs)
-        self._live.tick(tick, state, outputs)
+        self._live.tick(tick, believed, outputs)
         self._next_tick = tick + 1
         due = tick % self._feedback_ticks == 0
         for goal in self._goals:

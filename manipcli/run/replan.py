@@ -1,8 +1,8 @@
 """Re-planning from the measured state: its differences to the state a step was planned from, and the new plan.
 
-Joints that follow trajectories count as at their commanded position if they are near it, so that a new trajectory
-starts at the end of the last one. An object in the hand has its measured pose in the hand, so that it is placed
-correctly after slip.
+Bodies are where the robot believes them to be. Joints that follow trajectories count as at their commanded position if
+they are near it, so that a new trajectory starts at the end of the last one. An object in the hand has its measured
+pose in the hand, so that it is placed correctly after slip.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from manipcli.model.collision import Carried
 from manipcli.model.grasp import Grasp
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
+from manipcli.run.belief import Belief
 from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.source.tree import Plain
@@ -40,16 +41,20 @@ class Measured:
         planner: of the task.
         limits: differences above which a step is re-planned.
         physics: whether the engine moves bodies; otherwise their predicted poses are used.
+        belief: about the poses of bodies.
 
     Attributes:
         grasp: the grasp of the carried object.
     """
 
-    def __init__(self, session: Session, planner: Planner, limits: ReplanSpec, *, physics: bool) -> None:
+    def __init__(
+        self, session: Session, planner: Planner, limits: ReplanSpec, *, physics: bool, belief: Belief
+    ) -> None:
         self._session = session
         self._planner = planner
         self._limits = limits
         self._physics = physics
+        self._belief = belief
         self._lost = ""
         period = SLOW * session.period
         self.grasp = Grasp(planner.kinematics, planner.scene, period=period, attachment=session.holder)
@@ -61,7 +66,7 @@ class Measured:
             believed: names the carried object; the result carries nothing if that object was lost.
         """
         self._lost = ""
-        state = self._session.engine.read()
+        state = self._belief.look(self._session.engine.read())
         measured = np.array(state.position)
         position = self._commanded(measured)
         if not self._physics:
@@ -76,6 +81,7 @@ class Measured:
             return now
         self._lost = self.grasp.lost(carried, state, self._session.touching)
         if self._lost:
+            self._belief.let_go(state)
             return now
         X_WO = planner.body_pose(now, carried.body)
         X_LO = planner.kinematics.forward(measured, carried.link).inverse() @ X_WO

@@ -9,7 +9,10 @@ import numpy as np
 
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.collision import Carried
+from manipcli.plan.planner import Planner
 from manipcli.record.start_state import StartState
+from manipcli.run.belief import Belief
 from manipcli.scene.scene import Scene
 from manipcli.simulate.session import Session
 
@@ -59,6 +62,19 @@ def restore_controllers(session: Session, state: StartState) -> None:
     manager.update(0.0, _Joints(position, still, still.copy()), still.copy())
     if session.holder is not None and state.held:
         session.holder.hold(state.held)
+
+
+def restore_belief(belief: Belief, state: StartState, planner: Planner, session: Session) -> None:
+    """What the robot believed then; what the hand holds keeps its believed pose in it."""
+    poses = dict(zip(state.bodies, state.planned, strict=True))
+    for name, covariance in zip(state.uncertain, state.covariances, strict=True):
+        belief.update(name, _pose(poses[name]), covariance.reshape(6, 6))
+    now = session.engine.read()
+    belief.look(now)
+    if state.held:
+        link = planner.tool_link
+        X_WL = planner.kinematics.forward(now.position, link)
+        belief.hold(Carried(state.held, link, X_WL.inverse() @ _pose(poses[state.held])), now)
 
 
 def _active(session: Session) -> set[str]:

@@ -22,7 +22,14 @@ from manipcli.model.link_parts import LINK_PARTS, link_parts_to_json
 from manipcli.model.robot import RobotModel
 from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.attachments import CONTROLLERS, INERTIALS, ROBOT, SCENE, TASK, URDF
-from manipcli.record.channels import SENSORS, ControllerChannel, MeasuredChannel, Recorded, SensorChannel
+from manipcli.record.channels import (
+    SENSORS,
+    BeliefChannels,
+    ControllerChannel,
+    MeasuredChannel,
+    Recorded,
+    SensorChannel,
+)
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.recording import EMBEDDED
@@ -30,6 +37,7 @@ from manipcli.record.schemas import WRENCH
 from manipcli.record.selection import Selection
 from manipcli.record.start_state import START_STATE
 from manipcli.record.write.recorder import Recorder
+from manipcli.run.belief import Belief
 from manipcli.run.embedding import embeddable
 from manipcli.run.engine_settings import engine_settings
 from manipcli.scene.scene_file import scene_to_json
@@ -105,6 +113,7 @@ def open_log(
         attachments.append((START_STATE, JSON, task.part.state.to_json()))
     if (parts := link_parts_to_json(task.robot)) is not None:
         attachments.append((LINK_PARTS, JSON, parts))
+    belief = Belief(task.scene, task.true.scene, plan.planner.kinematics)
     recorder = None
     try:
         recorder = Recorder(
@@ -133,8 +142,9 @@ def open_log(
             ),
             overwrite=overwrite,
             live=task.part.live,
-            sensors=measured_channels(task.sensors, task.true.robot, task.spec.simulation.control_period),
-            sensor_frames=sensor_frames(task.sensors, task.true.robot),
+            sensors=measured_channels(task.true.sensors, task.true.robot, task.spec.simulation.control_period),
+            sensor_frames=sensor_frames(task.true.sensors, task.true.robot),
+            belief=BeliefChannels(belief.names, belief.uncertain),
         )
         yield recorder
     except RecordingFailed as failure:

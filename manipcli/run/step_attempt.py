@@ -13,11 +13,14 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
 from manipcli.model.state import WorldState
-from manipcli.plan.motion import Motion, PlanningState
+from manipcli.plan.motion import Look, Motion, PlanningState, StepPlan
+from manipcli.plan.prediction import put
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
+from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
+from manipcli.run.looking import Looking
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
@@ -44,6 +47,7 @@ class StepAttempt:
 
     Attributes:
         failed: whether the next step is re-planned, because one failed before it.
+        located: whether a believed pose was corrected since this was last reset: plans made before it do not hold.
         margin: of the last step that ended, and its unit; None where it has none.
         on_phase: called with the name of each motion that begins.
 
@@ -55,6 +59,7 @@ class StepAttempt:
         progress: receives steps and unplanned events.
         on_goal: called with every goal, see `Executor`.
         replanning: stopwatch of re-planning.
+        belief: about the poses of bodies.
     """
 
     def __init__(
@@ -68,11 +73,13 @@ class StepAttempt:
         *,
         on_goal: Callable[[str, GoalHandle], None],
         replanning: Stopwatch,
+        belief: Belief,
     ) -> None:
         self._task = task
         self._live = live
         self._plan = plan
         self._session = session
+        self._belief = belief
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
@@ -82,7 +89,7 @@ class StepAttempt:
         self._replans = replan is not False
         self._guards = any(motion.guarded for step in plan.every for motion in step.plan.motions)
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
-        self._measured = Measured(session, plan.planner, limits, physics=self._physics)
+        self._measured = Measured(session, plan.planner, limits, physics=self._physics, belief=belief)
         self._grasp_margin = GraspMargin(task.true.robot, task.true.scene)
         self._believed = plan.start
         self._replanning = replanning
@@ -94,6 +101,8 @@ class StepAttempt:
         self._over = False
         self._at: PlannedStep | None = None
         self._attaching = Attaching(session, self._event)
+        self._looking = Looking(session, plan.planner, belief)
+        self.located = False
 
     def _look(self, state: WorldState) -> str:
         """At every tick: update the grasp and return the alarm."""
@@ -103,7 +112,7 @@ class StepAttempt:
     def _follow(self, state: WorldState) -> None:
         """Update the grasp."""
         if self._physics and self._session.ticks % SLOW == 0:
-            self._measured.grasp.look(state, self._session.touching)
+            self._measured.grasp.look(self._belief.look(state), self._session.touching)
         self._attaching.look(self._at)
 
     @property
@@ -190,7 +199,7 @@ class StepAttempt:
         """All motions of the plan, which starts in `before`, and the wait for `until`; both up to `limit` [s]."""
         deadline = _sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
         if before.carried is not None and self._physics:
-            self._measured.grasp.begin_step(before.carried, self._session.engine.read(), self._session.touching)
+            self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
         with self._awaited(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
@@ -202,11 +211,16 @@ class StepAttempt:
                     left = self._left_behind(before.carried)
                     if left is not None:
                         return left
+                if motion.opens or motion.lets_go:
+                    self._belief.let_go(self._state)
                 self._attaching.before(motion, planned)
                 over = deadline
                 if motion.awaits and until is not None and step.timeout is None:
                     over = _sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
-                end = yield from executor.running(motion, until=until, deadline=over)
+                if motion.looks is not None:
+                    end = yield from self._look_at(motion.looks, planned, over)
+                else:
+                    end = yield from executor.running(motion, until=until, deadline=over)
                 if end.outcome != "done":
                     held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
                     text = f"{motion.label}: {end.text}{missing(end, probe)}{f'; {held}' if held else ''}"
@@ -218,12 +232,13 @@ class StepAttempt:
                     self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
                     self._take(planned.plan.end.carried)
                     if loose := (yield from self._loose(motion, planned.plan.end.carried.body)):
+                        self._belief.let_go(self._state)
                         return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
                 texts += [end.text + _no_longer(motion, probe)] if end.text else []
-            self._believed = planned.plan.end
+            self._believed = self._corrected(planned.plan)
             if awaited and until is not None:
                 if step.timeout is None:
                     deadline = _sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
@@ -238,6 +253,23 @@ class StepAttempt:
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
+        """Locate a body; its believed pose is then corrected and recorded."""
+        found = yield from self._looking.look(looks, lambda: self._measured.situation(self._believed), deadline)
+        if found.failure:
+            return MotionEnd("failed", found.failure)
+        self.located = True
+        name, tick = looks.object, self._session.ticks
+        self._recorder.believed(tick, name, self._belief.pose(name), self._belief.covariance(name))
+        self._event("located", planned, name, found.text)
+        self._report(found.text, detail=False)
+        return MotionEnd("done", found.text)
+
+    def _corrected(self, plan: StepPlan) -> PlanningState:
+        """The state after a plan, with what it located at its new pose."""
+        located = {motion.looks.object for motion in plan.motions if motion.looks is not None}
+        return put(self._plan.planner, plan.end, {name: self._belief.pose(name) for name in located})
 
     @contextmanager
     def _awaited(self, step: StepSpec) -> Iterator[Probe | None]:
@@ -255,7 +287,8 @@ class StepAttempt:
     def _take(self, carried: Carried) -> None:
         """The hand has closed on an object."""
         if self._physics:
-            self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
+            self._belief.hold(carried, self._state)
+            self._measured.grasp.close(carried, self._state, self._session.touching)
 
     def _loose(self, motion: Motion, body: str) -> Lane[str]:
         """Why the closed hand does not hold an object, up to `SQUEEZED` after it closed; "" where it does."""
@@ -276,9 +309,10 @@ class StepAttempt:
         """A failure if the hand does not carry the planned object; None if it does."""
         if carried is None or not self._physics:
             return None
-        why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
+        why = self._measured.grasp.lost(carried, self._state, self._session.touching)
         if not why:
             return None
+        self._belief.let_go(self._state)
         text = f"the hand does not carry '{carried.body}': {why}"
         if self._attaching.holding is not None:
             return MotionEnd("failed", text)
@@ -295,7 +329,7 @@ class StepAttempt:
             return None
         planner = self._plan.planner
         motion = planner.tool_pose(end).p - planner.tool_pose(before).p
-        why = self._measured.grasp.short_of(motion, self._session.engine.read())
+        why = self._measured.grasp.short_of(motion, self._state)
         return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
 
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
@@ -317,6 +351,11 @@ class StepAttempt:
         self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
         (_, first), (_, second), *_ = pressing(self._session.touching, body)
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
+
+    @property
+    def _state(self) -> WorldState:
+        """The state now, as the robot believes it."""
+        return self._belief.look(self._session.engine.read())
 
     def _report(self, text: str, *, detail: bool) -> None:
         self._progress.message(text, detail=detail)
@@ -352,7 +391,9 @@ def _sooner(a: float | None, b: float | None) -> float | None:
 
 def _moves(planned: PlannedStep) -> bool:
     """Whether a step has motions that depend on the state."""
-    return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
+    return any(
+        one is not None for motion in planned.plan.motions for one in (motion.trajectory, motion.grip, motion.looks)
+    )
 
 
 def missing(end: MotionEnd, probe: Probe | None) -> str:

@@ -14,7 +14,7 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial
 from manipcli.scene.scene import Interior
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba, Shape, Sphere
-from manipcli.spec.scene import BoxSpec, CupSpec, CylinderSpec, SphereSpec, TraySpec
+from manipcli.spec.scene import BoxSpec, CupSpec, CylinderSpec, HandleSpec, SphereSpec, TraySpec
 
 COLORS: dict[str, Rgba] = {
     "floor": (0.80, 0.81, 0.82, 1.0),
@@ -37,7 +37,7 @@ class BodyShape:
     Attributes:
         geometries: shapes in O.
         interior: its hollow, or None.
-        size, centre: (3,) [m] bounding box in O.
+        size, centre: (3,) [m] bounding box in O; of a cup without its handle.
         radius: [m] of the outline seen from above if it is a circle about O's z axis, else None.
         flat_top: whether other bodies can rest on its upper side.
         inertial: mass properties from a file; None: those of the union of the geometries at uniform density.
@@ -99,6 +99,8 @@ def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
         angle = 2.0 * math.pi * k / n
         p = (middle * math.cos(angle), middle * math.sin(angle), spec.wall + depth / 2.0)
         walls.append(Geometry(X_LS=Transform.of(xyz=p, rpy=(0.0, 0.0, angle)), shape=wall, rgba=rgba))
+    if spec.handle is not None:
+        walls += _handle(spec.handle, middle, spec, rgba)
     outline = math.hypot(spec.radius, wall.size[1] / 2.0)
     return BodyShape(
         geometries=(_placed(Cylinder(spec.radius, spec.wall), (0.0, 0.0, spec.wall / 2.0), rgba), *walls),
@@ -107,8 +109,20 @@ def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
         ),
         size=frozen([2.0 * outline, 2.0 * outline, spec.height]),
         centre=frozen([0.0, 0.0, spec.height / 2.0]),
-        radius=outline,
+        radius=outline if spec.handle is None else None,
     )
+
+
+def _handle(spec: HandleSpec, start: float, cup: CupSpec, rgba: Rgba) -> list[Geometry]:
+    """Two level bars that begin in the wall, at `start` [m] from the axis, and an upright one between their ends."""
+    t, end, middle = spec.thickness, cup.radius + spec.reach, cup.height / 2.0 if spec.middle is None else spec.middle
+    level, upright = Box((end - start, t, t)), Box((t, t, spec.height - 2.0 * t))
+    high = (spec.height - t) / 2.0
+    return [
+        _placed(level, ((start + end) / 2.0, 0.0, middle + high), rgba),
+        _placed(level, ((start + end) / 2.0, 0.0, middle - high), rgba),
+        _placed(upright, (end - t / 2.0, 0.0, middle), rgba),
+    ]
 
 
 def tray(spec: TraySpec, rgba: Rgba) -> BodyShape:

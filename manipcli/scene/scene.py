@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Final
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.scene.known import Known
 from manipcli.shapes.primitives import Box, Cylinder, Geometry
 
 SEPARATOR: Final = "/"
@@ -55,6 +56,7 @@ class Body:
         interior: the hollow of a container, else None.
         size: (3,) [m] bounding box of the body in O (full lengths).
         centre: (3,) [m] centre of that bounding box in O.
+        known: of a believed scene, how well the robot knows X_WO; None: exactly.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Body:
     interior: Interior | None
     size: Array
     centre: Array
+    known: Known | None = None
 
 
 @dataclass(frozen=True, slots=True)

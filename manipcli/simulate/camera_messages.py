@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,13 @@ def depth(metres: npt.NDArray[np.float32]) -> Picture:
     with np.errstate(invalid="ignore"):
         known = millimetres <= 65535.0
     return _picture(DEPTH, "16UC1", np.where(known, millimetres, 0.0).astype("<u2"))
+
+
+def metres(picture: Picture) -> npt.NDArray[np.float64]:
+    """(h, w) depth [m] of a message of `depth`; NaN where it has none."""
+    millimetres = np.frombuffer(cast(bytes, picture.fields["data"]), dtype="<u2").astype(np.float64)
+    height, width = cast(int, picture.fields["height"]), cast(int, picture.fields["width"])
+    return np.where(millimetres > 0.0, millimetres / MILLIMETRES, np.nan).reshape(height, width)
 
 
 def segmentation(part: npt.NDArray[np.uint16], count: int) -> Picture:

@@ -16,6 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -62,7 +63,7 @@ class Topic:
         constant: path -> value of fields that never change, and of arrays in `filled` (which sets their lengths).
         suffix: of the topic `/sensors/NAME`: `/image_raw`.
         frame: suffix of the frame in the header, one of `frames` of the member: `_optical`.
-        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves.
+        derive: (T, width) readings -> (T, k) numbers of `filled`, if they are not the readings themselves; picklable.
     """
 
     type: str
@@ -149,6 +150,7 @@ class SensorMember(Generic[S]):
             `velocity` and `effort` of these.
         remembers: the probe reads `SensorContext.before`, and on a body its velocities at every tick.
         needs_link: it must be on a link, not on a frame of the scene.
+        sensed: (spec, robot, scene) -> what conditions get of it, without `messages`; None: no condition asks for it.
     """
 
     name: str
@@ -161,6 +163,7 @@ class SensorMember(Generic[S]):
     joints: Callable[[S, RobotModel], tuple[str, ...]] | None = None
     remembers: bool = False
     needs_link: bool = False
+    sensed: Callable[[S, RobotModel, Scene], Sensed] | None = None
 
 
 AnySensor = SensorMember[Any]

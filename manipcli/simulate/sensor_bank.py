@@ -34,13 +34,18 @@ def _nobody(tick: int, taken: int, name: str, picture: Picture) -> None:
 
 @dataclass(slots=True)
 class _Numbers:
-    """A sensor of numbers; `row`: its columns of `SensorBank.numbers`, of which the first is 1 when one arrives."""
+    """A sensor of numbers.
+
+    `row`: its columns of `SensorBank.numbers`, of which the first is 1 when a measurement arrives; `heard`: whether one
+    has arrived since `reset`.
+    """
 
     probe: Probe
     chain: SignalChain
     truth: Array
     row: Array
     every: int
+    heard: bool = False
 
 
 @dataclass(slots=True)
@@ -92,7 +97,7 @@ class SensorBank:
         self.numbers = np.zeros(sum(1 + place.width for place in self._places.values() if place.width))
         self._before = LastTick(state)
         self._remembers = False
-        self._each: list[_Numbers] = []
+        self._each: dict[str, _Numbers] = {}
         self._pictures: list[_Pictures] = []
         for name, spec in sensors.items():
             member = SENSORS[spec.type]
@@ -113,7 +118,7 @@ class SensorBank:
         truth = np.zeros(place.width)
         chain = SignalChain(place.quantities, place.sampling, seed=self._seed, name=name, truth=truth, reading=row[1:])
         every = place.sampling.every if place.sampling.cutoff is None else 1
-        self._each.append(_Numbers(opened, chain, truth, row, every))
+        self._each[name] = _Numbers(opened, chain, truth, row, every)
         if place.joints is not None:
             if self.joints is None:
                 self.joints = MeasuredJoints(len(self._robot.joint_names))
@@ -127,20 +132,30 @@ class SensorBank:
         place = self._places[name]
         return self.numbers[place.first + 1 : place.first + 1 + place.width]
 
+    def arriving(self, name: str) -> Array:
+        """(1 + width) 1 at a tick at which a measurement arrives, else 0; the last reading. Always the same array."""
+        return self._each[name].row
+
+    def heard(self, name: str) -> bool:
+        """Whether a measurement of a sensor of numbers has arrived since `reset`."""
+        return self._each[name].heard
+
     def reset(self) -> None:
         """The next tick is tick 0: noise begins again, and what is on its way is dropped."""
-        for each in self._each:
+        for each in self._each.values():
             each.chain.reset()
+            each.heard = False
         for pictures in self._pictures:
             pictures.coming.clear()
             pictures.rng = generators(self._seed, pictures.name, 1)[0]
 
     def sense(self, tick: int, state: WorldState) -> None:
         """One control tick, counted from `reset`."""
-        for each in self._each:
+        for each in self._each.values():
             if tick % each.every == 0:
                 each.truth[:] = each.probe.read(state)
-            each.row[0] = each.chain.step(tick)
+            each.row[0] = arrived = each.chain.step(tick)
+            each.heard = arrived or each.heard
         for pictures in self._pictures:
             self._expose(pictures, tick, state)
         if self._remembers:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Scene
 from manipcli.simulate.mount import BASE, WORLD
 from manipcli.simulate.sensor import Quantity, Topic
 from manipcli.simulate.sensors import SENSORS
@@ -61,6 +63,19 @@ def layout(sensors: Mapping[str, SensorSpec], robot: RobotModel, period: float) 
         places[name] = Place(quantities, member.topics(spec, robot), sampling, first, width, joints)
         first += 1 + width if width else 0
     return places
+
+
+def sensed_by_name(sensors: Mapping[str, SensorSpec], robot: RobotModel, scene: Scene) -> dict[str, Sensed]:
+    """The sensors as conditions see them, also of a task with errors."""
+    found = {}
+    for name, spec in sensors.items():
+        member = SENSORS[spec.type]
+        found[name] = Sensed(spec.type)
+        if member.sensed is not None:
+            sensed = member.sensed(spec, robot, scene)
+            messages = {topic.suffix: topic.type for topic in member.topics(spec, robot)}
+            found[name] = replace(sensed, messages=messages)
+    return found
 
 
 def sensor_frames(sensors: Mapping[str, SensorSpec], robot: RobotModel) -> tuple[tuple[str, str, Transform], ...]:

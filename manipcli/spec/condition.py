@@ -29,7 +29,10 @@ COMBINATIONS = {
     "all": "All of these conditions hold.",
     "any": "At least one of these conditions holds.",
     "not": "This condition does not hold.",
+    "believed": "This condition holds for the poses that the robot believes, not for the true ones.",
 }
+SINGLE = ("not", "believed")
+"""Combinations of one condition."""
 QUANTIFIERS = {
     "always": "This condition holds all the time.",
     "never": "This condition never holds.",
@@ -55,7 +58,7 @@ class KeyedSpec(Model):
 
 
 class ConditionSpec(KeyedSpec):
-    """A condition: its name with its parameters; or `all`, `any`, `not` with other conditions."""
+    """A condition: its name with its parameters; or `all`, `any`, `not`, `believed` with other conditions."""
 
     @property
     def name(self) -> str:
@@ -73,7 +76,7 @@ class ConditionSpec(KeyedSpec):
         if not self.combines:
             return ()
         found = getattr(self, self.word)
-        return (found,) if self.word == "not" else found
+        return (found,) if self.word in SINGLE else found
 
 
 class ExpectationSpec(ConditionSpec):
@@ -113,10 +116,12 @@ class ExpectationSpec(ConditionSpec):
 
     @property
     def label(self) -> str:
-        """The id; else the name of the condition, with the prefix `never_` under `never`."""
+        """The id; else the name of the condition, with the prefix `never_` under `never`, `believed_` in `believed`."""
         if self.id is not None:
             return self.id
-        return f"never_{self.condition.name}" if self.quantifier == "never" else self.condition.name
+        inner = self.condition
+        name = f"believed_{inner.members[0].name}" if inner.name == "believed" else inner.name
+        return f"never_{name}" if self.quantifier == "never" else name
 
     @model_validator(mode="after")
     def _once(self) -> ExpectationSpec:

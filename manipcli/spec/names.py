@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 NameKind = Literal[
-    "body", "movable", "container", "part", "frame", "joint", "group", "pose", "link", "step", "controller"
+    "body", "movable", "container", "part", "frame", "joint", "group", "pose", "link", "step", "controller", "sensor"
 ]
 """What a name is of. `movable` and `container` are bodies; `part`: a body, `robot` or `robot/LINK`; `frame`: `world`,
 `base`, `tool`, a body, a part of one, a named frame; `step`: a step or a block of steps."""
@@ -39,3 +39,4 @@ PoseName = Annotated[str, Names("pose")]
 LinkName = Annotated[str, Names("link")]
 StepName = Annotated[str, Names("step")]
 ControllerName = Annotated[str, Names("controller")]
+SensorRef = Annotated[str, Names("sensor")]

@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from manipcli.spec.base import Model
+from manipcli.spec.known import KnownSpec
 from manipcli.spec.names import BodyName, FrameName
 from manipcli.spec.quantity import Length, Mass, Turn
 from manipcli.spec.robot import PoseSpec
@@ -34,6 +35,15 @@ class CylinderSpec(Model):
     height: Size = Field(description="Height [m], 1 um to 100 m.")
 
 
+class HandleSpec(Model):
+    """A handle of three bars in the plane y = 0, on the side of x."""
+
+    reach: Size = Field(description="From the outer radius of the cup to its outer side [m], 1 um to 100 m.")
+    height: Size = Field(description="Outer height [m], up to that of the cup.")
+    middle: Length | None = Field(None, description="Height of its middle [m]. Default: half that of the cup.")
+    thickness: Size = Field(0.008, description="Thickness of the bars [m], less than half the height. Default 8 mm.")
+
+
 class CupSpec(Model):
     """An open cup: a floor disc and a ring of `segments` wall boxes; its frame is in the middle of its bottom."""
 
@@ -41,6 +51,9 @@ class CupSpec(Model):
     height: Size = Field(description="Outer height [m], 1 um to 100 m.")
     wall: Size = Field(0.004, description="Thickness of wall and floor [m], 1 um to 100 m. Default 4 mm.")
     segments: Annotated[int, Field(ge=6, le=64, description="Wall boxes, 6 to 64. Default 16.")] = 16
+    handle: HandleSpec | None = Field(
+        None, description="Handle; steps treat the cup as if it had none, but for collisions. Default: none."
+    )
 
 
 class TraySpec(Model):
@@ -120,6 +133,9 @@ class BodySpec(Model):
     inside: BodyName | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
     fixed: bool = Field(
         False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
+    )
+    known: KnownSpec | None = Field(
+        None, description="How well the robot knows its pose at the start, of a movable body. Default: exactly."
     )
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
         None, description="Mass [kg], above 0 to 100 t; required unless `fixed` or `urdf`."

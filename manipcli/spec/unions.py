@@ -24,6 +24,7 @@ from manipcli.spec.block import BlockSpec
 from manipcli.spec.condition import (
     COMBINATIONS,
     QUANTIFIERS,
+    SINGLE,
     WATCHED,
     ConditionSpec,
     ExpectationSpec,
@@ -235,7 +236,7 @@ def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[Keyed
     """`base` with the field `all`, `any` (a list of conditions) or `not` (a condition)."""
     # `condition` is a type only at run time; type checkers cannot follow it.
     listed = Annotated[tuple[condition, ...], Field(min_length=1)]  # type: ignore[valid-type]
-    return _keyed(base, name, condition if name == "not" else listed, COMBINATIONS[name])
+    return _keyed(base, name, condition if name in SINGLE else listed, COMBINATIONS[name])
 
 
 def _union(kind: str, models: Sequence[type[KeyedSpec]], *, common: Sequence[str], below: Sequence[str] = ()) -> object:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -11,6 +11,9 @@ from manipcli.conditions.frames import fixed_frame
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
+from manipcli.conditions.members.touches import TouchesSpec
+from manipcli.conditions.members.wrench import WrenchSpec
+from manipcli.conditions.sensed import Sensed
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.judge.expectation import expectation_problems, until_problems
@@ -53,14 +56,18 @@ OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL14
 
 
 def consistent(
-    task: Located[TaskSpec], controllers: Located[ControllersSpec], robot: RobotModel, scene: Scene
+    task: Located[TaskSpec],
+    controllers: Located[ControllersSpec],
+    robot: RobotModel,
+    scene: Scene,
+    sensors: Mapping[str, Sensed] | None,
 ) -> tuple[Diagnostic, ...]:
     """Warnings and notes about three valid files together.
 
     Raises:
         InvalidInput: all errors of `disagreements`.
     """
-    found = disagreements(task, controllers, robot, scene)
+    found = disagreements(task, controllers, robot, scene, sensors)
     errors = [finding for finding in found if finding.severity == "error"]
     if errors:
         raise InvalidInput(errors)
@@ -68,17 +75,22 @@ def consistent(
 
 
 def disagreements(
-    task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
+    task: Located[TaskSpec],
+    controllers: Located[ControllersSpec] | None,
+    robot: RobotModel,
+    scene: Scene,
+    sensors: Mapping[str, Sensed] | None,
 ) -> tuple[Diagnostic, ...]:
     """All findings about the files together: missing names, units that fit no joint, robots that the engine refuses,
-    joints without a controller. Includes warnings and notes."""
+    joints without a controller. Includes warnings and notes. `sensors`: None if they are unknown."""
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
     misclaimed = any(finding.severity == "error" for finding in claimed)
     claims = None
     if controllers and controllers.source.untouched() and not misclaimed:
         claims = Claims.of(controllers.spec, controllers.place)
-    found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
-    warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task), *planned_in_the_run(task))
+    found = (*not_there(task, robot, scene, sensors, claims), *_named_as_links(task, robot, scene))
+    judged = () if found or sensors is None else unjudged(task, robot, scene, sensors)
+    warned = () if found else (*judged, *_unfelt(task), *planned_in_the_run(task))
     impossible = () if found or task.source.kept else tuple(_impossible(task, scene))
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
@@ -87,7 +99,11 @@ def disagreements(
 
 
 def not_there(
-    task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: Claims | None = None
+    task: Located[TaskSpec],
+    robot: RobotModel,
+    scene: Scene,
+    sensors: Mapping[str, Sensed] | None,
+    claims: Claims | None = None,
 ) -> Iterator[Diagnostic]:
     """Errors for missing names in steps, conditions and expectations; with `claims`, also for steps that no controller
     can execute."""
@@ -102,6 +118,7 @@ def not_there(
         in_order=not kept and complete,
         self_collision=spec.simulation.self_collision,
         blocks=tuple(block.id for block in spec.blocks),
+        sensors=sensors,
     )
     of_steps = [*_of_steps(spec, context, claims)]
     of_steps += _of_blocks(spec, context)
@@ -226,8 +243,10 @@ def _is_for_a_force(until: ConditionSpec, *, opposite: bool = False) -> bool:
     match until.body:
         case ContactForceSpec(above=above, below=below):
             return (below if opposite else above) is not None
-        case CollisionSpec():
+        case CollisionSpec() | TouchesSpec():
             return not opposite
+        case WrenchSpec():
+            return True
         case NoCollisionSpec():
             return opposite
     return False

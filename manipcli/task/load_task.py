@@ -13,12 +13,13 @@ from manipcli.model.build_robot import build_robot
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.load import load_controllers, load_robot
 from manipcli.spec.load import load_task as load_task_file
+from manipcli.task.believed_scene import believing
 from manipcli.task.changed_files import Files, bound
 from manipcli.task.consistency import consistent
 from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample
 from manipcli.task.second_chances import every_finding
-from manipcli.task.sensor_checks import refuse, sensor_findings
+from manipcli.task.sensor_checks import refuse, sensed, sensor_findings
 from manipcli.task.task import Task
 from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
@@ -143,8 +144,8 @@ def _as_written(
     )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
-    warnings = consistent(file, controllers_file, robot, scene)
+    warnings = consistent(file, controllers_file, robot, scene, sensed(file, robot_file, robot, scene))
     refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
     varied = bound(Files(file, robot_file, controllers_file))
     findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings)
-    return Task(file, robot_file, controllers_file, robot, scene, findings), varied
+    return believing(Task(file, robot_file, controllers_file, robot, scene, findings)), varied

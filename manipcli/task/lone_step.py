@@ -10,6 +10,7 @@ from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.outline import StepOutline
 from manipcli.plan.planner import Planner
+from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.spec.load import load_step_text
 from manipcli.spec.located import Located
 from manipcli.spec.source.tree import child, node_at
@@ -48,7 +49,10 @@ def lone_step(text: str, task: Task, number: int, claims: Claims) -> Task:
         name = step.verb if child(node, "id") is None else step.id
         changed = {"steps": steps, "blocks": (), "replan": task.spec.replan or True}
         alone = Located(task.spec.model_copy(update={**changed, "expect": (), "watch": ()}), file.source)
-        errors = [each for each in not_there(alone, task.robot, task.scene, claims) if each.severity == "error"]
+        sensors = sensed_by_name(task.sensors, task.robot, task.scene)
+        errors = [
+            each for each in not_there(alone, task.robot, task.scene, sensors, claims) if each.severity == "error"
+        ]
         if errors:
             raise InvalidInput(errors)
     except InvalidInput as invalid:

@@ -31,6 +31,7 @@ from manipcli.plan.trajectory import JointTrajectory
 from manipcli.record.start_state import StartState
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.planner import PlannerSpec
+from manipcli.task.camera_sights import camera_sights
 from manipcli.task.part import WHOLE
 from manipcli.task.plan_steps import PlannedStep, plan_units
 from manipcli.task.restored import restored_start
@@ -351,4 +352,5 @@ def _planner(task: Task) -> Planner:
             for pair in expanded_pairs(task.robot, task.scene, [each.between])
         },
         paths=task.spec.planner,
+        sights=camera_sights(task.sensors, task.robot, task.scene),
     )

@@ -25,7 +25,7 @@ def restored_start(state: StartState, planner: Planner) -> PlanningState:
     near = arm & (np.abs(state.reference - state.position) <= ReplanSpec().joints)
     lower, upper = np.transpose([joint.limits.range for joint in robot.moving_joints])
     position = frozen(np.clip(np.where(near, state.reference, state.position), lower, upper))
-    bodies = tuple(Transform.of(xyz=pose[:3], quat_xyzw=pose[3:]) for pose in state.poses)
+    bodies = tuple(Transform.of(xyz=pose[:3], quat_xyzw=pose[3:]) for pose in state.planned)
     start = PlanningState(position, bodies, closed=state.closed, at_start=False)
     if not state.held:
         return start

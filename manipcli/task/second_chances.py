@@ -27,7 +27,7 @@ from manipcli.task.changed_files import Files, out_of_range
 from manipcli.task.consistency import disagreements, not_there
 from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
-from manipcli.task.sensor_checks import robot_sensor_findings, sensor_findings
+from manipcli.task.sensor_checks import robot_sensor_findings, sensed, sensor_findings
 from manipcli.task.task_files import finder
 from manipcli.task.vary import bind
 from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
@@ -72,11 +72,12 @@ def every_finding(
         scene = errors.of(lambda: build_scene(task.spec, place=lambda loc: task.place(*loc), packages=packages))
     known_scene = scene or named_scene(partial.spec)
     if robot.model is not None:
-        found = disagreements(partial, partial_controllers, robot.model, known_scene)
+        sensors = sensed(partial, robot.file, robot.model, known_scene)
+        found = disagreements(partial, partial_controllers, robot.model, known_scene, sensors)
         errors.found += [finding for finding in found if finding.severity == "error"]
         errors.found += sensor_findings(partial, robot.file, partial_controllers, robot.model, known_scene)
     else:
-        errors.found += not_there(partial, named_robot(partial.spec), known_scene)
+        errors.found += not_there(partial, named_robot(partial.spec), known_scene, None)
     if task is not None and robot.file is not None and controllers_file is not None:
         varied, wrong = bind(task, robot.file, controllers_file)
         errors.found += (*wrong, *out_of_range(Files(task, robot.file, controllers_file), varied))

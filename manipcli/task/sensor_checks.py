@@ -9,17 +9,20 @@ from typing import Final
 
 from manipcli.conditions.condition import Problem
 from manipcli.conditions.frames import fixed_frame
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, listed
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims
 from manipcli.plan.hand import moved_links
 from manipcli.plan.steps.grasp import GraspSpec
+from manipcli.plan.steps.locate import LocateSpec
 from manipcli.plan.steps.pick import PickSpec
 from manipcli.scene.scene import Scene
 from manipcli.simulate.hand_pads import hand_pads
-from manipcli.simulate.sensor_layout import ticks_per_measurement
+from manipcli.simulate.sensor_layout import sensed_by_name, ticks_per_measurement
 from manipcli.simulate.sensors import SENSORS
+from manipcli.simulate.sensors.camera import CameraSpec
 from manipcli.simulate.sensors.tactile import TactileSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
@@ -28,6 +31,8 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.sensors import SensorSpec
 from manipcli.spec.task import TaskSpec
 
+ABSENT: Final = 230
+"""Number of the code of a finding about a name in a task that does not exist."""
 LOG_FOLDER: Final = "sensors"
 """A controller of this name publishes next to the sensors."""
 OF_CONTROLLERS: Final = ("controller_state", "reference", "error", "wrench")
@@ -86,7 +91,18 @@ def sensor_findings(
     if controllers is not None and robot_file is not None:
         every = {own.name: own.spec for own in sensors}
         found += [*_readers(controllers, every), *_reflexes(task, controllers.spec, every, robot)]
+    if robot_file is not None and not task.source.kept:
+        found += _looking(task, {own.name: own.spec for own in sensors})
     return tuple(found)
+
+
+def sensed(
+    task: Located[TaskSpec], robot_file: Located[RobotSpec] | None, robot: RobotModel, scene: Scene
+) -> dict[str, Sensed] | None:
+    """The sensors of a task and its robot as conditions see them; None: a file is refused, or they have errors."""
+    if robot_file is None or not task.source.untouched("sensors"):
+        return None
+    return sensed_by_name({**(robot_file.spec.sensors or {}), **(task.spec.sensors or {})}, robot, scene)
 
 
 def _of_robot(file: Located[RobotSpec]) -> list[_Named]:
@@ -180,6 +196,30 @@ def _measured_twice(sensors: list[_Named], robot: RobotModel) -> Iterator[Diagno
                 message = f"joint '{name}' is measured by the sensor '{other}' already; controllers read one sensor"
                 yield own.finding(Problem((), message, "list other `joints`, or remove one of them", "SENS110"))
                 break
+
+
+def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:
+    """Steps that look at an object that is known exactly, or with a sensor that is no camera with depth."""
+    able = [name for name, spec in sensors.items() if isinstance(spec, CameraSpec) and spec.depth]
+    for k, step in enumerate(task.spec.steps):
+        if not isinstance(step.body, LocateSpec):
+            continue
+        body = task.spec.scene.get(step.body.object)
+        if body is not None and body.known is None and not body.fixed:
+            message = f"the pose of '{step.body.object}' is known exactly: it has no `known`"
+            hint = "add to it `known: {region: {radius: 3 cm}}`, or remove this step"
+            yield task.source.finding(ABSENT, ("steps", k, step.verb, "object"), message, hint=hint)
+        if (name := step.body.with_) in able:
+            continue
+        spec = sensors.get(name)
+        if spec is None:
+            message = f"neither robot nor task has a sensor '{name}'"
+        elif isinstance(spec, CameraSpec):
+            message = f"camera '{name}' has no depth: `depth` is false"
+        else:
+            message = f"sensor '{name}' is of type '{spec.type}', not 'camera'"
+        near = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
+        yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=near)
 
 
 def _readers(controllers: Located[ControllersSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:

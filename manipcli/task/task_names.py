@@ -30,7 +30,7 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
     """
     find = finder(path, package_path=package_path, allow_outside=allow_outside)
     source, _ = task_source(path, model=task_spec(), find=find)
-    names = {**_of_scene(source), "step": _steps(source)}
+    names = {**_of_scene(source), "step": _steps(source), "sensor": _keys(source, "sensors")}
     robot_file = _named(source, path, "robot")
     args = None
     if robot_file is not None:
@@ -40,11 +40,13 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
             pass
         else:
             args = file.spec.args
+            names["sensor"] = {*(file.spec.sensors or {}), *_keys(source, "sensors")}
             links = [f"robot{SEPARATOR}{link.name}" for link in robot.links]
             names["joint"] = {joint.name for joint in robot.joints if joint.independent}
             names["link"] = {link.name for link in robot.links}
             names["group"] = {group.name for group in robot.groups}
             names["pose"] = {pose.name for pose in robot.poses}
+            names["sensor"] |= {*(file.spec.sensors or {})}
             names["part"] = {*names["body"], "robot", *links}
             names["frame"] |= {*links}
     controllers_file = _named(source, path, "controllers")
@@ -88,6 +90,12 @@ def _of_scene(source: Source) -> dict[NameKind, set[str]]:
         "part": {*bodies, *ground, "robot"},
         "frame": frame - {*RESERVED} | (frame & {"world", "base", "tool", "floor"}),
     }
+
+
+def _keys(source: Source, key: str) -> set[str]:
+    """The keys of a mapping of the task."""
+    node = child(source.root, key)
+    return {*node.entries} if isinstance(node, MappingNode) else set()
 
 
 def _is_true(node: Node | None) -> bool:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from manipcli.live.command import CALL_SERVICE, Command
-from manipcli.live.link import WANTED
+from manipcli.live.link import SENSED, WANTED
 from manipcli.live.loop import Outside, _Turn
 from manipcli.live.network import Hub
 from manipcli.live.pace import Share
@@ -54,13 +54,21 @@ def test_readers_leave_places_for_those_who_command() -> None:
 def test_samples_are_wanted_for_topics_of_ticks_alone() -> None:
     numbers = memoryview(bytearray(64)).cast("q")
     wanted: set[str] = set()
-    publisher = SimpleNamespace(latched={}, sampled=frozenset({"/clock", "/joint_states"}))
-    hub = Hub(cast(Any, publisher), cast(Any, None), numbers)
+    sensed = SimpleNamespace(topics=frozenset({"/sensors/wrist"}))
+    publisher = SimpleNamespace(
+        latched={}, sampled=frozenset({"/clock", "/joint_states", *sensed.topics}), sensed=sensed
+    )
+    hub = Hub(cast(Any, publisher), cast(Any, None), numbers, cast(Any, SimpleNamespace(want=lambda topics: None)))
     hub.outlets = [cast(Any, SimpleNamespace(notice="", wanted=lambda: wanted, watches=lambda: False))]
-    for topics, sampled in (({"/rosout", "/task/events"}, 0), ({"/rosout", "/clock"}, 1), (set(), 0)):
+    for topics, sampled, measured in (
+        ({"/rosout", "/task/events"}, 0, 0),
+        ({"/rosout", "/clock"}, 1, 0),
+        ({"/sensors/wrist"}, 1, 1),
+        (set(), 0, 0),
+    ):
         wanted = topics
         hub.subscribed()
-        assert numbers[WANTED] == sampled
+        assert (numbers[WANTED], numbers[SENSED]) == (sampled, measured)
 
 
 def test_a_new_subscription_keeps_the_count_of_dropped_messages() -> None:

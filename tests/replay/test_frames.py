@@ -104,29 +104,29 @@ def middle_of(image: np.ndarray, channel: int) -> tuple[float, float]:
 
 def test_things_are_where_the_camera_says() -> None:
     playback = run()
-    with Frames(playback, size=SIZE, captions=False) as frames:
-        for time in (0.0, 0.5, 1.0, 1.7, 2.0):
-            k = playback.index(time)
-            expected = seen_at(frames.camera, tuple(playback.body_position[k, 0]), SIZE)
-            assert middle_of(frames.at(time), 0) == pytest.approx(expected, abs=1.5)
-            expected = seen_at(frames.camera, (0.0, -0.15, 0.0), SIZE)
-            assert middle_of(frames.at(time), 1) == pytest.approx(expected, abs=2.5)
-        points = playback.body_position[::10, 0]
-        x, y, depth = frames.camera.project(points, SIZE)
-        for k, point in enumerate(points):
-            assert (x[k], y[k]) == pytest.approx(seen_at(frames.camera, tuple(point), SIZE))
-        assert (depth > 0).all()
+    frames = Frames(playback, size=SIZE, captions=False)
+    for time in (0.0, 0.5, 1.0, 1.7, 2.0):
+        k = playback.index(time)
+        expected = seen_at(frames.camera, tuple(playback.body_position[k, 0]), SIZE)
+        assert middle_of(frames.at(time), 0) == pytest.approx(expected, abs=1.5)
+        expected = seen_at(frames.camera, (0.0, -0.15, 0.0), SIZE)
+        assert middle_of(frames.at(time), 1) == pytest.approx(expected, abs=2.5)
+    points = playback.body_position[::10, 0]
+    x, y, depth = frames.camera.project(points, SIZE)
+    for k, point in enumerate(points):
+        assert (x[k], y[k]) == pytest.approx(seen_at(frames.camera, tuple(point), SIZE))
+    assert (depth > 0).all()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("view", [*VIEWS, "90,0", "-45,60", "10,-20", "0,90"])
 def test_all_of_the_run_is_in_view_from_everywhere(view: str) -> None:
     playback = run()
-    with Frames(playback, size=SIZE, towards=direction(view)) as frames:
-        x, y, depth = frames.camera.project(playback.body_position.reshape(-1, 3), SIZE)
-        assert x.min() > 0.0 and x.max() < SIZE[0] and y.min() > 0.0 and y.max() < SIZE[1] and depth.min() > 0.0
-        backward = np.subtract(frames.camera.eye, frames.camera.target)
-        assert np.cross(backward, direction(view)) == pytest.approx(np.zeros(3), abs=1e-6)
+    frames = Frames(playback, size=SIZE, towards=direction(view))
+    x, y, depth = frames.camera.project(playback.body_position.reshape(-1, 3), SIZE)
+    assert x.min() > 0.0 and x.max() < SIZE[0] and y.min() > 0.0 and y.max() < SIZE[1] and depth.min() > 0.0
+    backward = np.subtract(frames.camera.eye, frames.camera.target)
+    assert np.cross(backward, direction(view)) == pytest.approx(np.zeros(3), abs=1e-6)
 
 
 def test_azimuth_turns_from_the_front_to_the_left() -> None:
@@ -144,19 +144,21 @@ def test_what_stands_still_is_drawn_once_and_looks_the_same() -> None:
     camera = Camera((1.6, 0.5, 0.5), (0.0, 0.1, 0.0))
     near = Camera((0.2, -0.15, 0.05), (0.0, -0.15, 0.0))  # its near plane is in the cube
     away = Camera((1.6, 0.5, 0.5), (3.0, 0.5, 0.5))
-    with Renderer(drawing, size=SIZE) as whole, Renderer(drawing, size=SIZE, still=placing.still) as parts:
-        for one in (camera, near, away, camera):
-            for k in (0, 50, 100):
-                now = Poses(poses.position[k], poses.quat_xyzw[k])
-                difference = np.abs(whole.picture(now, one).astype(int) - parts.picture(now, one))
-                assert difference.max() <= 2
+    whole = Renderer(drawing, size=SIZE, shadows=False)
+    parts = Renderer(drawing, size=SIZE, still=placing.still, shadows=False)
+    for one in (camera, near, away, camera):
+        for k in (0, 50, 100):
+            now = Poses(poses.position[k], poses.quat_xyzw[k])
+            difference = np.abs(whole.picture(now, one).astype(int) - parts.picture(now, one))
+            assert difference.max() <= 2
 
 
 def test_step_time_and_timeline_are_written_in() -> None:
     playback = run()
-    with Frames(playback, size=(320, 240)) as frames, Frames(playback, size=(320, 240), captions=False) as bare:
-        drawn = {time: frames.at(time) for time in (0.5, 1.5, 2.0)}
-        plain = {time: bare.at(time) for time in drawn}
+    frames = Frames(playback, size=(320, 240))
+    bare = Frames(playback, size=(320, 240), captions=False)
+    drawn = {time: frames.at(time) for time in (0.5, 1.5, 2.0)}
+    plain = {time: bare.at(time) for time in drawn}
     changed = {time: np.any(drawn[time] != plain[time], axis=2) for time in drawn}
     for image in changed.values():
         assert image[:24, :100].sum() > 60  # the step
@@ -175,8 +177,8 @@ def test_step_time_and_timeline_are_written_in() -> None:
 def test_a_long_name_is_cut_and_a_tiny_picture_is_drawn() -> None:
     steps = (replace(STEPS[0], label="x" * 500 + "\x1b"),)
     for size in ((64, 64), (320, 240)):
-        with Frames(run(steps=steps), size=size) as frames:
-            assert frames.at(0.0).shape == (size[1], size[0], 3)
+        frames = Frames(run(steps=steps), size=size)
+        assert frames.at(0.0).shape == (size[1], size[0], 3)
 
 
 def test_a_sheet_has_one_tile_a_step_at_its_moment() -> None:
@@ -186,16 +188,16 @@ def test_a_sheet_has_one_tile_a_step_at_its_moment() -> None:
     assert [tile.label for tile in shown] == ["carry_1", "drop_1", "rest_1"]
     assert image.shape[1] == 3 * (SIZE[0] + sheets.GAP) + sheets.GAP
     top = image.shape[0] - sheets.GAP - SIZE[1] - round(2.1 * 9)
-    with Frames(playback, size=SIZE, captions=False) as frames:
-        for k, tile in enumerate(shown):
-            left = sheets.GAP + k * (SIZE[0] + sheets.GAP)
-            part = image[top : top + SIZE[1], left : left + SIZE[0]]
-            label = image[top + SIZE[1] : top + SIZE[1] + 18, left : left + SIZE[0]]
-            assert (label < 128).any()
-            if tile.time is None:
-                assert (part.reshape(-1, 3) == (240, 242, 245)).all(axis=1).mean() > 0.8
-            else:
-                assert np.array_equal(part, frames.at(tile.time))
+    frames = Frames(playback, size=SIZE, captions=False)
+    for k, tile in enumerate(shown):
+        left = sheets.GAP + k * (SIZE[0] + sheets.GAP)
+        part = image[top : top + SIZE[1], left : left + SIZE[0]]
+        label = image[top + SIZE[1] : top + SIZE[1] + 18, left : left + SIZE[0]]
+        assert (label < 128).any()
+        if tile.time is None:
+            assert (part.reshape(-1, 3) == (240, 242, 245)).all(axis=1).mean() > 0.8
+        else:
+            assert np.array_equal(part, frames.at(tile.time))
 
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (2, 2), (3, 3), (4, 4), (6, 3), (9, 3), (10, 4), (30, 4)])
@@ -252,8 +254,8 @@ def test_a_film_has_its_frames_and_lasts_as_long_as_the_run(
     assert np.diff(video.times) == pytest.approx(speed / fps)
     path, told = tmp_path / f"a.{ending}", []
     path.write_bytes(b"old")
-    with Frames(playback, size=(96, 72)) as frames:
-        videos.write_video(path, frames, video, progress=lambda done, total: told.append((done, total)))
+    frames = Frames(playback, size=(96, 72))
+    videos.write_video(path, frames, video, progress=lambda done, total: told.append((done, total)))
     assert told == [(k + 1, count) for k in range(count)]
     assert [one.name for one in tmp_path.iterdir()] == [path.name]
     with Image.open(path) as image:
@@ -270,23 +272,23 @@ def test_the_frames_of_a_film_show_the_run(tmp_path: Path) -> None:
     playback = run()
     for ending in ("webp", "gif"):
         path = tmp_path / f"a.{ending}"
-        with Frames(playback, size=SIZE, captions=False) as frames:
-            # Without its clock the video would have equal frames, which are written as one.
-            video = videos.Video((0.0, 0.5, 1.0, 1.8), 4.0)
-            videos.write_video(path, frames, video)
-            with Image.open(path) as image:
-                for k, time in enumerate(video.times):
-                    image.seek(k)
-                    frame = np.asarray(image.convert("RGB"))
-                    assert np.abs(frame.astype(int) - frames.at(time)).mean() < 4.0
-                    assert middle_of(frame, 0) == pytest.approx(middle_of(frames.at(time), 0), abs=1.5)
+        frames = Frames(playback, size=SIZE, captions=False)
+        # Without its clock the video would have equal frames, which are written as one.
+        video = videos.Video((0.0, 0.5, 1.0, 1.8), 4.0)
+        videos.write_video(path, frames, video)
+        with Image.open(path) as image:
+            for k, time in enumerate(video.times):
+                image.seek(k)
+                frame = np.asarray(image.convert("RGB"))
+                assert np.abs(frame.astype(int) - frames.at(time)).mean() < 4.0
+                assert middle_of(frame, 0) == pytest.approx(middle_of(frames.at(time), 0), abs=1.5)
 
 
 def test_an_mp4_has_its_frames_too(tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     playback, path = run(), tmp_path / "a.mp4"
-    with Frames(playback, size=(97, 73)) as frames:
-        videos.write_video(path, frames, videos.Video.of(playback, fps=10.0))
+    frames = Frames(playback, size=(97, 73))
+    videos.write_video(path, frames, videos.Video.of(playback, fps=10.0))
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         assert (stream.width, stream.height) == (96, 72)
@@ -309,7 +311,8 @@ def test_a_film_that_breaks_off_leaves_the_old_one(tmp_path: Path) -> None:
         if done == 3:
             raise KeyboardInterrupt
 
-    with Frames(run(), size=(96, 72)) as frames, pytest.raises(KeyboardInterrupt):
+    frames = Frames(run(), size=(96, 72))
+    with pytest.raises(KeyboardInterrupt):
         videos.write_video(path, frames, videos.Video.of(run(), fps=10.0), progress=stop)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
@@ -327,8 +330,8 @@ def test_what_makes_no_film_is_told(fps: float, speed: float) -> None:
 def test_the_same_picture_is_the_same_bytes() -> None:
     made = []
     for _ in range(2):
-        with Frames(run(), size=SIZE) as frames:
-            made.append(png_bytes(frames.at(1.8)))
+        frames = Frames(run(), size=SIZE)
+        made.append(png_bytes(frames.at(1.8)))
     assert made[0] == made[1]
     with Image.open(io.BytesIO(made[0])) as image:
         assert image.size == SIZE

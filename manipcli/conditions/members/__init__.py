@@ -19,11 +19,15 @@ from manipcli.conditions.members.moved import MOVED, UNMOVED
 from manipcli.conditions.members.near import NEAR
 from manipcli.conditions.members.rests_on import RESTS_ON
 from manipcli.conditions.members.saturation import SATURATION
+from manipcli.conditions.members.sees import SEES
 from manipcli.conditions.members.slip import SLIP
+from manipcli.conditions.members.slips import SLIPS
 from manipcli.conditions.members.step_done import STEP_DONE
 from manipcli.conditions.members.tool_speed import TOOL_SPEED
+from manipcli.conditions.members.touches import TOUCHES
 from manipcli.conditions.members.tracking import TRACKING
 from manipcli.conditions.members.upright import UPRIGHT
+from manipcli.conditions.members.wrench import WRENCH
 from manipcli.core.registry import Seam
 
 # Any: the members of a seam have different specs; each is called with its own.
@@ -32,5 +36,6 @@ CONDITIONS: Seam[Condition[Any]] = Seam(
     members=(
         INSIDE, OUTSIDE, UPRIGHT, NEAR, ABOVE, RESTS_ON, AT_REST, MOVED, UNMOVED, GRASPED, SLIP, CONTACT_FORCE,
         COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, SATURATION, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
+        TOUCHES, WRENCH, SEES, SLIPS,
     ),
 )  # fmt: skip

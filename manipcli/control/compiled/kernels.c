@@ -7,7 +7,7 @@
  *     run = kernels.bind("errors", 7, reference, position, velocity, errors).run
  *     run(bound)
  *
- * `bind` takes the arrays once, checks their types and lengths, and holds them; `run` takes numbers only.
+ * `bind` takes the arrays once, checks their types and lengths, and holds them; `run` takes what changes.
  */
 
 #define Py_LIMITED_API 0x030B0000
@@ -592,6 +592,260 @@ static const char *wrong_sensor(const Kernel *self)
     return integers(self, 11)[0] > 0 && integers(self, 11)[1] >= 0 ? NULL : "times below 0";
 }
 
+/* ---- motion of links: see manipcli/simulate/link_motion.py ---- */
+
+/* R v, R' v and a x b, for a rotation R row by row; `out` is none of the arguments. */
+static void out_of(const double *R, const double *v, double *out)
+{
+    for (int i = 0; i < 3; i++) out[i] = (R[3 * i] * v[0] + R[3 * i + 1] * v[1]) + R[3 * i + 2] * v[2];
+}
+
+static void into(const double *R, const double *v, double *out)
+{
+    for (int i = 0; i < 3; i++) out[i] = (R[i] * v[0] + R[3 + i] * v[1]) + R[6 + i] * v[2];
+}
+
+static void crossed(const double *a, const double *b, double *out)
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void product(const double *A, const double *B, double *out)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            out[3 * i + j] = (A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j]) + A[3 * i + 2] * B[6 + j];
+}
+
+/* The first arrays of laws of links, and numbers of a frame's motion. */
+enum { PARENT, KIND, INDEX, PLACEMENT, AXIS, BASE, POSITION, VELOCITY, CHAIN };
+enum { TO_P = 9, TO_W = 12, TO_V = 15, TO_ALPHA = 18, TO_A = 21, MOTION = 24 };
+
+/* travel: the motion of every frame; accelerations if `before` has the velocities of a `period` ago. */
+static void travel(const Kernel *self, const double *before, double period, double *motion)
+{
+    enum { FIXED, REVOLUTE, PRISMATIC };
+    const int64_t *parent = integers(self, PARENT), *kind = integers(self, KIND), *index = integers(self, INDEX);
+    const double *position = doubles(self, POSITION), *velocity = doubles(self, VELOCITY);
+    double root[MOTION] = {0.0};
+    memcpy(root, doubles(self, BASE), 12 * sizeof(double));
+    for (Size k = 0; k < self->n; k++) {
+        const double *above = parent[k] < 0 ? root : motion + MOTION * parent[k], *w = above + TO_W;
+        const double *placement = doubles(self, PLACEMENT) + 12 * k, *axis = doubles(self, AXIS) + 3 * k;
+        double *to = motion + MOTION * k, q = 0.0, v = 0.0, r[3], e[3], swing[3];
+        if (kind[k] != FIXED) {
+            q = position[index[k]];
+            v = velocity[index[k]];
+        }
+        product(above, placement, to);
+        out_of(above, placement + 9, r);
+        out_of(to, axis, e);
+        if (kind[k] == PRISMATIC)
+            for (int i = 0; i < 3; i++) r[i] = r[i] + e[i] * q;
+        crossed(w, r, swing);
+        for (int i = 0; i < 3; i++) {
+            to[TO_P + i] = above[TO_P + i] + r[i];
+            to[TO_W + i] = w[i];
+            to[TO_V + i] = above[TO_V + i] + swing[i];
+            if (kind[k] == REVOLUTE) to[TO_W + i] = w[i] + e[i] * v;
+            if (kind[k] == PRISMATIC) to[TO_V + i] = to[TO_V + i] + e[i] * v;
+        }
+        if (kind[k] == REVOLUTE) {
+            const double x = axis[0], y = axis[1], z = axis[2], s = sin(q), c = cos(q), t = 1.0 - c;
+            const double turn[9] = {c + x * x * t,     x * y * t - z * s, x * z * t + y * s,
+                                    x * y * t + z * s, c + y * y * t,     y * z * t - x * s,
+                                    x * z * t - y * s, y * z * t + x * s, c + z * z * t};
+            double R[9];
+            memcpy(R, to, sizeof R);
+            product(R, turn, to);
+        }
+        if (before != NULL) {
+            const double *faster = above + TO_ALPHA;
+            double tangential[3], centripetal[3], turned[3], along[3], a = 0.0;
+            crossed(faster, r, tangential);
+            crossed(w, swing, centripetal);
+            if (kind[k] != FIXED) a = (v - before[index[k]]) / period;
+            for (int i = 0; i < 3; i++) along[i] = e[i] * v;
+            crossed(w, along, turned);
+            for (int i = 0; i < 3; i++) {
+                to[TO_ALPHA + i] = faster[i];
+                to[TO_A + i] = (above[TO_A + i] + tangential[i]) + centripetal[i];
+                if (kind[k] == REVOLUTE) to[TO_ALPHA + i] = (faster[i] + e[i] * a) + turned[i];
+                if (kind[k] == PRISMATIC) to[TO_A + i] = (to[TO_A + i] + 2.0 * turned[i]) + e[i] * a;
+            }
+        }
+    }
+}
+
+static const char *wrong_chain(const Kernel *self)
+{
+    Size joints = length(self, POSITION);
+    if (length(self, PLACEMENT) != 12 * self->n || length(self, BASE) != 12) return "expected 12 numbers per pose";
+    if (length(self, VELOCITY) != joints) return "expected a velocity per joint";
+    for (Size k = 0; k < self->n; k++) {
+        int64_t parent = integers(self, PARENT)[k], index = integers(self, INDEX)[k];
+        if (parent < -1 || parent >= k) return "a frame before its parent";
+        if (integers(self, KIND)[k] != 0 && (index < 0 || index >= joints)) return "a wrong joint";
+    }
+    return NULL;
+}
+
+/* imu: PlaceMotion.measure. run() */
+static PyObject *run_imu(Kernel *self, PyObject *const *args)
+{
+    enum { BEFORE = CHAIN, GRAVITY, FRAMES, MEASURED };
+    const double *gravity = doubles(self, GRAVITY);
+    double *motion = doubles(self, FRAMES), *measured = doubles(self, MEASURED), felt[3];
+    (void)args;
+    travel(self, doubles(self, BEFORE), gravity[3], motion);
+    motion += MOTION * (self->n - 1);
+    for (int i = 0; i < 3; i++) felt[i] = motion[TO_A + i] - gravity[i];
+    into(motion, motion + TO_W, measured);
+    into(motion, felt, measured + 3);
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_imu(const Kernel *self)
+{
+    if (self->n == 0 || length(self, 8) != length(self, POSITION) || length(self, 9) != 4 || length(self, 11) != 6)
+        return "vectors of another length";
+    return length(self, 10) == MOTION * self->n ? wrong_chain(self) : "motion of another size";
+}
+
+/* momenta: LinkMomenta.update. run() */
+static PyObject *run_momenta(Kernel *self, PyObject *const *args)
+{
+    enum { NODES = CHAIN, INERTIAS, FRAMES, MOMENTA };
+    const int64_t *nodes = integers(self, NODES);
+    double *frames = doubles(self, FRAMES);
+    (void)args;
+    travel(self, NULL, 0.0, frames);
+    for (Size k = 0; k < length(self, NODES); k++) {
+        const double *own = doubles(self, INERTIAS) + 16 * k, *pose = own + 4, *motion = frames + MOTION * nodes[k];
+        double *momenta = doubles(self, MOMENTA) + 9 * k, arm[3], spin[3], part[3], swing[3];
+        out_of(motion, pose + 9, arm);
+        into(motion, motion + TO_W, part);
+        into(pose, part, spin);
+        for (int i = 0; i < 3; i++) spin[i] = own[1 + i] * spin[i];
+        out_of(pose, spin, part);
+        out_of(motion, part, momenta + 6);
+        crossed(motion + TO_W, arm, swing);
+        for (int i = 0; i < 3; i++) {
+            momenta[i] = motion[TO_P + i] + arm[i];
+            momenta[3 + i] = own[0] * (motion[TO_V + i] + swing[i]);
+        }
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_momenta(const Kernel *self)
+{
+    Size bodies = length(self, 8);
+    if (length(self, 9) != 16 * bodies || length(self, 11) != 9 * bodies) return "bodies of unequal number";
+    if (length(self, 10) != MOTION * self->n || !indices_within(self, 8, self->n)) return "motion of another size";
+    return wrong_chain(self);
+}
+
+/* Three numbers of a tuple; false with a Python error set. */
+static int vector(PyObject *of, Size at, double *found)
+{
+    PyObject *values = PyTuple_GetItem(of, at);
+    for (Size i = 0; i < 3; i++) {
+        PyObject *value = values != NULL ? PyTuple_GetItem(values, i) : NULL;
+        if (value == NULL || !number(value, found + i)) return 0;
+    }
+    return 1;
+}
+
+/* wrenches: WrenchSensors.measure without attachments. run(points): PyBullet's contact points, which it computes. n is
+ * the number of bodies on links. */
+static PyObject *run_wrenches(Kernel *self, PyObject *const *args)
+{
+    enum { NOW, BEFORE, INERTIAS, PULLS, ROWS, NUMBERS, GRAVITY, FORCES, FRAMES, NODES, CARRIED, SENSORS };
+    enum { BODY = 1, LINK = 3, PLACE = 5, NORMAL = 7, FORCE = 9 };
+    const double *now = doubles(self, NOW), *before = doubles(self, BEFORE), *inertias = doubles(self, INERTIAS);
+    const double *pulls = doubles(self, PULLS), *gravity = doubles(self, GRAVITY);
+    const int64_t *rows = integers(self, ROWS);
+    double *forces = doubles(self, FORCES);
+    Size n = self->n, points = PyTuple_Size(args[0]);
+    if (points < 0) return NULL;
+    for (Size k = 0; k < n; k++) {
+        const double *centre = now + 9 * k;
+        double *force = forces + 6 * k, moment[3];
+        for (int i = 0; i < 3; i++)
+            force[i] = (now[9 * k + 3 + i] - before[9 * k + 3 + i]) / gravity[3] - inertias[16 * k] * gravity[i];
+        crossed(centre, force, moment);
+        for (int i = 0; i < 3; i++)
+            force[3 + i] = ((now[9 * k + 6 + i] - before[9 * k + 6 + i]) / gravity[3] + moment[i]) - pulls[6 * k + 3 + i];
+        for (int i = 0; i < 3; i++) force[i] = force[i] - pulls[6 * k + i];
+    }
+    for (Size at = 0; at < points; at++) {
+        PyObject *point = PyTuple_GetItem(args[0], at);
+        double normal[3], along[3], across[3], press, first, second, place[3], moment[3], push[3];
+        int64_t row[2];
+        for (int side = 0; side < 2; side++) {
+            PyObject *body = PyTuple_GetItem(point, BODY + side), *link = PyTuple_GetItem(point, LINK + side);
+            long long own, child;
+            if (body == NULL || link == NULL) return NULL;
+            own = PyLong_AsLongLong(body);
+            child = PyLong_AsLongLong(link);
+            if (PyErr_Occurred()) return NULL;
+            row[side] = own == *integers(self, NUMBERS) && child >= 0 && child < length(self, ROWS) ? rows[child] : -1;
+        }
+        if (row[0] < 0 && row[1] < 0) continue;
+        if (!vector(point, NORMAL, normal) || !vector(point, FORCE + 2, along) || !vector(point, FORCE + 4, across))
+            return NULL;
+        for (int i = 0; i < 3; i++) {
+            PyObject *value = PyTuple_GetItem(point, FORCE + (i == 0 ? 0 : 2 * i - 1));
+            if (value == NULL || !number(value, i == 0 ? &press : i == 1 ? &first : &second)) return NULL;
+        }
+        for (int side = 0; side < 2; side++) {
+            double *force = forces + 6 * row[side];
+            if (row[side] < 0) continue;
+            if (!vector(point, PLACE + side, place)) return NULL;
+            for (int i = 0; i < 3; i++) {
+                push[i] = (press * normal[i] + first * along[i]) + second * across[i];
+                if (side == 1) push[i] = -push[i];
+            }
+            crossed(place, push, moment);
+            for (int i = 0; i < 3; i++) {
+                force[i] = force[i] - push[i];
+                force[3 + i] = force[3 + i] - moment[i];
+            }
+        }
+    }
+    for (Size s = 0; SENSORS + s < self->count; s++) {
+        const unsigned char *carried = flags(self, CARRIED) + s * n;
+        const double *motion = doubles(self, FRAMES) + MOTION * integers(self, NODES)[s];
+        double sum[6] = {0.0}, moment[3], *values = doubles(self, SENSORS + s);
+        for (Size k = 0; k < n; k++)
+            for (int i = 0; carried[k] && i < 6; i++) sum[i] = sum[i] + forces[6 * k + i];
+        crossed(motion + TO_P, sum, moment);
+        for (int i = 0; i < 3; i++) {
+            moment[i] = moment[i] - sum[3 + i];
+            sum[i] = -sum[i];
+        }
+        into(motion, sum, values);
+        into(motion, moment, values + 3);
+    }
+    Py_RETURN_NONE;
+}
+
+static const char *wrong_wrenches(const Kernel *self)
+{
+    Size n = self->n, sensors = self->count - 11;
+    for (Size k = 0; k < length(self, 4); k++)
+        if (integers(self, 4)[k] >= n) return "a link of no body";
+    if (length(self, 2) != 16 * n || length(self, 5) != 1 || length(self, 6) != 4) return "vectors of another length";
+    if (length(self, 9) != sensors || length(self, 10) != sensors * n) return "sensors of unequal number";
+    if (!indices_within(self, 9, length(self, 8) / MOTION)) return "a sensor on no frame";
+    for (Size k = 11; k < self->count; k++)
+        if (length(self, k) != 6) return "expected 6 numbers per wrench";
+    return NULL;
+}
+
 static const Law LAWS[] = {
     {"errors", "d2d1d1D2", 1, run_errors, NULL},
     {"pid", "d2d2d1d1d1d1d1d1b1d1b1d1d1D1D1d1d1D1b0", 2, run_pid, wrong_pid},
@@ -604,6 +858,9 @@ static const Law LAWS[] = {
     {"scan", "d0i0i0i0d0b1d0d0D0D0", 0, run_scan, wrong_scan},
     {"raster", "d0d0i0i0i0d0d3b1d0d0d0D0D0I0D0D0", 0, run_raster, wrong_raster},
     {"sensor", "d1D1d0b0d1d1d1D0B0D1d0i0", 1, run_sensor, wrong_sensor},
+    {"imu", "i1i1i1d0d3d0d0d0d0d0D0D0", 0, run_imu, wrong_imu},
+    {"momenta", "i1i1i1d0d3d0d0d0i0d0D0D0", 0, run_momenta, wrong_momenta},
+    {"wrenches", "d9d9d0d6i0i0d0D6d0i0b0|D0", 1, run_wrenches, wrong_wrenches},
     {NULL, NULL, 0, NULL, NULL},
 };
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from manipcli.core.registry import Seam
 from manipcli.plan.step import StepMember
-from manipcli.plan.steps import follow, grasp, lift, move, pick, place, pour, release, switch_controllers, wait
+from manipcli.plan.steps import follow, grasp, lift, locate, move, pick, place, pour, release, switch_controllers, wait
 
 STEPS: Seam[StepMember[Any]] = Seam(
     kind="step",
@@ -14,6 +14,7 @@ STEPS: Seam[StepMember[Any]] = Seam(
         grasp.MEMBER,
         release.MEMBER,
         wait.MEMBER,
+        locate.MEMBER,
         switch_controllers.MEMBER,
         pick.MEMBER,
         lift.MEMBER,

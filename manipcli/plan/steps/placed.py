@@ -39,7 +39,7 @@ def goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     if isinstance(spec.at, RelationSpec) and carrier(planner.scene, spec.at.of) in inside:
         raise NotPlannable(f"'{spec.at.of}' is in '{spec.object}' and moves with it", loc=("at", "of"))
     if spec.at_start:
-        return planner.scene.body(spec.object).X_WO
+        return planner.starts.get(spec.object, planner.scene.body(spec.object).X_WO)
     X_WG = _goal(spec, planner, state)
     _refuse_overlap(spec, planner, state, X_WG)
     if spec.support is None:

@@ -12,6 +12,9 @@ from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from manipcli.core.geometry import Transform, frozen
 from manipcli.record import channels as topics
 from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
@@ -22,12 +25,14 @@ from manipcli.record.read.chunk import indexed, open_chunk, singly, walked
 from manipcli.record.read.contacts import have_points
 from manipcli.record.read.scan import MAX_NAMED, Record, Scan, guarded
 from manipcli.record.read.spans import FileSpans
-from manipcli.record.recording import Recording, TaskEvent
+from manipcli.record.recording import BeliefSnapshot, Recording, TaskEvent
 from manipcli.record.records import ATTACHMENT, CHANNEL, CHUNK, HEADER, MESSAGE, METADATA, SCHEMA
 
 if TYPE_CHECKING:
     from mcap.records import Attachment
 
+UNIT = 1e-6
+"""Largest difference of the length of a quaternion from 1."""
 MAX_ATTACHED = 1 << 30
 """Largest size of all attachments together [byte]."""
 
@@ -75,6 +80,7 @@ class _Reader:
         self._contents: Contents | None = None
         self._types: dict[str, str] = {}
         self._events: list[TaskEvent] = []
+        self._beliefs: list[BeliefSnapshot] = []
         self._chunks: list[int] = []
         self._newest = -1
         self._heard: set[str] = set()
@@ -141,6 +147,8 @@ class _Reader:
         }
         for name in self._contents.controllers:
             self._types[ControllerChannel(name, ()).state_topic] = schemas.CONTROLLER_STATE
+        if self._contents.believed:
+            self._types[topics.BELIEF_TF] = schemas.TF_MESSAGE
         for topic in self._contents.absent:
             self._types.pop(topic, None)
 
@@ -152,7 +160,9 @@ class _Reader:
         if not indexes or "" in of.values():
             guarded(self._path, record, lambda record: self._opened(record, {}))
             return
-        needed = {channel: raw for channel, raw in indexes.items() if of[channel] == topics.EVENTS}
+        needed = {
+            channel: raw for channel, raw in indexes.items() if of[channel] == topics.EVENTS or believes(of[channel])
+        }
         if needed:
             guarded(self._path, record, lambda record: self._opened(record, needed))
         self._heard.update(of[channel] for channel, entries in indexes.items() if entries)
@@ -176,6 +186,8 @@ class _Reader:
             self._heard.add(topic)
             if topic == topics.EVENTS:
                 self._events += [_event(ns, reader) for ns, reader in singly(data, found)]
+            elif believes(topic):
+                self._beliefs += [_belief(topic, ns, reader) for ns, reader in singly(data, found)]
             elif topic == topics.JOINT_STATES:
                 self._newest = int(found.times[-1])
 
@@ -207,6 +219,8 @@ class _Reader:
         return Recording(
             joint_names=known.joints,
             body_names=known.bodies,
+            believed_names=known.believed,
+            beliefs=tuple(self._beliefs),
             spans=FileSpans(
                 path=self._path,
                 contents=known,
@@ -224,6 +238,21 @@ class _Reader:
             absent=known.absent,
             silent=tuple(topic for topic in self._types if topic not in {*self._heard, *inactive}),
         )
+
+
+def believes(topic: str) -> bool:
+    """Whether a topic has the believed poses of one uncertain body."""
+    return topic.startswith(f"{topics.BELIEF}/") and topic != topics.BELIEF_TF
+
+
+def _belief(topic: str, ns: int, reader: CdrReader) -> BeliefSnapshot:
+    reader.header()
+    pose, covariance = (np.array([reader.f64() for _ in range(count)]) for count in (7, 36))
+    if not abs(float(np.linalg.norm(pose[3:])) - 1.0) <= UNIT:
+        raise CdrError(f"a quaternion of {topic} is not of length 1")
+    X_WO = Transform.of(xyz=pose[:3], quat_xyzw=pose[3:])
+    body = topic.removeprefix(f"{topics.BELIEF}/")
+    return BeliefSnapshot(ns / 1e9, body, X_WO, frozen(covariance.reshape(6, 6)))
 
 
 def _event(ns: int, reader: CdrReader) -> TaskEvent:

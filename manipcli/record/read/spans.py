@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record import schemas
 from manipcli.record.cdr import CdrError
-from manipcli.record.channels import ControllerChannel
+from manipcli.record.channels import ControllerChannel, believed_frame
 from manipcli.record.contents import Contents
 from manipcli.record.decode import Int
 from manipcli.record.faults import Thinned
@@ -30,7 +31,8 @@ from manipcli.record.read.columns import (
 from manipcli.record.read.contacts import read_contacts
 from manipcli.record.read.differences import body_velocities
 from manipcli.record.read.scan import Record, chunk_at, guarded, readable
-from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
+from manipcli.record.read.sensed import SensedTopics, reading_topics
+from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span
 from manipcli.record.selection import common_stride
 
 MEASURED: Final = 2
@@ -50,6 +52,7 @@ class FileSpans:
         cut: whether parts of the file are missing, so that messages of some ticks can be missing.
         points: whether contacts have contact points.
         skip_points: leave these out.
+        sensors: whose readings are read.
     """
 
     path: Path
@@ -59,6 +62,7 @@ class FileSpans:
     cut: bool
     points: bool
     skip_points: bool = False
+    sensors: Mapping[str, Sensed] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Span]:
         """
@@ -75,7 +79,9 @@ class FileSpans:
         yield _with_velocities(before, span, None)
 
     def _without_velocities(self) -> Iterator[Span]:
-        reader = _SpanReader(self.contents, self.channels, gaps=self.cut, points=self.points, skip=self.skip_points)
+        reader = _SpanReader(
+            self.contents, self.channels, self.sensors, gaps=self.cut, points=self.points, skip=self.skip_points
+        )
         empty = True
         with readable(self.path), self.path.open("rb") as file:
             for start in self.chunks:
@@ -103,8 +109,19 @@ class FileSpans:
             raise Thinned(self.path) from error
 
 
+def with_readings(recording: Recording, sensors: Mapping[str, Sensed]) -> Recording:
+    """The recording with the readings of these sensors in its spans, if the log has their topics."""
+    spans = recording.spans
+    if not sensors or not isinstance(spans, FileSpans):
+        return recording
+    there = {*spans.channels.values()}
+    read = {name: sensed for name, sensed in sensors.items() if there.issuperset(reading_topics(name, sensed))}
+    return replace(recording, spans=replace(spans, sensors=read), sensors=tuple(read))
+
+
 class _Apart(Exception):
-    """Joints, bodies and controllers have different times or rates than declared, or contacts are missing."""
+    """Joints, bodies and controllers have different times or rates than declared, or contacts or measurements are
+    missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +154,14 @@ class _SpanReader:
     """
 
     def __init__(
-        self, contents: Contents, channels: Mapping[int, str], *, gaps: bool, points: bool, skip: bool
+        self,
+        contents: Contents,
+        channels: Mapping[int, str],
+        sensors: Mapping[str, Sensed],
+        *,
+        gaps: bool,
+        points: bool,
+        skip: bool,
     ) -> None:
         n, m = len(contents.joints), len(contents.bodies)
         self._channels = channels
@@ -157,6 +181,12 @@ class _SpanReader:
         if topics.TF not in contents.absent:
             poses = body_runs(frozenset(contents.bodies), WORLD)
             self._columns[topics.TF] = Columns(topics.TF, schemas.TF_MESSAGE, poses, contents.bodies, (7,) * m)
+        if contents.believed and topics.BELIEF_TF not in contents.absent:
+            frames = tuple(map(believed_frame, contents.believed))
+            poses = body_runs(frozenset(frames), WORLD)
+            self._columns[topics.BELIEF_TF] = Columns(
+                topics.BELIEF_TF, schemas.TF_MESSAGE, poses, frames, (7,) * len(frames)
+            )
         for controller in self._controllers:
             topic, widths = controller.state_topic, (len(controller.joints),) * 4
             self._columns[topic] = Columns(
@@ -166,10 +196,14 @@ class _SpanReader:
         self._grid_ns = common_stride(strides) * contents.period * 1e9
         self._strided = len(set(strides.values())) > 1
         self._contacts: list[ContactSnapshot] = []
+        self._sensors = {name: SensedTopics(name, sensed) for name, sensed in sensors.items()}
+        self._sensed = {
+            topic: self._sensors[name] for name, sensed in sensors.items() for topic in reading_topics(name, sensed)
+        }
         self._gaps = gaps
         self._points, self._skip = points, skip
         self._last = -1
-        self._number: int | None = None
+        self._numbers: dict[str, int] = {}
 
     @property
     def ready(self) -> int:
@@ -195,19 +229,21 @@ class _SpanReader:
                 if len(common.times):
                     self._columns[topic].add(data, common)
             elif topic == topics.CONTACTS:
-                self._follow(sequences(data, found))
+                self._follow(topic, sequences(data, found))
                 self._contacts += [
                     ContactSnapshot(ns / 1e9, read_contacts(reader, points=self._points, skip=self._skip))
                     for ns, reader in singly(data, found)
                 ]
+            elif topic in self._sensed:
+                self._follow(topic, sequences(data, found))
+                self._sensed[topic].add(topic, data, found)
 
-    def _follow(self, numbers: Int) -> None:
-        """Detect missing contact messages by their sequence numbers, which another program can restart at 0 or set to
-        0."""
-        before = min(int(numbers[0]) - 1, 0) if self._number is None else self._number
+    def _follow(self, topic: str, numbers: Int) -> None:
+        """Detect missing messages by their sequence numbers, which another program can restart at 0 or set to 0."""
+        before = self._numbers.get(topic, min(int(numbers[0]) - 1, 0))
         if not self._gaps and numbers.any() and not np.all(np.diff(numbers, prepend=before) == 1):
             raise _Apart
-        self._number = int(numbers[-1])
+        self._numbers[topic] = int(numbers[-1])
 
     def _common(self, places: Places) -> Places:
         """The messages of the ticks with a message of every topic."""
@@ -225,6 +261,12 @@ class _SpanReader:
         taken = [self._trace(controller.state_topic, ns, position) for controller in self._controllers]
         if not np.array_equal(ns, body_ns):
             raise _Apart
+        believed = np.zeros((0, 0, 7))
+        if topics.BELIEF_TF in self._columns:
+            belief_ns, beliefs = self._columns[topics.BELIEF_TF].take(ticks)
+            believed = np.stack(beliefs, axis=1)
+            if not np.array_equal(ns, belief_ns):
+                raise _Apart
         self._count(ns)
         time = _settled(ns / 1e9)
         bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
@@ -237,6 +279,8 @@ class _SpanReader:
                 for controller, runs in zip(self._controllers, taken, strict=True)
             ),
             contacts=self._contacts_until(time[-1] if ticks else np.inf),
+            believed=_settled(believed),
+            readings={name: each.until(float(ns[-1]) if ticks else np.inf) for name, each in self._sensors.items()},
         )
 
     def _trace(self, topic: str, ns: Int, position: Array) -> list[Array]:

@@ -19,7 +19,14 @@ from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
-from manipcli.record.channels import Channel, ControllerChannel, MeasuredChannel, Recorded, SensorChannel
+from manipcli.record.channels import (
+    Channel,
+    ControllerChannel,
+    MeasuredChannel,
+    Recorded,
+    SensorChannel,
+    believed_frame,
+)
 from manipcli.record.messages import WORLD
 from manipcli.record.selection import Selection
 from manipcli.record.write.arrivals import Arrivals, nanoseconds, together
@@ -152,6 +159,7 @@ class Block:
     Args:
         channels: recorded channels.
         sensors: those of numbers.
+        believed: bodies with believed poses of their own.
 
     Attributes:
         topics: those with messages at ticks.
@@ -167,6 +175,7 @@ class Block:
         period: float,
         capacity: int,
         sensors: Sequence[MeasuredChannel] = (),
+        believed: Sequence[str] = (),
     ) -> None:
         n, m = len(robot.moving_joints), len(scene.movable)
         self.count = 0
@@ -183,20 +192,30 @@ class Block:
         self._compiled: Run | None = None
         self._idle = [*_NOBODY]
         self._ids = {channel.topic: channel.id for channel in channels}
+        self._believed = np.zeros((capacity, 7 * len(believed)))
+        self._belief: Array | None = None
         sources = self._sources(robot, scene, controllers)
+        if topics.BELIEF_TF in self._ids:
+            template = tf_template(self._ids[topics.BELIEF_TF], [(WORLD, believed_frame(name)) for name in believed])
+            sources.append(_Source(topics.BELIEF_TF, template, self._beliefs))
         self.topics = frozenset(source.topic for source in sources)
         strides = [selection.stride(source.topic, period) for source in sources]
         self._groups = []
         for stride in sorted(set(strides)):
             mine = [source for source, every in zip(sources, strides, strict=True) if every == stride]
             self._groups.append(_Group(stride, mine, capacity))
-        self._measured = np.zeros((capacity, max((s.first + s.width for s in sensors), default=0)))
+        self._measured = np.zeros((capacity, max((s.first + s.width for s in sensors if s.width), default=0)))
         self._sensed: Array | None = None
         self._arrivals = [Arrivals(same, self._ids, capacity) for same in together(sensors, self._ids)]
 
     def attach(self, numbers: Array) -> None:
         """Copy these numbers (width of all sensors) at every tick from now on; see `MeasuredChannel`."""
         self._sensed = numbers if self._measured.shape[1] else None
+        self._seen = None
+
+    def believe(self, poses: Array) -> None:
+        """Copy these believed poses (k, 7) at every tick from now on."""
+        self._belief = poses.reshape(-1)
         self._seen = None
 
     def _sources(self, robot: RobotModel, scene: Scene, controllers: Sequence[Recorded]) -> list[_Source]:
@@ -261,6 +280,8 @@ class Block:
         self._numbers[k] = numbers
         if self._sensed is not None:
             self._measured[k] = self._sensed
+        if self._belief is not None:
+            self._believed[k] = self._belief
         for rows, speeds, output in zip(self._rows, self._speeds, outputs, strict=True):
             if rows is not None and output is not None:
                 rows[k] = output.rows
@@ -281,6 +302,8 @@ class Block:
         groups = [self._numbers, numbers]
         if self._sensed is not None:
             groups += [self._measured, self._sensed]
+        if self._belief is not None:
+            groups += [self._believed, self._belief]
         for rows, speeds, output in zip(self._rows, self._speeds, outputs, strict=True):
             if rows is not None and output is not None and rows[0].size:
                 groups += [rows, output.rows] if speeds is None else [rows, output.rows, speeds, output.speed]
@@ -308,6 +331,10 @@ class Block:
         links = np.concatenate((X_position, X_quat), axis=2)
         bodies = np.concatenate((self._states.body_position[at], self._states.body_quat_xyzw[at]), axis=2)
         return [*links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
+
+    def _beliefs(self, at: Ticks) -> list[Array]:
+        poses = self._believed[at]
+        return [*poses.reshape(len(poses), -1, 7).swapaxes(0, 1)]
 
     def _state(self, of: _ControllerRows, at: Ticks) -> list[Array]:
         return of.state(at, *self._joints(at))

@@ -23,11 +23,14 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
 from manipcli.record.channels import (
+    NO_BELIEF,
     TRANSIENT_LOCAL,
+    BeliefChannels,
     Channel,
     ControllerChannel,
     MeasuredChannel,
     Recorded,
+    believed_frame,
     channel_table,
 )
 from manipcli.record.contents import RECORD, Contents
@@ -62,6 +65,7 @@ class Recorder:
         live: the recording is that of a live session, and has its commands.
         sensors: topics of sensors; `attach` gives the numbers.
         sensor_frames: (parent, child, X_PC) of their frames.
+        belief: topics of what the robot believes; `believe` gives the poses.
 
     Attributes:
         listener: called with the topic, time [ns] and CDR bytes of each message that is not written at every tick.
@@ -86,15 +90,17 @@ class Recorder:
         live: bool = False,
         sensors: Sequence[MeasuredChannel] = (),
         sensor_frames: Sequence[tuple[str, str, Transform]] = (),
+        belief: BeliefChannels = NO_BELIEF,
     ) -> None:
         self.listener: Callable[[str, int, bytes], None] = _nobody
-        _check_names(path, robot, scene, [child for _, child, _ in sensor_frames], [name for name, _, _ in attachments])
-        everything = channel_table(controllers, live=live, sensors=sensors)
+        further = [*(child for _, child, _ in sensor_frames), *map(believed_frame, belief.bodies)]
+        _check_names(path, robot, scene, further, [name for name, _, _ in attachments])
+        everything = channel_table(controllers, live=live, sensors=sensors, belief=belief)
         table = [channel for channel in everything if selection.holds(channel)]
         self._period = period
         self._ids = {channel.topic: channel.id for channel in table}
         capacity = max(1, round(BLOCK_SECONDS / period))
-        self._block = Block(robot, scene, controllers, table, selection, period, capacity, sensors)
+        self._block = Block(robot, scene, controllers, table, selection, period, capacity, sensors, belief.bodies)
         self._singles: list[Single] = []
         self._sequences: Counter[int] = Counter()
         self._contact_encoder = messages.ContactEncoder()
@@ -109,6 +115,7 @@ class Recorder:
             controllers={c.name: c.joints for c in controllers if isinstance(c, ControllerChannel)},
             strides={c.topic: selection.stride(c.topic, period) for c in table if word(c.topic) in JUDGED},
             absent=tuple(channel.topic for channel in everything if channel not in table),
+            believed=belief.bodies,
         )
         self._goals = {c.name: GoalLog(c) for c in controllers if isinstance(c, ControllerChannel) and c.action}
         self._touches = topics.CONTACTS in self._ids
@@ -156,9 +163,20 @@ class Recorder:
         """Record the numbers of all sensors from now on, at every tick; see `MeasuredChannel`."""
         self._block.attach(numbers)
 
+    def believe(self, poses: Array) -> None:
+        """Record these poses (k, 7) of the bodies of `belief` from now on, at every tick."""
+        self._block.believe(poses)
+
+    def believed(self, tick: int, name: str, X_WO: Transform, covariance: Array) -> None:
+        """Record what the robot believes about an uncertain body from `tick` on; `covariance`: see `Belief`."""
+        topic, ns = f"{topics.BELIEF}/{name}", self._ns(tick)
+        if topic in self._ids:
+            data = messages.pose_with_covariance(X_WO, covariance, ns)
+            self._single(topic, ns, data)
+
     def measured(self, tick: int, taken: int, topic: str, fields: Mapping[str, object]) -> None:
         """Record a message of a sensor that arrives at `tick` and was taken at the tick `taken`."""
-        if topic in self._ids:
+        if topic in self._ids or self.listener is not _nobody:
             kind, frame = self._frames[topic]
             self._single(topic, self._ns(tick), encode(kind, fields, ns=self._ns(taken), frame=frame).data)
 
@@ -318,13 +336,13 @@ def _declare(container: Container, table: Sequence[Channel]) -> None:
 
 
 def _check_names(
-    path: Path, robot: RobotModel, scene: Scene, sensors: Sequence[str], attachments: Sequence[str]
+    path: Path, robot: RobotModel, scene: Scene, further: Sequence[str], attachments: Sequence[str]
 ) -> None:
     """Check that frame names are unique in /tf and attachments have plain file names."""
     frames = Counter([messages.WORLD, *(link.name for link in robot.links if link.name != messages.WORLD)])
     frames.update([body.name for body in scene.bodies])
     frames.update([frame.name for frame in scene.frames])
-    frames.update(sensors)
+    frames.update(further)
     for name, times in frames.items():
         if times > 1:
             raise RecordingRefused(

@@ -25,6 +25,7 @@ from manipcli.report.html.page_parts import (
     signed,
     table,
 )
+from manipcli.report.located import LOCATED, located_rows
 from manipcli.report.nesting import block_line, nested
 from manipcli.report.run_page import RunPage, Source, Written
 
@@ -157,6 +158,19 @@ def expectations(page: RunPage) -> Markup | None:
         heading("expectations", "Expectations", about),
         table(headers, rows, numbers=("margin",), stacks=True),
     )
+
+
+def located(page: RunPage) -> Markup | None:
+    """Belief against truth before and after each `locate`."""
+    found = page.verdict.located
+    if not found:
+        return None
+    rows = [
+        (*row[:-1], joined(row[-1], seek(each.time, playable=page.playback is not None)))
+        for row, each in zip(located_rows(found), found, strict=True)
+    ]
+    about = "Distance and angle between the believed and the true pose."
+    return element("section", heading("located", "Located", about), table(LOCATED, rows, stacks=True))
 
 
 def steps(page: RunPage) -> Markup | None:

@@ -23,6 +23,7 @@ def render_page(page: RunPage) -> str:
         "Warnings": sections.warnings(page),
         "Replay": _replay(page),
         "Steps": sections.steps(page),
+        "Located": sections.located(page),
         "Grasps": grasps,
         "Joints": joints,
         "Energy": energy,

@@ -88,8 +88,10 @@ class PybulletEngine:
         ]
         self._start(robot, settings)
         self._rows = {body.name: row for row, body in enumerate(scene.movable)}
-        self._wrenches = WrenchSensors(p, client, self._robot, gravity=scene.gravity, step=settings.step)
         links = {name: k for k, name in self._links.items()}
+        self._wrenches = WrenchSensors(
+            p, client, robot, self._robot, self._joints, links, gravity=scene.gravity, step=settings.step
+        )
         bodies = {body.name: k for body, k in zip(scene.bodies, self._bodies, strict=True)}
         self._attachments = Attachments(p, client, robot, self._robot, links, bodies)
         n, m = len(self._joints), len(self._movable)
@@ -117,7 +119,7 @@ class PybulletEngine:
         infos = [p.getJointInfo(self._robot, k, physicsClientId=client) for k in range(count)]
         by_name = {info[1].decode(): k for k, info in enumerate(infos)}
         self._joints = [by_name[name] for name in robot.joint_names]
-        self._model, self._numbers = robot, by_name
+        self._model = robot
         self._links = link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
         for link in link_names:
             # Two calls: with a damping, Bullet drops all other values of a link.
@@ -198,16 +200,14 @@ class PybulletEngine:
                 state.body_linear[row], state.body_angular[row] = self._velocity(row, quat)
         pulls = self._attachments.measure() if self._attachments else ()
         if self._wrenches:
-            self._wrenches.measure(self._contact_points(), pulls)
+            self._wrenches.measure(state.numbers[: 2 * len(self._joints)], self._contact_points, pulls)
         return state
 
     def write(self, command: JointCommand) -> None:
         self._motors.write(command)
 
     def sense_wrench(self, joint: str) -> Array:
-        hanging = self._model.descendants(self._model.joint(joint).child)
-        below = [self._numbers[below.name] for below in self._model.joints if below.child in hanging]
-        return self._wrenches.add(self._numbers[joint], below)
+        return self._wrenches.add(self._model.joint(joint).child)
 
     def attach(self, body: str) -> Array:
         return self._attachments.attach(body)

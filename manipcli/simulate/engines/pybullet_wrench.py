@@ -14,40 +14,27 @@ surface. PyBullet does not report the moment of spinning and rolling friction: t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
 
-from manipcli.core.geometry import Array, cross, rotate, rotate_inverse
+from manipcli.control.compiled import bind
+from manipcli.core.geometry import Array, cross
+from manipcli.model.robot import RobotModel
 from manipcli.simulate.engines.pybullet_attachment import Pull
-from manipcli.simulate.engines.pybullet_contacts import BulletPoint, Vector
+from manipcli.simulate.engines.pybullet_contacts import BulletPoint
+from manipcli.simulate.link_motion import Chain, LinkMomenta, crossed, into
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sensor:
-    """`link`: the child, `links`: all links below the joint, Bullet's numbers; `values` (6)."""
+    """`link`: the child, `links`: it and all below the joint; `values` (6)."""
 
-    link: int
-    links: frozenset[int]
+    link: str
+    links: frozenset[str]
     values: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Motion:
-    """Poses and momenta in the world of the links of all sensors (k).
-
-    Attributes:
-        centres: (k, 3) centres of mass.
-        origins, turned: (k, 3), (k, 4) their frames; the quaternions xyzw.
-        momenta: (k, 6) linear [N s], and angular about the centre of mass [N m s].
-    """
-
-    centres: Array
-    origins: Array
-    turned: Array
-    momenta: Array
 
 
 class WrenchSensors:
@@ -56,100 +43,122 @@ class WrenchSensors:
     Args:
         p: PyBullet.
         client: its world.
-        body: Bullet's number of the robot.
+        robot: the model; `body`: Bullet's number of it.
+        joints: Bullet's numbers of its moving joints.
+        links: Bullet's number of each link.
         gravity: (3) [m/s^2].
         step: [s] of the physics.
     """
 
-    def __init__(self, p: ModuleType, client: int, body: int, *, gravity: Array, step: float) -> None:
-        self._p, self._client, self._body, self._gravity, self._step = p, client, body, gravity, step
+    def __init__(
+        self, p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int], links: Mapping[str, int],
+        *, gravity: Array, step: float,
+    ) -> None:  # fmt: skip
+        self._p, self._client, self._robot, self._body = p, client, robot, body
+        self._numbers, self._links = joints, links
+        self._gravity = np.array([*gravity, step])
+        self._joints = np.zeros(2 * len(joints))  # positions and velocities
         self._sensors: list[_Sensor] = []
-        self._rows: dict[int, int] = {}
-        self._mass: Array = np.zeros((0, 1))
-        self._moments: Array = np.zeros((0, 3))
-        self._carries: Array = np.zeros((0, 0))
-        self._now: _Motion | None = None
-        self._before: _Motion | None = None
+        self._known = self._remembers = False
 
     def __bool__(self) -> bool:
         return bool(self._sensors)
 
-    def add(self, link: int, below: Sequence[int]) -> Array:
-        """A sensor between `link` and its parent; `below`: it and all links below it.
+    def add(self, link: str) -> Array:
+        """A sensor between `link` and its parent.
 
         Returns:
             (6) force [N] and torque [N m] of the link on its parent, in the link's frame, about its origin.
         """
-        sensor = _Sensor(link, frozenset(below), np.zeros(6))
+        sensor = _Sensor(link, self._robot.descendants(link), np.zeros(6))
         self._sensors.append(sensor)
-        links = sorted(frozenset[int]().union(*(other.links for other in self._sensors)))
-        self._rows = {k: row for row, k in enumerate(links)}
-        infos = [self._p.getDynamicsInfo(self._body, k, physicsClientId=self._client) for k in links]
-        self._mass = np.array([[info[0]] for info in infos])
-        self._moments = np.array([info[2] for info in infos])
-        self._carries = np.array([[k in other.links for k in links] for other in self._sensors], dtype=float)
-        self._now = self._before = None
+        self._known = self._remembers = False
+        below = frozenset[str]().union(*(each.links for each in self._sensors))
+        names = [link.name for link in self._robot.links if link.name in below]
+        chain = Chain.to(self._robot, names)
+        infos = [self._p.getDynamicsInfo(self._body, self._links[k], physicsClientId=self._client) for k in names]
+        turned = [np.reshape(self._p.getMatrixFromQuaternion(info[4]), 9) for info in infos]
+        self._inertias = np.array([(i[0], *i[2], *R, *i[3]) for i, R in zip(infos, turned, strict=True)])
+        nodes = np.array([chain.names[name] for name in names], dtype=np.int64)
+        position, velocity = self._joints.reshape(2, -1)
+        self._bodies = LinkMomenta(chain, nodes, self._inertias, position, velocity)
+        self._before = np.zeros_like(self._bodies.momenta)
+        self._pulls = np.zeros((len(names), 6))
+        self._rows = np.full(1 + max(self._links.values()), -1, dtype=np.int64)
+        self._rows[[self._links[name] for name in names]] = np.arange(len(names))
+        self._frames = np.array([chain.names[each.link] for each in self._sensors], dtype=np.int64)
+        self._carried = np.array([[name in each.links for name in names] for each in self._sensors])
+        self._compute: Callable[[Sequence[BulletPoint]], object] = bind(
+            "wrenches", len(names), self._bodies.momenta, self._before, self._inertias.reshape(-1),
+            self._pulls.reshape(-1), self._rows, np.array([self._body], dtype=np.int64), self._gravity,
+            np.zeros(6 * len(names)), self._bodies.motion.reshape(-1), self._frames, self._carried.reshape(-1),
+            *(each.values for each in self._sensors),
+        ) or self._law  # fmt: skip
         return sensor.values
 
     def moved(self) -> None:
         """Invalidate the cached motion after a physics step."""
-        self._now = None
+        self._known = False
 
     def remember(self) -> None:
         """Store the motion before the last physics step of a tick."""
-        self._before = self._motion() if self._now is None else self._now
+        if not self._known:
+            states = self._p.getJointStates(self._body, self._numbers, self._client)
+            self._joints[:] = [*(state[0] for state in states), *(state[1] for state in states)]
+            self._bodies.update()
+        self._before[:] = self._bodies.momenta
+        self._remembers = True
 
-    def measure(self, points: Sequence[BulletPoint], pulls: Sequence[Pull] = ()) -> None:
-        """Compute the wrenches of the last physics step, with all its contact `points` and `pulls` of attachments."""
-        if self._now is not None or self._before is None:
+    def measure(self, joints: Array, points: Callable[[], Sequence[BulletPoint]], pulls: Sequence[Pull] = ()) -> None:
+        """Compute the wrenches of the last physics step.
+
+        Args:
+            joints: (2 n) positions and velocities now.
+            points: gives all contact points of that step.
+            pulls: of attachments in that step.
+        """
+        if self._known or not self._remembers:
             return
-        now = self._now = self._motion()
-        rate = (now.momenta - self._before.momenta) / self._step
-        force = rate[:, :3] - self._mass * self._gravity
-        torque = rate[:, 3:] + cross(now.centres, force)
-        rows, places, pushes = self._pushed(points)
-        if rows:
-            given = np.array(pushes)
-            np.subtract.at(force, rows, given)
-            np.subtract.at(torque, rows, cross(np.array(places), given))
+        self._known = True
+        self._joints[:] = joints
+        self._bodies.update()
+        self._pulls[:] = 0.0
         for pull in pulls:
-            if pull.link in self._rows:
-                force[self._rows[pull.link]] -= pull.force
-                torque[self._rows[pull.link]] -= cross(pull.point, pull.force) + pull.torque
-        forces, torques = self._carries @ force, self._carries @ torque
-        for sensor, f, t in zip(self._sensors, forces, torques, strict=True):
-            row = self._rows[sensor.link]
-            turned = now.turned[row]
-            sensor.values[:3] = rotate_inverse(turned, -f)
-            sensor.values[3:] = rotate_inverse(turned, cross(now.origins[row], f) - t)
+            if (row := int(self._rows[pull.link])) >= 0:
+                self._pulls[row, :3] += pull.force
+                self._pulls[row, 3:] += cross(pull.point, pull.force) + pull.torque
+        self._compute(points())
 
-    def _motion(self) -> _Motion:
-        links = self._p.getLinkStates(
-            self._body, list(self._rows), computeLinkVelocity=1, computeForwardKinematics=1,
-            physicsClientId=self._client,
+    def _law(self, points: Sequence[BulletPoint]) -> None:
+        """The definition of the kernel `wrenches`, operation by operation, in plain floats."""
+        *gravity, step = self._gravity.tolist()
+        forces: list[list[float]] = []
+        states = zip(
+            self._bodies.momenta.reshape(-1, 9).tolist(), self._before.reshape(-1, 9).tolist(),
+            self._inertias.tolist(), self._pulls.tolist(), strict=True,
         )  # fmt: skip
-        states = np.array([(*s[0], *s[1], *s[4], *s[5], *s[6], *s[7]) for s in links])
-        principal = states[:, 3:7]
-        turning = rotate(principal, self._moments * rotate_inverse(principal, states[:, 17:20]))
-        momenta = np.hstack([self._mass * states[:, 14:17], turning])
-        return _Motion(states[:, :3], states[:, 7:10], states[:, 10:14], momenta)
-
-    def _pushed(self, points: Sequence[BulletPoint]) -> tuple[list[int], list[Vector], list[list[float]]]:
-        """Rows of the links in contact, contact positions, and contact forces."""
-        rows: list[int] = []
-        places: list[Vector] = []
-        pushes: list[list[float]] = []
+        for now, before, (mass, *_), pull in states:
+            rate = [(now[3 + i] - before[3 + i]) / step for i in range(6)]
+            force = [rate[i] - mass * gravity[i] for i in range(3)]
+            moment = crossed(now, force)
+            forces.append(
+                [force[i] - pull[i] for i in range(3)] + [(rate[3 + i] + moment[i]) - pull[3 + i] for i in range(3)]
+            )
         for point in points:
             _, a, b, link_a, link_b, at_a, at_b, normal, _, press, first, along, second, across = point[:14]
-            if self._body not in (a, b):
-                continue
-            push = [press * n + first * u + second * v for n, u, v in zip(normal, along, across, strict=True)]
-            if a == self._body and link_a in self._rows:
-                rows.append(self._rows[link_a])
-                places.append(at_a)
-                pushes.append(push)
-            if b == self._body and link_b in self._rows:
-                rows.append(self._rows[link_b])
-                places.append(at_b)
-                pushes.append([-force for force in push])
-        return rows, places, pushes
+            push = [(press * n + first * u) + second * v for n, u, v in zip(normal, along, across, strict=True)]
+            for body, link, at, sign in ((a, link_a, at_a, 1.0), (b, link_b, at_b, -1.0)):
+                row = self._rows[link] if body == self._body and link >= 0 else -1
+                if row >= 0:
+                    given = [sign * each for each in push]
+                    moment = crossed(at, given)
+                    own = forces[row]
+                    own[:] = [own[i] - given[i] for i in range(3)] + [own[3 + i] - moment[i] for i in range(3)]
+        for sensor, frame, carried in zip(self._sensors, self._frames, self._carried, strict=True):
+            total = [0.0] * 6
+            for force in (force for force, below in zip(forces, carried, strict=True) if below):
+                total = [total[i] + force[i] for i in range(6)]
+            motion = self._bodies.motion[frame].tolist()
+            moment = crossed(motion[9:12], total)
+            sensor.values[:3] = into(motion, [-total[i] for i in range(3)])
+            sensor.values[3:] = into(motion, [moment[i] - total[3 + i] for i in range(3)])

@@ -22,9 +22,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
+from manipcli.render.drawing import frame_names
 from manipcli.render.lens import Lens
 from manipcli.render.scene_camera import X_SC, SceneCamera, Shot
 from manipcli.render.stage import stage_of
@@ -123,6 +125,11 @@ def frames(spec: CameraSpec) -> Mapping[str, Transform]:
     return {OPTICAL: X_SC}
 
 
+def sensed(spec: CameraSpec, robot: RobotModel, scene: Scene) -> Sensed:
+    """How many pixels show each part, if it tells them apart."""
+    return Sensed("camera", picture=messages.SEGMENTATION, parts=frame_names(robot, scene) if spec.segmentation else ())
+
+
 class CameraExposure:
     """Takes the pictures of one camera."""
 
@@ -167,4 +174,5 @@ MEMBER = SensorMember(
     open=CameraExposure,
     check=check,
     frames=frames,
+    sensed=sensed,
 )

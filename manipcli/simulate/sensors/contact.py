@@ -7,12 +7,14 @@ measured force is at least `threshold`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -64,11 +66,13 @@ def _quantities(spec: ContactSpec, robot: RobotModel) -> tuple[Quantity, ...]:
 
 
 def _topics(spec: ContactSpec, robot: RobotModel) -> tuple[Topic, ...]:
-    def closed(force: Array) -> Array:
-        return np.concatenate((force >= spec.threshold, force), axis=1)
-
+    closed = partial(_closed, spec.threshold)
     fixed = {"threshold": spec.threshold}
     return (Topic("manipcli_msgs/msg/ContactSwitch", ("closed", "force"), derive=closed, constant=fixed),)
+
+
+def _closed(threshold: float, force: Array) -> Array:
+    return np.concatenate((force >= threshold, force), axis=1)
 
 
 def _check(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Iterator[Problem]:
@@ -79,6 +83,10 @@ def _check(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
         yield Problem(("threshold",), message, "raise `limits: {force: ...}`, or lower the threshold", "SENS109")
 
 
+def _sensed(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Sensed:
+    return Sensed("contact", fields=(("", "force", 1),), forces=1, threshold=spec.threshold)
+
+
 MEMBER = SensorMember(
-    name="contact", spec=ContactSpec, quantities=_quantities, topics=_topics, open=Touched, check=_check
+    name="contact", spec=ContactSpec, quantities=_quantities, topics=_topics, open=Touched, check=_check, sensed=_sensed
 )

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
@@ -86,4 +87,5 @@ MEMBER = SensorMember(
     open=ForceTorque,
     check=_check,
     needs_link=True,
+    sensed=lambda spec, robot, scene: Sensed("force_torque", fields=(("", "wrench", 6),)),
 )

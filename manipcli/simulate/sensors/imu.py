@@ -14,6 +14,7 @@ from pydantic import Field
 from manipcli.core.geometry import Array, matrix_from_quat
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
+from manipcli.simulate.link_motion import PlaceMotion
 from manipcli.simulate.sensor import Probe, Quantity, SensorContext, SensorMember, Topic, limited
 from manipcli.spec.base import Model
 from manipcli.spec.mounted_sensor import MountedFilteredSpec
@@ -55,19 +56,20 @@ class OnLink:
     """An IMU on a link, by the kinematics of the robot."""
 
     def __init__(self, context: SensorContext) -> None:
-        mount = context.place
-        self._place = mount.kinematics.place(mount.parent, mount.X_PS, context.scene.gravity)
-        self._before = context.before.velocity
-        self._period = context.period
-        self._acceleration = np.zeros_like(self._before)
-        self._read = np.zeros(6)
+        self._context = context
+        self._motion: PlaceMotion | None = None
+        self._joints: Array | None = None
 
     def read(self, state: WorldState) -> Array:
-        acceleration = self._acceleration
-        np.subtract(state.velocity, self._before, out=acceleration)
-        acceleration /= self._period
-        self._place.motion(state.position, state.velocity, acceleration, self._read)
-        return self._read
+        if self._motion is None or state.position is not self._joints:
+            self._joints = state.position
+            context, mount = self._context, self._context.place
+            self._motion = PlaceMotion(
+                context.robot, mount.parent, mount.X_PS, context.scene.gravity, context.period, state.position,
+                state.velocity, context.before.velocity,
+            )  # fmt: skip
+        self._motion.measure()
+        return self._motion.measured
 
 
 class OnBody:

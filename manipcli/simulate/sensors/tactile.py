@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import Problem
+from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -149,6 +150,12 @@ def _check(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
     yield from needs_a_part(spec, scene)
 
 
+def _sensed(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Sensed:
+    cells = spec.rows * spec.columns
+    fields = (("", "force", cells), ("/shear", "x", cells), ("/shear", "y", cells))
+    return Sensed("tactile", fields=fields if spec.shear else fields[:1], forces=cells, shear=bool(spec.shear))
+
+
 MEMBER = SensorMember(
-    name="tactile", spec=TactileSpec, quantities=_quantities, topics=_topics, open=Taxels, check=_check
+    name="tactile", spec=TactileSpec, quantities=_quantities, topics=_topics, open=Taxels, check=_check, sensed=_sensed
 )

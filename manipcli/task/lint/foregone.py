@@ -136,7 +136,7 @@ def _still(spec: ConditionSpec, task: Task, world: World) -> _Foregone | None:
     """A condition on places of fixed bodies alone: its result at the start."""
     if spec.name not in PLACES or spec.name == "at_pose":
         return None
-    bodies = {body.name: body for body in task.scene.bodies}
+    bodies = {body.name: body for body in task.true.scene.bodies}
     named = _names(spec, task)
     if any(name not in bodies or not bodies[name].fixed for name in named if name not in ("start", "world")):
         return None
@@ -149,7 +149,7 @@ def _still(spec: ConditionSpec, task: Task, world: World) -> _Foregone | None:
 
 def _names(spec: ConditionSpec, task: Task) -> list[str]:
     """The texts in a condition; frames as the bodies that they are fixed to."""
-    parents = {frame.name: frame.parent for frame in task.scene.frames}
+    parents = {frame.name: frame.parent for frame in task.true.scene.frames}
     texts = [value for value in spec.body.model_dump().values() if isinstance(value, str)]
     return [parents.get(text, text) for text in texts]
 
@@ -173,7 +173,7 @@ def _at_start(spec: ConditionSpec, world: World) -> float:
 
 def _world(task: Task) -> World:
     """The world as written, at rest."""
-    q, scene = start_position(task), task.scene
+    q, scene = start_position(task), task.true.scene
     m = len(scene.movable)
 
     def rows(value: Callable[[int], Array], width: int) -> Array:
