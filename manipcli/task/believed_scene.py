@@ -72,7 +72,7 @@ def believing(task: Task) -> Task:
     scene = believed_scene(task.file, task.scene, None)
     if scene is task.scene:
         return task
-    return replace(task, scene=scene, truth=GroundTruth(task.robot, task.scene, task.controllers_file))
+    return replace(task, scene=scene, truth=GroundTruth(task.robot, task.scene, task.controllers_file, task.sensors))
 
 
 def contents(scene: Scene, container: str, uncertain: Mapping[str, object]) -> tuple[str, ...]:
