@@ -21,7 +21,7 @@ CUP = f"""<link name="palm">{mass(0.2, 0.001)}<collision><origin xyz="0 0 -0.03"
   <geometry><cylinder radius="0.012" length="0.06"/></geometry></collision></link>"""
 FIXED = "at: {xyz: [0.1, 0.5, 0.42], rpy: [0, 38 deg, -90 deg]}"
 SENSORS = """sensors:
-  eye: {type: camera, PLACE, resolution: [160, 120], rate: 10 Hz, delay: 20 ms, color: false,
+  eye: {type: camera, PLACE, resolution: [240, 180], rate: 10 Hz, delay: 20 ms, color: false,
         noise: {depth: {white: 1 mm}}}
 steps:
   - locate: {object: block, with: eye}
