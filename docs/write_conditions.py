@@ -22,7 +22,9 @@ INTRODUCTION = """\
 
 A condition measures a run and gives a signed margin with a unit: 0 or more where it holds, negative where it fails.
 Steps wait for conditions (`until`), `watch` stops the run at a broken one, and `expect` judges the recording. All three
-use the same functions on the same ticks, so they cannot disagree.
+use the same functions on the same ticks, so they cannot disagree. Where bodies have
+[`known`](sensors.md#measured-believed-true), `until`, `if` and `watch` are asked of the poses that the robot believes,
+`expect` of the true ones; `believed: {...}` is asked of the believed ones everywhere.
 
 ```yaml
 steps:
@@ -58,12 +60,13 @@ tick: at the start of the step with `at: STEP` and `during`, else at the start o
 
 ## Margins
 
-`all: [...]`, `any: [...]` and `not: {...}` combine conditions, to any depth. Margins combine as in the robust semantics
-of signal temporal logic: the least for `all` and over time, the greatest for `any` and with `eventually`, the negated
-margin for `not` and with `never`. A margin of exactly 0 holds and its opposite fails: at each tick exactly one of a
-condition and its `not` holds. Over several ticks both can fail, if the condition holds at some of them and fails at
-others; to require that it fails at least once, write `eventually: {not: {...}}`. A failed condition has a margin of at
-most -1e-9 (N, m, rad, ...), also where the measured margin is 0, as for `not: {no_collision: ...}` without contact.
+`all: [...]`, `any: [...]`, `not: {...}` and `believed: {...}` combine conditions, to any depth. Margins combine as in
+the robust semantics of signal temporal logic: the least for `all` and over time, the greatest for `any` and with
+`eventually`, the negated margin for `not` and with `never`. A margin of exactly 0 holds and its opposite fails: at each
+tick exactly one of a condition and its `not` holds. Over several ticks both can fail, if the condition holds at some of
+them and fails at others; to require that it fails at least once, write `eventually: {not: {...}}`. A failed condition
+has a margin of at most -1e-9 (N, m, rad, ...), also where the measured margin is 0, as for `not: {no_collision: ...}`
+without contact.
 Reports show the margin of the deciding condition at the deciding tick, in its own unit, with its measurement.
 
 Margins in one unit are compared directly. In a combination of different units each margin is first divided by its own
@@ -78,7 +81,8 @@ the other members are. Ticks at which a member does not apply (no hand holds the
 ## Names in reports
 
 The name of an expectation is its `id`; else the name of its condition (`near`, `all`, `any`, `not`), with `never_` in
-front for `never`. Duplicates get a number (`near_2`). `at`, `during`, `always` and `eventually` do not change the name.
+front for `never` and `believed_` for `believed`. Duplicates get a number (`near_2`). `at`, `during`, `always` and
+`eventually` do not change the name.
 
 ## The conditions
 

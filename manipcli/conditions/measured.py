@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from manipcli.conditions.condition import CheckContext, Problem, World
-from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.robustness import Mask, Robustness, robustness
 from manipcli.conditions.sensed import Sensed
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
@@ -55,10 +55,9 @@ def of_readings(
     unit: str,
     scale: float,
     describe: Callable[[float], str],
+    touched: Callable[[Array], Mask] | None = None,
 ) -> Robustness:
-    """Margins of a value of the reading that holds at each tick.
-
-    It does not apply before the first arrival, nor where the value is NaN.
+    """Margins of a value of the reading that holds at each tick; it does not apply before the first arrival.
 
     Args:
         window, sensor: where the readings are.
@@ -66,17 +65,21 @@ def of_readings(
         margin: (T,) values -> (T,) margins in `unit`.
         unit, scale: see `robustness`.
         describe: value -> text.
+        touched: (K, width) readings -> (K,) False where it does not apply because nothing touches the sensor.
     """
     readings = window.readings[sensor]
     index, known = readings.at(window.times)
-    values = value(readings.values)[index] if len(readings.times) else np.zeros(len(index))
-    touched = ~np.isnan(values)
+    values = np.full(len(index), np.nan)
+    applies = known
+    if known.any():
+        values[known] = value(readings.values)[index[known]]
+        applies = known if touched is None else known & touched(readings.values)[index]
     return robustness(
         margin(values),
         window.times,
         unit=unit,
         scale=scale,
         describe=lambda k: describe(float(values[k])),
-        applies=known & touched,
-        idle=f"no measurement of sensor '{sensor}' has arrived" if touched.all() else f"nothing touches '{sensor}'",
+        applies=applies,
+        idle=f"nothing touches '{sensor}'" if known.all() else f"no measurement of sensor '{sensor}' has arrived",
     )

@@ -86,8 +86,8 @@ def served(
     period = task.spec.simulation.control_period
     robot, scene = task.robot, task.true.scene
     channels = [recorded(controller) for controller in manager.controllers]
-    sensors = measured_channels(task.sensors, task.true.robot, period)
-    frames = sensor_frames(task.sensors, task.true.robot)
+    sensors = measured_channels(task.true.sensors, task.true.robot, period)
+    frames = sensor_frames(task.true.sensors, task.true.robot)
     offer = offer_of(endpoints_of(task, manager.controllers), channels, sensors)
     title = " · ".join(dict.fromkeys((task.spec.task, robot.name)))
     setup = Setup(

@@ -15,7 +15,14 @@ from manipcli.control.controller import Controller
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.text import number_of
-from manipcli.logs.recorded_files import recorded_controllers_file, recorded_robot, recorded_scene, recorded_task_file
+from manipcli.logs.graph_sensors import SensorGraph, node_id
+from manipcli.logs.recorded_files import (
+    recorded_controllers_file,
+    recorded_robot,
+    recorded_robot_file,
+    recorded_scene,
+    recorded_task_file,
+)
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
 from manipcli.record.channels import channel_table
@@ -29,6 +36,7 @@ from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.recording import JUDGED
+from manipcli.spec.sensors import SensorSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.load_task import load_task
 
@@ -55,7 +63,7 @@ def task_graph(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
         InvalidInput: a file of the task cannot be used.
     """
     task = load_task(path, package_path=package_path, allow_outside=allow_outside)
-    return _Builder(task.spec, task.controllers, task.robot, task.scene, None).graph()
+    return _Builder(task.spec, task.controllers, task.robot, task.scene, task.sensors, None).graph()
 
 
 def log_graph(path: Path) -> Graph:
@@ -73,9 +81,10 @@ def log_graph(path: Path) -> Graph:
     spec = recorded_task_file(recording, path).spec
     controllers = recorded_controllers_file(recording, path).spec
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
+    sensors = {**(recorded_robot_file(recording, path).spec.sensors or {}), **(spec.sensors or {})}
     version = recording.metadata.get("versions", {}).get(spec.simulation.engine, "")
     notes = () if recording.lost is None else (recording.lost,)
-    return _Builder(spec, controllers, robot, scene, topics, version=version, notes=notes).graph()
+    return _Builder(spec, controllers, robot, scene, sensors, topics, version=version, notes=notes).graph()
 
 
 class _Builder:
@@ -85,6 +94,7 @@ class _Builder:
         file: ControllersSpec,
         robot: RobotModel,
         scene: Scene,
+        sensors: Mapping[str, SensorSpec],
         topics: Mapping[str, Topic] | None,
         *,
         version: str = "",
@@ -93,6 +103,7 @@ class _Builder:
         self._spec, self._file, self._robot, self._scene = spec, file, robot, scene
         self._topics, self._notes = topics, notes
         self._period = spec.simulation.control_period
+        self._sensors = SensorGraph(sensors, robot, self._period)
         self._member = ENGINES[spec.simulation.engine]
         self._version = version or self._member.version()
         manager = build_controllers(file, robot, self._period)
@@ -202,14 +213,20 @@ class _Builder:
         self._add(Node("contacts", "sensor", "contacts"))
         self._join("engine", "joints")
         self._join("engine", "contacts")
+        for node in self._sensors.nodes():
+            self._add(node)
+            self._join("engine", node.id)
         for controller in self._controllers:
             idle = not self._file.controllers[controller.name].active
             for request in controller.sensors:
-                sensor = f"wrench {controller.name}"
-                self._add(Node(sensor, "sensor", request.sensor or f"wrench at {request.joint}"))
-                self._join("engine", sensor)
+                sensor = node_id(request.sensor) if request.sensor else f"wrench {controller.name}"
+                if not request.sensor:
+                    self._add(Node(sensor, "sensor", f"wrench at {request.joint}"))
+                    self._join("engine", sensor)
                 self._join(sensor, controller.name, idle=idle, back=True)
-            if controller.joints:
+            for name in self._sensors.measured(controller):
+                self._join(node_id(name), controller.name, idle=idle, back=True)
+            if controller.joints and not self._sensors.complete(controller):
                 self._join("joints", controller.name, idle=idle, back=True)
             if is_hand(controller):
                 self._join("contacts", controller.name, "forces", idle=idle, back=True)
@@ -223,13 +240,15 @@ class _Builder:
         for controller in self._controllers:
             mine = channel_table([recorded(controller)])
             rows += [(channel, controller.name) for channel in mine if channel.topic not in common]
+        rates = {channel.topic: rate for channel, _, rate in self._sensors.topics()}
+        rows += [(channel, sensor) for channel, sensor, _ in self._sensors.topics()]
         for channel, producer in rows:
             if self._topics is None:
                 if not selection.holds(channel):
                     continue
                 clock = word(channel.topic) in BY_THE_CLOCK
                 rate = 1.0 / (selection.stride(channel.topic, self._period) * self._period)
-                about = f"{rate:g} Hz" if clock else ""
+                about = f"{rates.get(channel.topic, rate):g} Hz" if clock else ""
             elif channel.topic in self._topics:
                 about = _held(self._topics[channel.topic])
             else:

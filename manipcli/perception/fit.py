@@ -18,6 +18,7 @@ from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.perception.picture import Mask, Picture, patches
 from manipcli.render.raster import Raster
 from manipcli.render.surface import Surface
+from manipcli.render.triangles import Indices
 
 LATERAL = 0.5
 """Standard deviation of the place in the picture where depth is measured [pixel]."""
@@ -72,7 +73,7 @@ class _Rendered:
 
     depth: Array
     shown: Mask
-    at: Array
+    at: Indices
     change: Array
     sigma: Array
 
@@ -106,7 +107,7 @@ class Fit:
         R = matrix_from_axis_angle((0.0, 0.0, 1.0), float(state[3])) @ self._X_WO.R
         return Transform.of(xyz=self._X_WO.p + state[:3], R=R)
 
-    def _see(self, state: Array) -> tuple[Array, Array, Transform]:
+    def _see(self, state: Array) -> tuple[Array, Indices, Transform]:
         """Depth and faces at a state (overwritten by the next call), and its pose."""
         X = self.pose(state)
         R, p = self._R_CW @ X.R, self._R_CW @ (X.p - self._picture.X_WC.p)
@@ -117,7 +118,7 @@ class Fit:
         picture = self._picture
         depth, face, X = self._see(state)
         shown = depth < picture.floor
-        at = np.flatnonzero(shown)
+        at = np.flatnonzero(shown).astype(np.int64)
         z, d = depth.reshape(-1)[at], self._rays[at]
         n_W = self._normals[face.reshape(-1)[at]] @ X.R.T
         n_C = n_W @ picture.X_WC.R
@@ -135,7 +136,7 @@ class Fit:
         picture = self._picture
         depth, _, _ = self._see(state)
         visible = depth < picture.floor
-        if not visible.any():
+        if not visible.any() or not shown.any():
             return state
         measured, rendered = (
             (self._rays[mask.reshape(-1)] * z[mask][:, None]).mean(axis=0)
@@ -163,9 +164,8 @@ class Fit:
             used &= picture.shown.reshape(-1)[rendered.at]
             used &= rendered.depth.reshape(-1)[rendered.at] < picture.floor.reshape(-1)[rendered.at] - 3 * noise
         J = (rendered.change[used] / rendered.sigma[used, None])[:, self.free]
-        H = J.T @ J
-        g = J.T @ (error[used] / rendered.sigma[used])
-        if edges:
+        H, g = _normal_equations(J, error[used] / rendered.sigma[used])
+        if edges and len(self.free):
             more_H, more_g = self._edges(state, rendered)
             H, g = H + more_H, g + more_g
         H = H + self._weight
@@ -212,7 +212,8 @@ class Fit:
             columns.append(blurred(ends[0] - ends[1]) / (2.0 * deltas[k]))
         J = np.stack(columns, axis=1)
         weight = 2.0 * math.sqrt(math.pi) * BLUR / EDGE**2
-        return weight * (J.T @ J), weight * (J.T @ blurred(misfit(rendered.depth)))
+        H, g = _normal_equations(J, blurred(misfit(rendered.depth)))
+        return weight * H, weight * g
 
     def compare(self, state: Array, slack: float = 0.0) -> Comparison:
         """How a state explains the picture; `slack` [m] is added to the depth errors that are explained."""
@@ -240,3 +241,8 @@ class Fit:
             residual=math.sqrt(float(np.square(error[explained]).mean())) if count else 0.0,
             spread=math.sqrt(float(squares.mean())) if count else 0.0,
         )
+
+
+def _normal_equations(J: Array, residual: Array) -> tuple[Array, Array]:
+    """J^T J and J^T r; summed in an order that does not depend on the number of threads."""
+    return np.einsum("ni,nj->ij", J, J), np.einsum("ni,n->i", J, residual)

@@ -56,7 +56,7 @@ def key(axis: Array) -> tuple[float, float, float]:
 def looks_same(
     geometries: tuple[Geometry, ...], axis: tuple[float, float, float], angles: tuple[float, ...] = ANY
 ) -> bool:
-    """Whether a body looks the same after rotations [rad] about an axis through the origin of O [default: after any]."""
+    """Whether a body looks the same after rotations [rad] about an axis through O's origin [default: after any]."""
     points, tree, radius = _visible(geometries)
     for angle in angles:
         far = tree.query(points @ matrix_from_axis_angle(axis, angle).T)[0] > SAME * radius

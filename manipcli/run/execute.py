@@ -140,7 +140,7 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
                 engine=engine,
                 manager=manager,
                 period=simulation.control_period,
-                sensors=task.sensors,
+                sensors=true.sensors,
                 seed=simulation.seed,
             )
             if state is None:

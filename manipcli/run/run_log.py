@@ -142,8 +142,8 @@ def open_log(
             ),
             overwrite=overwrite,
             live=task.part.live,
-            sensors=measured_channels(task.sensors, task.true.robot, task.spec.simulation.control_period),
-            sensor_frames=sensor_frames(task.sensors, task.true.robot),
+            sensors=measured_channels(task.true.sensors, task.true.robot, task.spec.simulation.control_period),
+            sensor_frames=sensor_frames(task.true.sensors, task.true.robot),
             belief=BeliefChannels(belief.names, belief.uncertain),
         )
         yield recorder

@@ -115,7 +115,7 @@ def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
 
 def _handle(spec: HandleSpec, start: float, cup: CupSpec, rgba: Rgba) -> list[Geometry]:
     """Two level bars that begin in the wall, at `start` [m] from the axis, and an upright one between their ends."""
-    t, end, middle = spec.thickness, cup.radius + spec.reach, cup.height / 2.0
+    t, end, middle = spec.thickness, cup.radius + spec.reach, cup.height / 2.0 if spec.middle is None else spec.middle
     level, upright = Box((end - start, t, t)), Box((t, t, spec.height - 2.0 * t))
     high = (spec.height - t) / 2.0
     return [

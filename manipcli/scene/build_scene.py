@@ -142,6 +142,11 @@ class _Builder:
                 hint = "remove `known`, or write `fixed: false`"
                 self._error("TASK228", f"body '{name}' is fixed: its pose is known exactly", (*loc, "known"), hint)
             return
+        around = self.spec.scene.get(spec.inside or "")
+        if spec.known is not None and around is not None and around.known is not None:
+            message = f"body '{name}' is inside '{spec.inside}', whose pose is not known exactly"
+            hint = "remove `known`: it is known exactly relative to its container"
+            self._error("TASK228", message, (*loc, "known"), hint)
         if max(shape.size) > LONGEST:
             message = f"body '{name}' is {max(shape.size):.3g} m long; movable bodies are at most {LONGEST:g} m"
             scaled = _SCALED.get(kind, "each size with its unit, such as '80 mm'")
@@ -165,8 +170,10 @@ class _Builder:
             if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
                 raise ValueError(f"wall of {spec.cup.wall:g} m is too thick: the cup has no interior")
             handle = spec.cup.handle
-            if handle is not None and handle.height > spec.cup.height:
-                raise ValueError(f"handle of {handle.height:g} m is higher than the cup, {spec.cup.height:g} m")
+            middle = spec.cup.height / 2.0 if handle is None or handle.middle is None else handle.middle
+            if handle is not None and abs(middle - spec.cup.height / 2.0) > (spec.cup.height - handle.height) / 2.0:
+                ends = middle - handle.height / 2.0, middle + handle.height / 2.0
+                raise ValueError(f"handle from {ends[0]:g} to {ends[1]:g} m is beyond the cup of {spec.cup.height:g} m")
             if handle is not None and handle.thickness >= min(handle.reach, handle.height / 2.0):
                 raise ValueError(f"thickness of {handle.thickness:g} m leaves no room in the handle")
             return body_shapes.cup(spec.cup, rgba)

@@ -36,10 +36,11 @@ class CylinderSpec(Model):
 
 
 class HandleSpec(Model):
-    """A handle of three bars in the plane y = 0, on the side of x, half-way up."""
+    """A handle of three bars in the plane y = 0, on the side of x."""
 
     reach: Size = Field(description="From the outer radius of the cup to its outer side [m], 1 um to 100 m.")
     height: Size = Field(description="Outer height [m], up to that of the cup.")
+    middle: Length | None = Field(None, description="Height of its middle [m]. Default: half that of the cup.")
     thickness: Size = Field(0.008, description="Thickness of the bars [m], less than half the height. Default 8 mm.")
 
 

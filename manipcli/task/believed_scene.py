@@ -12,7 +12,8 @@ from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Transform
-from manipcli.scene.known import Known, contains, displaced
+from manipcli.scene.containing import contains
+from manipcli.scene.known import Known, displaced
 from manipcli.scene.scene import Body, Scene
 from manipcli.scene.start_overlap import overlaps
 from manipcli.spec.located import Located
@@ -71,7 +72,7 @@ def believing(task: Task) -> Task:
     scene = believed_scene(task.file, task.scene, None)
     if scene is task.scene:
         return task
-    return replace(task, scene=scene, truth=GroundTruth(task.robot, task.scene, task.controllers_file))
+    return replace(task, scene=scene, truth=GroundTruth(task.robot, task.scene, task.controllers_file, task.sensors))
 
 
 def contents(scene: Scene, container: str, uncertain: Mapping[str, object]) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 """Sampling of a task with `vary:`: the model for planning and the ground truth for simulation.
 
 Poses, sizes, limits and the clock change for planner and controllers, too. Masses, contact coefficients, gravity,
-actuators and controller parameters change in the simulation only: the planner and the models of controllers keep the
-values in the files (`Varied.only_world`).
+actuators, controller parameters and what sensors lose change in the simulation only: the planner and the models of
+controllers keep the values in the files (`Varied.only_world`).
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from manipcli.task.believed_scene import believed_scene
 from manipcli.task.changed_files import Changes, Files
 from manipcli.task.consistency import refused_by_engine
 from manipcli.task.named_file import named_file
-from manipcli.task.task import GroundTruth, Task
-from manipcli.task.vary import Varied, draw
+from manipcli.task.sensor_checks import refuse, sensor_findings
+from manipcli.task.task import GroundTruth, Task, sensors_of
+from manipcli.task.vary import SENSORS, Varied, draw
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
 SceneOf = Callable[[Located[TaskSpec]], Scene]
@@ -104,7 +105,10 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
             robot=robot if _same(changes, seen, "ROBOT") else robot_of(true.robot),
             scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
             controllers=true.controllers,
+            sensors=sensors_of(true.robot.spec, true.task.spec),
         )
+        if any(_of_sensor(quantity) for quantity, _ in changes):
+            refuse(sensor_findings(true.task, true.robot, true.controllers, truth.robot, truth.scene))
         if refused := refused_by_engine(task.file, truth.robot, truth.scene):
             raise InvalidInput(refused)
         scene = believed_scene(planned.task, scene, drawn.number)
@@ -132,5 +136,10 @@ def _but_for(drawn: Drawn, varied: Sequence[Varied], overrides: Sequence[Overrid
 
 
 def _same(changes: Changes, seen: Changes, area: str) -> bool:
-    """Whether all changes of this file are visible to the planner."""
-    return sum(quantity.area == area for quantity, _ in changes) == sum(quantity.area == area for quantity, _ in seen)
+    """Whether all changes of this file but those of sensors are visible to the planner."""
+    counts = [sum(q.area == area and not _of_sensor(q) for q, _ in some) for some in (changes, seen)]
+    return counts[0] == counts[1]
+
+
+def _of_sensor(quantity: Varied) -> bool:
+    return quantity.area != "CTRL" and quantity.parts[0] == SENSORS

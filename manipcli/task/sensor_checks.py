@@ -16,11 +16,17 @@ from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceS
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, listed
 from manipcli.model.robot import RobotModel
+from manipcli.plan.claimed_joints import Claims
+from manipcli.plan.hand import moved_links
+from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.locate import LocateSpec
+from manipcli.plan.steps.pick import PickSpec
 from manipcli.scene.scene import Scene
+from manipcli.simulate.hand_pads import hand_pads
 from manipcli.simulate.sensor_layout import sensed_by_name, ticks_per_measurement
 from manipcli.simulate.sensors import SENSORS
 from manipcli.simulate.sensors.camera import CameraSpec
+from manipcli.simulate.sensors.tactile import TactileSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.mounted_sensor import MountedSpec
@@ -88,7 +94,8 @@ def sensor_findings(
     found += _names(sensors, controllers, robot, scene)
     found += _measured_twice(sensors, robot)
     if controllers is not None and robot_file is not None:
-        found += _readers(controllers, {own.name: own.spec for own in sensors}, robot)
+        every = {own.name: own.spec for own in sensors}
+        found += [*_readers(controllers, every, robot), *_reflexes(task, controllers.spec, every, robot)]
     if robot_file is not None and not task.source.kept:
         found += _looking(task, {own.name: own.spec for own in sensors})
     return tuple(found)
@@ -216,8 +223,8 @@ def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterato
             message = f"camera '{name}' has no depth: `depth` is false"
         else:
             message = f"sensor '{name}' is of type '{spec.type}', not 'camera'"
-        hint = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
-        yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=hint)
+        near = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
+        yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=near)
 
 
 def _readers(
@@ -264,3 +271,23 @@ def _not_along(sensor: MountedSpec, spec: CartesianImpedanceSpec, robot: RobotMo
     cosine = (np.trace(np.asarray(sensor.at.transform.R).T @ R) - 1.0) / 2.0
     angle = float(np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))))
     return f"is rotated by {angle:.3g} deg from the tool" if angle > PARALLEL else ""
+
+
+def _reflexes(
+    task: Located[TaskSpec], controllers: ControllersSpec, sensors: dict[str, SensorSpec], robot: RobotModel
+) -> Iterator[Diagnostic]:
+    """Reflexes of a hand that does not feel shear."""
+    joints = tuple(name for name in Claims.of(controllers).hand if name in robot.joint_names)
+    links = moved_links(robot, joints) if joints else frozenset[str]()
+    for k, step in enumerate(task.spec.steps):
+        grasp, keys = (step.body.grasp, ("grasp",)) if isinstance(step.body, PickSpec) else (step.body, ())
+        if not isinstance(grasp, GraspSpec) or not grasp.reflex or hand_pads(sensors, robot, joints):
+            continue
+        place = task.place("steps", k, step.verb, *keys, "reflex")
+        blunt = [name for name, spec in sensors.items() if isinstance(spec, TactileSpec) and spec.link in links]
+        if blunt:
+            hint = f"add `shear: true` to the sensor '{blunt[0]}'"
+        else:
+            there = [link.name for link in robot.links if link.name in links and link.collisions]
+            hint = f"add a sensor of type `tactile` with `shear: true` on a link of the hand: {listed(there)}"
+        yield Diagnostic("SENS150", "the reflex feels no slip: no sensor with `shear` is on the hand", place, hint)

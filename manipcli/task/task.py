@@ -20,11 +20,12 @@ from manipcli.task.part import WHOLE, Part
 
 @dataclass(frozen=True, slots=True)
 class GroundTruth:
-    """Robot, scene and controllers of the simulation, if they differ from those known to the planner."""
+    """Robot, scene, controllers and sensors of the simulation, if they differ from those known to the planner."""
 
     robot: RobotModel
     scene: Scene
     controllers: Located[ControllersSpec]
+    sensors: Mapping[str, SensorSpec]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class Task:
     @property
     def true(self) -> GroundTruth:
         """The ground truth of the simulation."""
-        return self.truth or GroundTruth(self.robot, self.scene, self.controllers_file)
+        return self.truth or GroundTruth(self.robot, self.scene, self.controllers_file, self.sensors)
 
     @property
     def known(self) -> Task:
@@ -82,8 +83,8 @@ class Task:
 
     @property
     def sensors(self) -> Mapping[str, SensorSpec]:
-        """The sensors of the robot file, then those of the task, by name."""
-        return {**(self.robot_file.spec.sensors or {}), **(self.spec.sensors or {})}
+        """The sensors of the robot file, then those of the task, by name; `true` has those of a sample."""
+        return sensors_of(self.robot_file.spec, self.spec)
 
     def log_place(self, *path: str | int) -> str:
         """A place without its folder, for logs: `pour.yaml:21:5`."""
@@ -91,3 +92,8 @@ class Task:
             return self.places[path]
         place = self.file.place(*path)
         return f"{Path(place.file).name}:{place.line}:{place.column}"
+
+
+def sensors_of(robot: RobotSpec, task: TaskSpec) -> dict[str, SensorSpec]:
+    """The sensors of a robot file, then those of a task, by name."""
+    return {**(robot.sensors or {}), **(task.sensors or {})}

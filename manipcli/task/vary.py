@@ -33,13 +33,15 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.vary import Amount, DistributionSpec, Value, VarySpec
 
+SENSORS: Final = "sensors"
 EVERY: Final = "*"
 """Wildcard in a path: all names of a mapping, or all items of a list."""
 LARGEST: Final = 1e100
 """Bound on amounts [SI], so that drawn values stay finite."""
 RAREST: Final = 1e-3
 """Minimum share of a normal distribution within the bounds of the field."""
-_TASK_KEYS: Final = ("scene", "frames", "simulation")
+_TASK_KEYS: Final = ("scene", "frames", "simulation", SENSORS)
+_MEASURING: Final = frozenset({"noise", "delay", "rate", "filter", "limits"})
 _CONTACT: Final = frozenset({"mass", "friction", "rolling_friction", "spinning_friction", "restitution"})
 
 Path = tuple[str, ...]
@@ -97,6 +99,8 @@ class Varied:
                 return True
             case "TASK", ("scene", _, field, *_):
                 return field in _CONTACT
+            case _, ("sensors", _, field, *_):
+                return field in _MEASURING
         return False
 
     @property

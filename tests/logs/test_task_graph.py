@@ -22,7 +22,7 @@ TASK = (
     "simulation: {{engine: {engine}, control_period: 4 ms}}\n{more}"
     "steps:\n  - move: {{to: {{pitch: 0.2}}}}\n  - wait: 0.1 s\n"
 )
-CONTROLLERS = {
+CONTROLLERS: dict[str, dict[str, object]] = {
     "wrist": {"type": "joint_trajectory", "joints": ["pitch", "roll"], "command_interface": "position"},
     "wrist_effort": {
         "type": "joint_trajectory",
@@ -34,6 +34,8 @@ CONTROLLERS = {
     },
     "feel": {"type": "force_torque_broadcaster", "link": "hand"},
 }
+
+SENSORS = "sensors: {encoder: {type: joint}, scanner: {type: range, rate: 50 Hz}}\n"
 
 
 @pytest.fixture
@@ -83,8 +85,34 @@ def test_the_graph_of_a_task_is_what_its_files_say(task: Callable[..., Path]) ->
     assert ("limits", "engine") in ideal
 
 
+def test_sensors_are_where_the_files_say_and_feed_who_reads_them(task: Callable[..., Path], tmp_path: Path) -> None:
+    sensors = {
+        "force": {"type": "force_torque", "link": "hand", "rate": "125 Hz", "delay": "8 ms"},
+        "encoder": {"type": "joint", "joints": ["pitch"]},
+        "scanner": {"type": "range", "at": {"xyz": [1, 0, 0]}, "rays": 3, "rate": "10 Hz"},
+    }
+    path = task("pybullet", f"sensors: {json.dumps(sensors)}\n")
+    controllers = CONTROLLERS | {"feel": {"type": "force_torque_broadcaster", "sensor": "force"}}
+    (tmp_path / "controllers.yaml").write_text(yaml.safe_dump({"controllers": controllers}, sort_keys=False))
+    graph = task_graph(path)
+    edges = _edges(graph)
+    nodes = {node.name: node for node in graph.nodes if node.kind == "sensor"}
+    assert nodes["force"].details == ("force_torque", "on hand", "125 Hz", "8 ms late")
+    assert nodes["encoder"].details == ("joint", "1 joint", "250 Hz")
+    assert nodes["scanner"].details == ("range", "in world", "10 Hz")
+    readers = {name: {b for a, b in edges if a == node.id} for name, node in nodes.items()}
+    assert readers["force"] == {"feel", "/sensors/force"}
+    assert readers["encoder"] == {"wrist", "wrist_effort", "/sensors/encoder"}
+    assert readers["scanner"] == {"/sensors/scanner"}
+    assert ("joints", "wrist") in edges, "of roll they get the truth"
+    both = {**sensors, "encoder": {"type": "joint"}}
+    assert ("joints", "wrist") not in _edges(task_graph(task("pybullet", f"sensors: {json.dumps(both)}\n")))
+
+
 def test_the_topics_of_a_task_are_those_of_its_log(task: Callable[..., Path], tmp_path: Path) -> None:
-    path = task("kinematic", "record: {topics: [tf, controller_state, contacts], rates: {tf: 125 Hz}}\n")
+    path = task(
+        "kinematic", "record: {topics: [tf, controller_state, contacts, sensors], rates: {tf: 125 Hz}}\n" + SENSORS
+    )
     before = {node.name: node for node in task_graph(path).nodes if node.kind == "topic"}
     log = tmp_path / "nod.mcap"
     run_task(path, log=log)
@@ -101,6 +129,7 @@ def test_the_topics_of_a_task_are_those_of_its_log(task: Callable[..., Path], tm
         count = summary.statistics.channel_message_counts.get(k, 0)
         assert after[name].details[0].startswith(f"{count} message")
         assert after[name].type == before[name].type == summary.schemas[summary.channels[k].schema_id].name
+    assert before["/sensors/scanner"].details == ("50 Hz",)
     assert before["/tf"].details == ("125 Hz",)
     assert ", 125 Hz" in after["/tf"].details[0]
     without = {(a, b) for a, b in _edges(graph) if b not in after}

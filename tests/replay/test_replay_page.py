@@ -16,15 +16,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manipcli.core.geometry import matrix_from_quat
+from manipcli.core.geometry import Transform, matrix_from_quat
 from manipcli.judge.verdict import StepOutcome
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
 from manipcli.render.drawing import draw
 from manipcli.replay.ghost import ghost_of
 from manipcli.replay.page_server import PageServer
+from manipcli.replay.pixels import from_image
 from manipcli.replay.playback import RATE, Playback, PlaybackStep
 from manipcli.replay.player import player_html, player_page
+from manipcli.replay.sensed import CameraFeed, PictureStream, RayFeed, Sensed, TaxelFeed, counted
 
 ROOT = Path(__file__).parents[2]
 CLICK = """(text => {
@@ -165,6 +167,62 @@ def test_the_page_of_its_own_plays(browser: Page, playback: Playback, tmp_path: 
 
     assert [url for url in browser.requests if url != path.as_uri()] == []
     assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_sensors_are_shown_in_step_with_the_time(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """A picture that turns from red to blue at 1 s, depth of two levels, a grid of two taxels and one ray."""
+    red, blue = (np.full((12, 16, 3), colour, dtype=np.uint8) for colour in ((220, 20, 20), (20, 20, 220)))
+    times, none = np.array([0.2, 1.0]), np.full(2, np.nan)
+    shots = tuple(from_image("rgb8", 16, 12, 48, memoryview(each.tobytes())).data for each in (red, blue))
+    deep = np.full((12, 16), 1000, dtype="<u2")
+    deep[:, 8:] = 3000
+    depth = from_image("16UC1", 16, 12, 32, memoryview(deep.tobytes()))
+    limits = np.array([[depth.low] * 2, [depth.high] * 2])
+    streams = (
+        PictureStream("image_raw", "colour", (16, 12), times, shots, none, none, "2 of 9 pictures"),
+        PictureStream("depth", "depth", (16, 12), times, (depth.data,) * 2, *limits),
+    )
+    counts, unit = counted(np.array([[0.0, 1.0], [4.0, 2.0]]))
+    far, metre = counted(np.array([[0.5], [0.75]]))
+    X_PS = Transform.of(xyz=(0.1, 0.2, 0.3), rpy=(0.0, 0.0, np.pi / 2.0))
+    sensed = Sensed(
+        cameras=(CameraFeed("eye", streams),),
+        taxels=(TaxelFeed("tip", 1, 2, (1e-3, 1e-3), times, counts, unit),),
+        rays=(RayFeed("scan", "world", X_PS, np.zeros(1), times, times, far, metre),),
+        notes=("/x: <b>frame</b>",),
+    )
+    path = tmp_path / "sensors.html"
+    path.write_text(player_page(replace(playback, sensed=lambda frames: sensed)), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player').player")
+    canvas, figure = "document.querySelectorAll('.senses canvas')", "document.querySelectorAll('.senses figure')"
+
+    def pixel(number: int, x: int) -> list[int]:
+        data = f"{canvas}[{number}].getContext('2d').getImageData({x}, 6, 1, 1).data"
+        return list(json.loads(str(browser.evaluate(f"JSON.stringify([...{data}])"))))[:3]
+
+    browser.wait_for(f"{figure}[0].textContent.includes('nothing arrived yet')")
+    for time_of, arrived, brightest, force in ((0.2, 0.2, 0, "1.00"), (0.99, 0.2, 0, "1.00"), (1.0, 1.0, 2, "6.00")):
+        browser.evaluate(f"document.querySelector('.mc-player').player.seek({time_of})")
+        browser.wait_for(f"Math.abs(Number({figure}[0].dataset.shown) - {arrived}) < 1e-6")
+        seen = pixel(0, 8)
+        assert seen[brightest] > 180
+        assert sum(seen) - seen[brightest] < 120
+        assert f"sum {force} N" in str(browser.evaluate(f"{figure}[1].textContent"))
+    assert "2 of 9 pictures" in str(browser.evaluate(f"{figure}[0].textContent"))
+    assert browser.evaluate("document.querySelector('.senses > .note').textContent") == "/x: <b>frame</b>"
+    # The strong cell is the dark one.
+    assert sum(pixel(1, 5)) < sum(pixel(1, 450)) - 50
+    choose = "(e => { e.value = 1; e.dispatchEvent(new Event('change')); })"
+    browser.evaluate(f"{choose}(document.querySelector('.senses select'))")
+    browser.wait_for(f"{figure}[0].textContent.includes('1.00 m') && {figure}[0].textContent.includes('3.00 m')")
+    assert sum(pixel(0, 3)) > sum(pixel(0, 13)) + 200
+    # The pose of the range finder turns x to y.
+    (beam,) = json.loads(str(browser.evaluate("JSON.stringify(document.querySelector('.mc-player').beams(1.5))")))
+    assert beam == pytest.approx([0.1, 0.2, 0.3, 0.1, 0.95, 0.3], abs=1e-4)
+    assert browser.complaints == []
+    assert [url for url in browser.requests if url != path.as_uri()] == []
 
 
 def _press(page: Page, key: str, code: str, number: int) -> None:

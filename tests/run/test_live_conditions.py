@@ -10,7 +10,7 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.conditions.condition import World
-from manipcli.conditions.formula import leaves
+from manipcli.conditions.formula import leaves, sensors_of
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.robustness import Robustness
 from manipcli.conditions.state_window import StateWindow
@@ -35,6 +35,31 @@ scene:
   cup: {{cup: {{radius: 36 mm, height: 110 mm}}, mass: 150 g, rests_on: desk, at: [0.75, 0.0], friction: 1.0}}
   ball: {{sphere: {{radius: 14 mm}}, mass: 10 g, inside: cup}}
   tray: {{tray: {{size: [0.3, 0.3, 0.05]}}, rests_on: desk, at: [0.70, 0.32], fixed: true}}
+sensors:
+  wrist: {{type: force_torque, link: palm, delay: 3 ms, noise: {{force: {{white: 0.1 N}}, dropout: 10 %}}}}
+  tip: {{type: contact, link: finger_1_distal_link, threshold: 1 N, rate: 250 Hz, delay: 12 ms}}
+  late: {{type: contact, link: finger_2_distal_link, threshold: 1 N, rate: 4 Hz, noise: {{dropout: 20 %}}}}
+  pad:
+    type: tactile
+    link: finger_1_distal_link
+    at: {{xyz: [0, -8 mm, 27 mm], rpy: [90 deg, 0, 0]}}
+    size: [20 mm, 56 mm]
+    rows: 3
+    columns: 3
+    rate: 100 Hz
+    delay: 10 ms
+    noise: {{force: {{white: 0.01 N}}}}
+    shear: true
+  eye:
+    type: camera
+    frame: desk
+    at: {{xyz: [-0.4, 0.6, 0.5], rpy: [0, 35 deg, -40 deg]}}
+    resolution: [48, 36]
+    rate: 20 Hz
+    delay: 70 ms
+    depth: false
+    color: false
+    segmentation: true
 vary:
   scene.cup.mass: {{choice: [80 g]}}
 steps:
@@ -67,9 +92,16 @@ expect:
   - always: {{duration: {{below: 60 s}}}}
   - always: {{step_done: {{step: lift_1}}}}
   - always: {{any: [{{tool_speed: {{below: 0.1 m/s}}}}, {{not: {{grasped: {{object: cup}}}}}}]}}
+  - always: {{touches: {{sensor: tip}}}}
+  - always: {{touches: {{sensor: pad, force: 1 N}}}}
+  - always: {{wrench: {{sensor: wrist, force: {{axis: z, above: -2 N, below: 5 N}}, torque: {{below: 1 N m}}}}}}
+  - always: {{sees: {{sensor: eye, object: cup, pixels: 20}}}}
+  - always: {{slips: {{sensor: pad, friction: 0.8}}}}
   - always: {{moved: {{object: cup, by: 1 cm}}}}
     during: lift_1
   - always: {{duration: {{below: 9 s}}}}
+    during: lift_1
+  - always: {{touches: {{sensor: late}}}}
     during: lift_1
 """
 
@@ -171,6 +203,10 @@ def test_live_and_judged_answers_agree_on_every_tick(judged: list[Answers]) -> N
         assert live.applies == later.applies[:count], spec.name
         # The same numbers through the same functions; arrays of other lengths round elsewhere in their last bit.
         np.testing.assert_allclose(live.margins, later.margins[:count], rtol=1e-12, atol=1e-12, err_msg=spec.name)
+        if sensors_of(spec, CONDITIONS):
+            assert live.margins == later.margins[:count], spec.name
+            assert not live.applies[0], spec.name
+            assert any(live.applies), spec.name
         changing = spec.name not in ("outside", "no_collision")
         assert not changing or len(set(live.margins)) > 1, spec.name
 
@@ -179,7 +215,8 @@ def test_what_counts_from_the_start_of_a_step_does_so_live_too(judged: list[Answ
     for live, later in zip(Monitors.of_step, judged[len(EXPECT) : -1], strict=True):
         assert live.times == later.times
         np.testing.assert_allclose(live.margins, later.margins, rtol=1e-12, atol=1e-12)
-    moved, taken = Monitors.of_step
+    moved, taken, touched = Monitors.of_step
+    assert all(touched.applies)  # by the measurement before the step
     assert moved.margins[0] == -0.01
     assert moved.margins[-1] >= 0.05
     assert taken.margins[0] == 9.0 - 0.001

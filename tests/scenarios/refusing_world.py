@@ -171,7 +171,7 @@ def run(world: World, text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
                 text = text.replace(*change, 1)
         file.write_text(text, encoding="utf-8")
         other = load_task(file, overrides=[each for each in world.true if isinstance(each, str)])
-        task = replace(task, truth=GroundTruth(other.robot, other.scene, other.controllers_file))
+        task = replace(task, truth=GroundTruth(other.robot, other.scene, other.controllers_file, other.sensors))
     refuser = Refuser(task, world.when, world.change)
     changed = {"mujoco": replace(ENGINES["mujoco"], open=refuser.opened)}
     monkeypatch.setattr(execute, "ENGINES", {each.name: each for each in ENGINES} | changed)

@@ -26,7 +26,7 @@ class SeesSpec(Model):
         description="The camera, with `segmentation: true`; its last picture that arrived counts."
     )
     object: PartName = Field(description="A body, `robot` or `robot/LINK`.")
-    pixels: Annotated[int, Field(ge=1)] = Field(1, description="Least number of pixels, 1 or more.")
+    pixels: Annotated[int, Field(ge=1)] = Field(1, description="Least number of pixels, 1 or more. Default 1.")
 
 
 def monitor(spec: SeesSpec, world: World) -> Monitor:
@@ -46,7 +46,7 @@ def monitor(spec: SeesSpec, world: World) -> Monitor:
             spec.sensor,
             shown,
             lambda count: count - spec.pixels,
-            unit="pixel",
+            unit="px",
             scale=float(spec.pixels),
             describe=describe,
         )
@@ -72,7 +72,7 @@ def clause(spec: SeesSpec, robot: RobotModel) -> str:
 SEES = Condition(
     name="sees",
     spec=SeesSpec,
-    units=("pixel",),
+    units=("px",),
     open=monitor,
     check=check,
     absent=lambda spec, world: unmeasured(spec.sensor, world, of_forces=False),

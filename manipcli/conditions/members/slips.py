@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
@@ -39,15 +38,21 @@ def monitor(spec: SlipsSpec, world: World) -> Monitor:
     """The used share of the friction, by the sums of all cells, minus `onset`."""
 
     def used(readings: Array) -> Array:
-        normal, tangential = grip_forces(readings)
-        return np.where(normal >= spec.force, friction_share(normal, tangential, spec.friction), np.nan)
+        return friction_share(*grip_forces(readings), spec.friction)
 
     def describe(value: float) -> str:
         return f"'{spec.sensor}' measures {share(value)} of the friction; at least {share(spec.onset)}"
 
     def look(window: StateWindow) -> Robustness:
         return of_readings(
-            window, spec.sensor, used, lambda value: value - spec.onset, unit="", scale=spec.onset, describe=describe
+            window,
+            spec.sensor,
+            used,
+            lambda value: value - spec.onset,
+            unit="",
+            scale=spec.onset,
+            describe=describe,
+            touched=lambda readings: grip_forces(readings)[0] >= spec.force,
         )
 
     return look

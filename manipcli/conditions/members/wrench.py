@@ -76,8 +76,12 @@ class WrenchSpec(Model):
     """What a `force_torque` sensor measures, in its frame, is `below` and/or `above` a limit."""
 
     sensor: SensorRef = Field(description="The sensor; its last measurement that arrived counts.")
-    force: ForceLimits | None = Field(None, description="Limits of the force or of one of its components.")
-    torque: TorqueLimits | None = Field(None, description="Limits of the torque or of one of its components.")
+    force: ForceLimits | None = Field(
+        None,
+        description="`below` and/or `above` [N], and `axis`: `x`, `y` or `z` of the sensor frame, or `magnitude`. "
+        "Default: no limits.",
+    )
+    torque: TorqueLimits | None = Field(None, description="The same for the torque [N m]. Default: no limits.")
 
     @model_validator(mode="after")
     def _whole(self) -> WrenchSpec:
@@ -96,7 +100,10 @@ class WrenchSpec(Model):
 
 
 def monitor(spec: WrenchSpec, world: World) -> Monitor:
-    """The distance of the measured component, or of the magnitude, to the nearer limit [N or N m]."""
+    """The distance of the measured component, or of the magnitude, to the nearer limit [N or N m].
+
+    In a combination of different units it is divided by this limit, a limit of 0 by 1 N or 1 N m.
+    """
     looks = [
         _bounded(spec.sensor, quantity, unit, first, limits, word)
         for quantity, unit, first, limits in spec.limited
