@@ -81,7 +81,8 @@ the other members are. Ticks at which a member does not apply (no hand holds the
 ## Names in reports
 
 The name of an expectation is its `id`; else the name of its condition (`near`, `all`, `any`, `not`), with `never_` in
-front for `never`. Duplicates get a number (`near_2`). `at`, `during`, `always` and `eventually` do not change the name.
+front for `never` and `believed_` for `believed`. Duplicates get a number (`near_2`). `at`, `during`, `always` and
+`eventually` do not change the name.
 
 ## The conditions
 

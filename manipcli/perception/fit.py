@@ -136,7 +136,7 @@ class Fit:
         picture = self._picture
         depth, _, _ = self._see(state)
         visible = depth < picture.floor
-        if not visible.any():
+        if not visible.any() or not shown.any():
             return state
         measured, rendered = (
             (self._rays[mask.reshape(-1)] * z[mask][:, None]).mean(axis=0)

@@ -67,16 +67,20 @@ class Picture:
         return self.some(slice(0, None, step), slice(0, None, step))
 
     def around(self, points: Array) -> Picture:
-        """The part that shows what is unexpected, and points (n, 3) in the world."""
+        """The part that shows what is unexpected and near, and points (n, 3) in the world."""
         seen = np.argwhere(self.near)
-        corners = window(self.lens, self.X_WC.inverse().apply(points))
         first, last = seen.min(axis=0), seen.max(axis=0)
-        if corners is not None:
-            first = np.minimum(first, [each.start for each in corners])
-            last = np.maximum(last, [each.stop for each in corners])
+        inside = window(self.lens, self.X_WC.inverse().apply(points))
+        if inside is not None:
+            first = np.minimum(first, [each.start for each in inside])
+            last = np.maximum(last, [each.stop for each in inside])
         first = np.maximum(first - BORDER, 0)
         rows, columns = (slice(int(a), int(b) + BORDER, 1) for a, b in zip(first, last, strict=True))
         return self.some(rows, columns)
+
+    def cloud(self) -> Array:
+        """(n, 3) points in the world of what is near."""
+        return self.X_WC.apply(self.rays[self.near] * self.depth[self.near][:, None])
 
 
 def cut(
@@ -88,37 +92,42 @@ def cut(
     """
     from scipy.ndimage import minimum_filter
 
-    corners = np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
-    inside = window(lens, X_WC.inverse().apply(corners))
+    inside = window(lens, X_WC.inverse().apply(corners(low, high)))
     if inside is None:
         return None
     rows, columns = inside
     z = np.array(depth[inside], dtype=np.float64)
     sigma = np.broadcast_to(np.asarray(noise, dtype=np.float64), depth.shape)[inside]
     sigma = np.maximum(np.where(np.isfinite(sigma), sigma, LEAST_NOISE), LEAST_NOISE)
-    behind = np.minimum(np.asarray(expected, dtype=np.float64), NOTHING)
+    behind = np.minimum(np.asarray(expected[inside], dtype=np.float64), NOTHING)
     z[~(z > 0.0) | ~np.isfinite(z)] = np.nan
-    z[np.isnan(z) & (behind[inside] == NOTHING)] = NOTHING
+    z[np.isnan(z) & (behind == NOTHING)] = NOTHING
     part = Lens(z.shape[1], z.shape[0], lens.fx, lens.fy, lens.cx - columns.start, lens.cy - rows.start)
     rays = np.asarray(part.points(np.ones_like(z)), dtype=np.float64)
     # A pixel may show what its neighbours were expected to show.
-    floor = minimum_filter(behind, size=3)[inside] - NEARER * sigma
+    floor = minimum_filter(behind, size=3, mode="nearest") - NEARER * sigma
     with np.errstate(invalid="ignore"):
         shown = z < floor
     shown = patches(shown)
     points = X_WC.apply(rays * np.where(shown, z, 0.0)[..., None])
     near = shown & ((points >= low) & (points <= high)).all(axis=-1)
     pixel = np.array([1.0 / lens.fx, 1.0 / lens.fy])
-    return Picture(part, X_WC, rays, z, sigma, behind[inside], floor, shown, near, pixel)
+    return Picture(part, X_WC, rays, z, sigma, behind, floor, shown, near, pixel)
 
 
-def window(lens: Lens, corners: Array) -> tuple[slice, slice] | None:
+def corners(low: Array, high: Array) -> Array:
+    """(8, 3) of a box between two of them."""
+    found: Array = np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
+    return found
+
+
+def window(lens: Lens, points: Array) -> tuple[slice, slice] | None:
     """Rows and columns that can show the convex hull of points (n, 3) in C; None without any."""
-    if corners[:, 2].max() <= 0.0:
+    if points[:, 2].max() <= 0.0:
         return None
     first, last = np.zeros(2, dtype=np.int64), np.array([lens.width, lens.height])
-    if corners[:, 2].min() > 1e-3:
-        image = np.clip(lens.project(corners), -1e6, 1e6)
+    if points[:, 2].min() > 1e-3:
+        image = np.clip(lens.project(points), -1e6, 1e6)
         first = np.maximum(first, np.floor(image.min(axis=0)).astype(np.int64) - 2)
         last = np.minimum(last, np.ceil(image.max(axis=0)).astype(np.int64) + 3)
     if (first >= last).any():

@@ -10,7 +10,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform, wrapped
 from manipcli.perception.fit import Comparison, Fit
-from manipcli.perception.picture import Mask, Picture
+from manipcli.perception.picture import Mask, Picture, corners
 from manipcli.render.surface import Surface
 
 COARSE, FINE = 48, 100
@@ -58,7 +58,9 @@ def search(picture: Picture, shown: Surface, X_WO: Transform, reach: Array) -> F
         X_WO: believed pose.
         reach: (4,) the state is at most this before; 0: known.
     """
-    coarse = Fit(small := picture.strided(COARSE), shown, X_WO, reach)
+    cloud, size = picture.cloud(), 2.0 * float(np.linalg.norm(shown.vertices, axis=1).max())
+    small = picture.around(corners(cloud.min(axis=0) - size, cloud.max(axis=0) + size)).strided(COARSE)
+    coarse = Fit(small, shown, X_WO, reach)
     begun = [_begun(coarse, *start) for start in _starts(small, float(reach[3]))]
     kept = _distinct([_coarse(coarse, each.state) for each in _best(begun, BEGUN)])[:KEPT]
     body = np.concatenate([coarse.pose(each.state).apply(shown.corners) for each in kept])
@@ -78,7 +80,7 @@ def _starts(picture: Picture, rotation: float) -> Iterator[tuple[Array, Mask]]:
 
     numbers, count = label(picture.near)
     sizes = np.bincount(numbers.reshape(-1), minlength=count + 1)[1:]
-    large = [k + 1 for k in np.argsort(-sizes, kind="stable")[:3] if sizes[k] >= 0.2 * sizes.max()]
+    large = [int(k) + 1 for k in np.argsort(-sizes, kind="stable")[:3] if sizes[k] >= 0.2 * sizes.max()]
     masks: list[Mask] = [picture.near]
     if len(large) > 1:
         masks += [numbers == k for k in large]

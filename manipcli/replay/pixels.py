@@ -133,7 +133,7 @@ def _colour(image: PillowImage) -> Small:
 
 
 def _depth(rows: npt.NDArray[np.generic], unit: float) -> Small:
-    """Levels 1 to 255 from the lowest to the highest depth; without mixing those of neighbours."""
+    """Levels 0 to 255 from the lowest to the highest depth; what was not measured is transparent."""
     from PIL import Image
 
     factor = _factor(rows.shape[1], rows.shape[0])
@@ -141,8 +141,8 @@ def _depth(rows: npt.NDArray[np.generic], unit: float) -> Small:
     known = np.isfinite(metres) & (metres > 0.0)
     low, high = (float(np.percentile(metres[known], part)) for part in SPREAD) if known.any() else (0.0, 0.0)
     spread = max(high - low, 1e-6)
-    levels = 1.0 + 254.0 * np.clip((np.where(known, metres, low) - low) / spread, 0.0, 1.0)
-    image = Image.fromarray(np.where(known, np.rint(levels), 0.0).astype(np.uint8))
+    levels = np.rint(255.0 * np.clip((np.where(known, metres, low) - low) / spread, 0.0, 1.0))
+    image = Image.fromarray(np.dstack([*[levels] * 3, np.where(known, 255, 0)]).astype(np.uint8))
     return Small(_webp(image), image.size, "depth", low, low + spread)
 
 
@@ -163,5 +163,5 @@ def _labels(rows: npt.NDArray[np.generic]) -> Small:
 
 def _webp(image: PillowImage) -> bytes:
     stream = BytesIO()
-    image.convert("RGB").save(stream, "WEBP", quality=QUALITY, method=2)
+    image.save(stream, "WEBP", quality=QUALITY, method=2)
     return stream.getvalue()

@@ -17,7 +17,7 @@ from manipcli.core.geometry import Array, Transform, quat_product, rotate
 from manipcli.model.collision import Carried
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.state import WorldState
-from manipcli.scene.known import contains, within
+from manipcli.scene.containing import contains, within
 from manipcli.scene.scene import Scene
 from manipcli.task.believed_scene import contents
 

@@ -63,7 +63,8 @@ def prepare(path: Path, **options: Unpack[FileOptions]) -> Prepared:
     def prepared() -> tuple[WrittenTask, Plan | None]:
         written = load_written(path, **options)
         load_libraries(written.task)
-        shared = all(quantity.only_world for quantity in written.varied)
+        every_one = not written.varied or written.task.scene is written.task.true.scene  # beliefs differ by sample
+        shared = every_one and all(quantity.only_world for quantity in written.varied)
         return written, plan_task(written.task) if shared else None
 
     (written, plan), files = opened_by(prepared)

@@ -142,6 +142,11 @@ class _Builder:
                 hint = "remove `known`, or write `fixed: false`"
                 self._error("TASK228", f"body '{name}' is fixed: its pose is known exactly", (*loc, "known"), hint)
             return
+        around = self.spec.scene.get(spec.inside or "")
+        if spec.known is not None and around is not None and around.known is not None:
+            message = f"body '{name}' is inside '{spec.inside}', whose pose is not known exactly"
+            hint = "remove `known`: it is known exactly relative to its container"
+            self._error("TASK228", message, (*loc, "known"), hint)
         if max(shape.size) > LONGEST:
             message = f"body '{name}' is {max(shape.size):.3g} m long; movable bodies are at most {LONGEST:g} m"
             scaled = _SCALED.get(kind, "each size with its unit, such as '80 mm'")

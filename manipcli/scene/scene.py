@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.scene.known import Known
 from manipcli.shapes.primitives import Box, Cylinder, Geometry
-
-if TYPE_CHECKING:
-    from manipcli.scene.known import Known
 
 SEPARATOR: Final = "/"
 """Between a body and its part: `cup/handle`."""

@@ -116,10 +116,12 @@ class ExpectationSpec(ConditionSpec):
 
     @property
     def label(self) -> str:
-        """The id; else the name of the condition, with the prefix `never_` under `never`."""
+        """The id; else the name of the condition, with the prefix `never_` under `never`, `believed_` in `believed`."""
         if self.id is not None:
             return self.id
-        return f"never_{self.condition.name}" if self.quantifier == "never" else self.condition.name
+        inner = self.condition
+        name = f"believed_{inner.members[0].name}" if inner.name == "believed" else inner.name
+        return f"never_{name}" if self.quantifier == "never" else name
 
     @model_validator(mode="after")
     def _once(self) -> ExpectationSpec:

@@ -12,7 +12,8 @@ from typing import Final
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Transform
-from manipcli.scene.known import Known, contains, displaced
+from manipcli.scene.containing import contains
+from manipcli.scene.known import Known, displaced
 from manipcli.scene.scene import Body, Scene
 from manipcli.scene.start_overlap import overlaps
 from manipcli.spec.located import Located

@@ -218,8 +218,8 @@ def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterato
             message = f"camera '{name}' has no depth: `depth` is false"
         else:
             message = f"sensor '{name}' is of type '{spec.type}', not 'camera'"
-        hint = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
-        yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=hint)
+        near = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
+        yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=near)
 
 
 def _readers(controllers: Located[ControllersSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:

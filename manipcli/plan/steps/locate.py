@@ -35,6 +35,8 @@ from manipcli.spec.names import MovableName, SensorRef
 
 ELEVATIONS: Final = tuple(np.radians([50.0, 35.0, 65.0]))
 """[rad] Of the camera above the horizontal through the object."""
+STEEP: Final = tuple(np.radians([75.0, 60.0, 45.0]))
+"""[rad] The same of an object whose rotation is not known: from above nothing of it is behind it."""
 AROUND: Final = tuple(np.radians([0.0, 40.0, -40.0, 80.0, -80.0, 120.0, -120.0, 180.0]))
 """[rad] About the vertical, from the direction in which the camera is."""
 FARTHER: Final = (1.1, 1.5)
@@ -101,7 +103,8 @@ def _views(
         builder.look(Look(spec.object, spec.with_), sight.latency)
         return builder.plan()
 
-    for farther, elevation, around in itertools.product(FARTHER, ELEVATIONS, AROUND):
+    turned = body.known is not None and body.known.rotation > 0.0
+    for farther, elevation, around in itertools.product(FARTHER, STEEP if turned else ELEVATIONS, AROUND):
         X_WC = _looking_at(target, here + around, elevation, farther * least)
         angle = math.degrees(here + around) % 360.0
         name = f"from {amount(round(farther * least, 3), 'm')} away at {angle:.0f} deg"

@@ -1,0 +1,26 @@
+"""Which bodies have their centre in the interior of a container."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.scene.scene import Body, Interior
+from manipcli.shapes.primitives import Cylinder
+
+
+def within(interior: Interior, X_WC: Transform, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(k,) whether points (k, 3) [m] of the world are in the interior of a container at X_WC."""
+    X_WS = X_WC @ interior.X_OS
+    local = (points - X_WS.p) @ X_WS.R
+    if isinstance(interior.shape, Cylinder):
+        level = np.hypot(local[:, 0], local[:, 1]) < interior.shape.radius
+        return np.asarray(level & (np.abs(local[:, 2]) < interior.shape.length / 2.0))
+    return np.asarray(np.all(np.abs(local) < np.array(interior.shape.size) / 2.0, axis=1))
+
+
+def contains(container: Body, X_WC: Transform, body: Body, X_WO: Transform) -> bool:
+    """Whether the centre of a body at X_WO is in the interior of a container at X_WC."""
+    if container.interior is None or container.name == body.name:
+        return False
+    return bool(within(container.interior, X_WC, X_WO.apply(body.centre)[None])[0])
