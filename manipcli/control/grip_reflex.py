@@ -5,9 +5,10 @@ The share of the friction cone that all taxels of the hand use together follows 
 
     dF/dt = min(RATE, GAIN (|T| / (mu onset) - N) / k)
 
-where N and T are the sums of the normal and tangential forces and k is the number of links with taxels that press. The
-force never falls before the next goal. The PID goes on: the efforts u_0 that held F_0 when the reflex began are scaled,
-u = PID + u_0 (F - F_0) / F_0. F_0 is the force of the goal, or what the taxels measured then, if that is more.
+where N and T are the sums of the normal and tangential forces and k is the number of links with taxels that press; from
+the share (1 + onset) / 2 on, where the object slides and T is mu N whatever the load, with RATE. The force never falls
+before the next goal. The PID goes on: the efforts u_0 that held F_0 when the reflex began are scaled,
+u = PID + u_0 (F - F_0) / F_0. F_0 is the force of the goal, or what the taxels measured before, if that is more.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ RATE: Final = 100.0
 GAIN: Final = 30.0
 """[1/s] Growth of the force per missing force; its product with the delays of sensor and hand is below 1."""
 TOUCHES: Final = 0.1
-"""Share of the goal's force below which taxels touch nothing: what they report is noise."""
+"""Share of F_0 below which a sensor touches nothing: what it reports is noise."""
+MEMORY: Final = 0.05
+"""[s] Time constant of the measured force F_0."""
 IDLE: Final = 1e-9
 """[N m or N] A joint with less effort does not press."""
 
@@ -86,7 +89,7 @@ class GripReflex:
         self._most = np.inf
         self._limit = ""
         self._rotations: list[Array] = []
-        self._told, self._count = self.force, 0
+        self._told, self._count, self._measured = self.force, 0, self.force
 
     def update(self, period: float, position: Array, command: Array, effort: Array) -> bool:
         """One control tick of a hand that holds.
@@ -106,17 +109,23 @@ class GripReflex:
         if not self._rotations:
             self._rotations = self._turned(position)
         normal, tangential = joint_forces([pad.reading for pad in self._pads], self._rotations)
-        slips = friction_share(normal, tangential, reflex.friction) > reflex.onset and normal > TOUCHES * self._first
-        before = self.force
-        if slips:
-            cells = [pad.reading[: len(pad.reading) // 3].sum() for pad in self._pads]
-            pressing = {pad.link for pad, force in zip(self._pads, cells, strict=True) if force > 0.0}
+        least = TOUCHES * self._first
+        links = len({pad.link for pad in self._pads if pad.reading[: len(pad.reading) // 3].sum() > least})
+        if not links:
+            return self._pressed
+        share = float(friction_share(normal, tangential, reflex.friction))
+        grows = False
+        if share > reflex.onset:
             if not self._pressed:
-                self._first_press(reflex, float(normal) / len(pressing), command, effort)
-            missing = (float(tangential) / (reflex.friction * reflex.onset) - float(normal)) / len(pressing)
-            self.force = max(before, min(before + period * min(RATE, GAIN * missing), self._most))
+                self._first_press(reflex, command, effort)
+            before = self.force
+            missing = (float(tangential) / (reflex.friction * reflex.onset) - float(normal)) / links
+            rate = RATE if share > 0.5 * (1.0 + reflex.onset) else min(RATE, GAIN * missing)
+            self.force = max(before, min(before + period * rate, self._most))
             np.multiply(self._held, self.force / self._first - 1.0, out=self.extra)
-        grows = self.force > before
+            grows = self.force > before
+        elif not self._pressed:
+            self._measured += period / (period + MEMORY) * (float(normal) / links - self._measured)
         self._count += grows and not self._presses
         self._presses = grows
         return self._pressed
@@ -130,10 +139,10 @@ class GripReflex:
         self._told, self._count = self.force, 0
         return text if self.force < self._most else f"{text}, {self._limit}"
 
-    def _first_press(self, reflex: Reflex, measured: float, command: Array, effort: Array) -> None:
+    def _first_press(self, reflex: Reflex, command: Array, effort: Array) -> None:
         """Take the efforts that hold F_0, and the largest force with the efforts' limits."""
         self._pressed = True
-        self.force = self._told = self._first = max(self._first, measured)
+        self.force = self._told = self._first = max(self._first, self._measured)
         self._held = command.copy()
         presses = np.abs(command) > IDLE
         most = self._first * float(np.min(effort[presses] / np.abs(command[presses]), initial=np.inf))

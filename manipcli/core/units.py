@@ -8,9 +8,10 @@ written `s2`, `s^2`, `s^-1` or `s²`. An angle is a dimension of its own, so tha
 from __future__ import annotations
 
 import math
+import operator
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import ClassVar, Final
 
 from manipcli.core.errors import Diagnostic, ExitCode, ManipcliError
@@ -38,20 +39,19 @@ class UnitError(ManipcliError):
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """Exponents of the base units m, kg, s and rad."""
+    """Exponents of the base units m, kg, s, rad and px."""
 
     length: int = 0
     mass: int = 0
     time: int = 0
     angle: int = 0
+    pixel: int = 0
 
     def __mul__(self, other: Dimension) -> Dimension:
-        return Dimension(
-            self.length + other.length, self.mass + other.mass, self.time + other.time, self.angle + other.angle
-        )
+        return Dimension(*map(operator.add, astuple(self), astuple(other)))
 
     def __pow__(self, exponent: int) -> Dimension:
-        return Dimension(self.length * exponent, self.mass * exponent, self.time * exponent, self.angle * exponent)
+        return Dimension(*(exponent * each for each in astuple(self)))
 
     def __truediv__(self, other: Dimension) -> Dimension:
         return self * other**-1
@@ -66,7 +66,7 @@ class Dimension:
         """The SI unit, as `parse_unit` reads it; empty for a plain number."""
         if self in _SYMBOLS:
             return _SYMBOLS[self]
-        parts = (("kg", self.mass), ("m", self.length), ("rad", self.angle), ("s", self.time))
+        parts = (("kg", self.mass), ("m", self.length), ("rad", self.angle), ("s", self.time), ("px", self.pixel))
         return " ".join(symbol if power == 1 else f"{symbol}^{power}" for symbol, power in parts if power)
 
 
@@ -75,6 +75,7 @@ LENGTH = Dimension(length=1)
 ANGLE = Dimension(angle=1)
 MASS = Dimension(mass=1)
 TIME = Dimension(time=1)
+PIXELS = Dimension(pixel=1)
 FREQUENCY = TIME**-1
 SPEED, ACCELERATION, JERK = LENGTH / TIME, LENGTH / TIME**2, LENGTH / TIME**3
 ANGULAR_VELOCITY, ANGULAR_ACCELERATION, ANGULAR_JERK = ANGLE / TIME, ANGLE / TIME**2, ANGLE / TIME**3
@@ -87,6 +88,7 @@ _NAMES = {
     FREQUENCY: "a frequency", SPEED: "a speed", ACCELERATION: "an acceleration", JERK: "a jerk",
     ANGULAR_VELOCITY: "an angular velocity", ANGULAR_ACCELERATION: "an angular acceleration",
     ANGULAR_JERK: "an angular jerk", FORCE: "a force", TORQUE: "a torque or an energy",
+    PIXELS: "a number of pixels",
 }  # fmt: skip
 _SYMBOLS = {
     NUMBER: "", LENGTH: "m", ANGLE: "rad", MASS: "kg", TIME: "s", FREQUENCY: "Hz", SPEED: "m/s",
@@ -141,7 +143,7 @@ _UNITS: dict[str, Unit] = {
     "N": _unit(FORCE), "mN": _unit(FORCE, 1, 1e3), "kN": _unit(FORCE, 1e3),
     "J": _unit(TORQUE), "mJ": _unit(TORQUE, 1, 1e3), "kJ": _unit(TORQUE, 1e3),
     "Nm": _unit(TORQUE), "mNm": _unit(TORQUE, 1, 1e3), "kNm": _unit(TORQUE, 1e3), "Nmm": _unit(TORQUE, 1, 1e3),
-    "%": _unit(NUMBER, 1, 100),
+    "%": _unit(NUMBER, 1, 100), "px": _unit(PIXELS),
 }  # fmt: skip
 _WORDS = {
     "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad", "meter": "m", "meters": "m",

@@ -32,6 +32,8 @@ MAX_ASSET: Final = 64 << 20
 """Largest file that is sent [byte]."""
 BACKLOG: Final = 256
 """Messages that wait for a client; then its oldest are dropped."""
+PICTURE_BACKLOG: Final = 64
+"""The same with cameras, whose messages have up to 8 MiB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,7 @@ class FoxgloveServer(Outlet):
                 server_listener=_Listener(self._subscribe, self._unsubscribe),
                 asset_handler=lambda uri: asset(assets, uri),
                 context=context,
-                message_backlog_size=BACKLOG,
+                message_backlog_size=PICTURE_BACKLOG if offer.pictures else BACKLOG,
             )
         except RuntimeError as error:
             raise _unusable(port, str(error)) from None

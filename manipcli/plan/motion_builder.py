@@ -393,11 +393,18 @@ class MotionBuilder:
         q[self._planner.robot.indices(tuple(names))] = values
         return with_mimics(self._planner.robot, q)
 
-    def _grip(self, targets: dict[str, float], *, force: float | None = None, **must: bool) -> Grip | None:
-        """A goal for the joints of the gripper controller, or None if no target is one of them; `must`: see `Grip`."""
+    def _grip(
+        self,
+        targets: dict[str, float],
+        *,
+        force: float | None = None,
+        must_hold: bool = False,
+        must_arrive: bool = False,
+    ) -> Grip | None:
+        """A goal for the joints of the gripper controller, or None if no target is one of them."""
         joints = self._planner.gripper_joints
         if not any(name in targets for name in joints):
             return None
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
-        return Grip(joints=joints, target=target, force=force, **must)
+        return Grip(joints, target, force, must_hold=must_hold, must_arrive=must_arrive)

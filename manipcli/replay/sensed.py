@@ -25,11 +25,11 @@ class PictureStream:
 
     Attributes:
         name: of the topic within its camera, `image_raw`.
-        kind: colours, depth in 254 levels between `low` and `high` (level 0: not measured), or numbers of parts.
+        kind: colours, depth in levels between `low` and `high` (transparent: not measured), or numbers of parts.
         size: width and height as shown [pixel].
         times: (T,) arrivals [s].
         pictures: (T,) files, WebP or PNG.
-        low, high: (T,) depths of the levels 1 and 255 [m]; NaN unless `kind` is depth.
+        low, high: (T,) depths of the levels 0 and 255 [m]; NaN unless `kind` is depth.
         note: how they differ from the log; "" if all are shown as they are.
     """
 

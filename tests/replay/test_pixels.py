@@ -55,7 +55,7 @@ def test_compressed_pictures_are_read(form: str) -> None:
 
 
 @pytest.mark.parametrize("big", [False, True])
-def test_depth_is_told_in_metres_and_what_is_missing_is_level_0(big: bool) -> None:
+def test_depth_is_told_in_metres_and_what_is_missing_is_transparent(big: bool) -> None:
     metres = np.tile(np.linspace(0.5, 2.5, WIDTH), (HEIGHT, 1))
     metres[:, :10] = 0.0
     order = ">" if big else "<"
@@ -65,10 +65,17 @@ def test_depth_is_told_in_metres_and_what_is_missing_is_level_0(big: bool) -> No
     for encoding, pixels in pictures:
         step, data = rows(pixels)
         small = from_image(encoding, WIDTH, HEIGHT, step, data, big=big)
-        level = seen(small)[12, :, 0]
-        assert level[:8].max() <= 8
-        told = small.low + (level[13:] - 1) / 254 * (small.high - small.low)
-        assert told == pytest.approx(metres[12, 13:], abs=0.05)
+        level, _, _, there = np.moveaxis(np.asarray(Image.open(io.BytesIO(small.data))).astype(int)[12], 1, 0)
+        assert there.tolist() == [0] * 10 + [255] * (WIDTH - 10)
+        told = small.low + level[10:] / 255 * (small.high - small.low)
+        assert told == pytest.approx(metres[12, 10:], abs=0.05)
+
+
+def test_infrared_is_a_picture_and_no_depth() -> None:
+    step, data = rows(np.repeat(np.array([[100, 1000]], dtype="<u2"), 20, axis=1).repeat(HEIGHT, axis=0))
+    small = from_image("mono16", WIDTH, HEIGHT, step, data)
+    assert small.kind == "colour"
+    assert seen(small)[12, [5, 35], 0] == pytest.approx([25, 255], abs=6)
 
 
 def test_compressed_depth_is_a_png_behind_its_head() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from PIL import Image as PillowImage
 from manipcli.core.geometry import Transform, frozen
 from manipcli.render.drawing import draw
 from manipcli.render.placing import Placing
+from manipcli.render.shading import TO_LIGHT
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.renderer import Renderer, png_bytes, sky
 from manipcli.scene.scene import Body, Scene
@@ -94,3 +96,35 @@ def test_the_same_picture_is_the_same_bytes() -> None:
         renderer = Renderer(draw(None, SCENE), size=(80, 60))
         drawn.append(png_bytes(renderer.picture(Placing(None, SCENE).start(), FRONT)))
     assert drawn[0] == drawn[1]
+
+
+def test_a_shadow_is_where_the_light_cannot_reach() -> None:
+    """A plate above a floor, seen from above; oracle: the plate moved along the light to the floor."""
+    table = replace(_body("floor", Box((4.0, 4.0, 0.1)), (0.8, 0.8, 0.8, 1.0), (0.0, 0.0, -0.05)), fixed=True)
+    plate = _body("plate", Box((0.4, 0.4, 0.01)), RED, (-0.2, 0.1, 0.5))
+    scene = Scene(bodies=(table, plate), frames=(), gravity=frozen([0.0, 0.0, -9.8]))
+    camera, placing, size = Camera(eye=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), field=40.0), Placing(None, scene), 200
+    drawing, poses = draw(None, scene), placing.start()
+    bright, dark = (
+        Renderer(drawing, size=(size, size), still=placing.still, shadows=shadows).picture(poses, camera).astype(int)
+        for shadows in (False, True)
+    )
+    darker = (bright - dark).max(axis=2) > 30
+    assert np.all(dark <= bright)
+    v, u = np.nonzero(darker)
+    focal = size / 2.0 / math.tan(math.radians(20.0))
+    # Seen from above with x up: x is up and -y to the right; 3 m from the camera.
+    x, y = (size / 2.0 - v - 0.5) * 3.0 / focal, (size / 2.0 - u - 0.5) * 3.0 / focal
+    dx, dy = 0.5 * TO_LIGHT[:2] / TO_LIGHT[2]
+    # 5 mm in the picture from the light, 11 mm a pixel; the plate hides a part of its shadow.
+    assert np.all((np.abs(x + 0.2 + dx) < 0.22) & (np.abs(y - 0.1 + dy) < 0.22))
+    assert [x.min(), x.max()] == pytest.approx([-0.4 - dx, -dx], abs=0.03)
+    assert y.min() == pytest.approx(-0.1 - dy, abs=0.03)
+
+
+def test_no_physics_library_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("pybullet", "mujoco"):
+        monkeypatch.setitem(sys.modules, name, None)
+    placing = Placing(None, SCENE)
+    image = Renderer(draw(None, SCENE), size=(80, 60), still=placing.still).picture(placing.start(), FRONT)
+    assert np.ptp(image) > 100

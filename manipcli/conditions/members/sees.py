@@ -46,7 +46,7 @@ def monitor(spec: SeesSpec, world: World) -> Monitor:
             spec.sensor,
             shown,
             lambda count: count - spec.pixels,
-            unit="pixel",
+            unit="px",
             scale=float(spec.pixels),
             describe=describe,
         )
@@ -72,7 +72,7 @@ def clause(spec: SeesSpec, robot: RobotModel) -> str:
 SEES = Condition(
     name="sees",
     spec=SeesSpec,
-    units=("pixel",),
+    units=("px",),
     open=monitor,
     check=check,
     absent=lambda spec, world: unmeasured(spec.sensor, world, of_forces=False),

@@ -100,7 +100,10 @@ class WrenchSpec(Model):
 
 
 def monitor(spec: WrenchSpec, world: World) -> Monitor:
-    """The distance of the measured component, or of the magnitude, to the nearer limit [N or N m]."""
+    """The distance of the measured component, or of the magnitude, to the nearer limit [N or N m].
+
+    In a combination of different units it is divided by this limit, a limit of 0 by 1 N or 1 N m.
+    """
     looks = [
         _bounded(spec.sensor, quantity, unit, first, limits, word)
         for quantity, unit, first, limits in spec.limited

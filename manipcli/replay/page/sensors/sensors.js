@@ -77,11 +77,11 @@ function cameraFeed(strip, camera) {
   const colour = (stream, k) => {
     const image = pen.getImageData(0, 0, canvas.width, canvas.height), pixels = image.data, table = [];
     for (let level = 0; level < 256; level++) {
-      const z = stream.low[k] + ((level - 1) / 254) * (stream.high[k] - stream.low[k]);
-      // Compression blurs the edges of what was not measured.
-      table.push(level < 1 ? NOT_MEASURED : shade(NEAR_TO_FAR, (z - stream.nearest) / (stream.farthest - stream.nearest)));
+      const z = stream.low[k] + (level / 255) * (stream.high[k] - stream.low[k]);
+      table.push(shade(NEAR_TO_FAR, (z - stream.nearest) / (stream.farthest - stream.nearest)));
     }
-    for (let j = 0; j < pixels.length; j += 4) [pixels[j], pixels[j + 1], pixels[j + 2]] = table[pixels[j]];
+    for (let j = 0; j < pixels.length; j += 4)
+      [pixels[j], pixels[j + 1], pixels[j + 2], pixels[j + 3]] = pixels[j + 3] ? [...table[pixels[j]], 255] : [...NOT_MEASURED, 255];
     pen.putImageData(image, 0, 0);
   };
   return async (t) => {
