@@ -280,8 +280,10 @@ class StepLoop(StepAttempt):
         if end.outcome != "done" and self._physics:
             short = effort_shortage(self._session, self._task.scene.gravity)
             end = replace(end, text=f"{short}; {end.text}") if short else end
-        pressed = [c.reflex.report() for c in self._session.manager.controllers if has_reflex(c)]
-        end = replace(end, text="; ".join(filter(None, (end.text, *pressed))))
+        for controller in self._session.manager.controllers:
+            if has_reflex(controller) and (pressed := controller.reflex.report()):
+                self._report(pressed, detail=False)
+                end = replace(end, text=f"{end.text}; {pressed}" if end.text else pressed)
         self._event("step_ended", planned, end.outcome, end.text)
         return end
 

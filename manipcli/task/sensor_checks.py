@@ -7,9 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from manipcli.conditions.condition import Problem
 from manipcli.conditions.frames import fixed_frame
 from manipcli.conditions.sensed import Sensed
+from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceSpec
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, listed
 from manipcli.model.robot import RobotModel
@@ -36,6 +39,8 @@ ABSENT: Final = 230
 LOG_FOLDER: Final = "sensors"
 """A controller of this name publishes next to the sensors."""
 OF_CONTROLLERS: Final = ("controller_state", "reference", "error", "wrench")
+PARALLEL: Final = 1.0
+"""[deg] Accepted rotation between the frame of a sensor and the tool whose force it measures."""
 WHOLE: Final = 1e-6
 """Accepted deviation of a number of ticks from a whole number, as a share."""
 
@@ -90,7 +95,7 @@ def sensor_findings(
     found += _measured_twice(sensors, robot)
     if controllers is not None and robot_file is not None:
         every = {own.name: own.spec for own in sensors}
-        found += [*_readers(controllers, every), *_reflexes(task, controllers.spec, every, robot)]
+        found += [*_readers(controllers, every, robot), *_reflexes(task, controllers.spec, every, robot)]
     if robot_file is not None and not task.source.kept:
         found += _looking(task, {own.name: own.spec for own in sensors})
     return tuple(found)
@@ -222,19 +227,50 @@ def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterato
         yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=near)
 
 
-def _readers(controllers: Located[ControllersSpec], sensors: dict[str, SensorSpec]) -> Iterator[Diagnostic]:
-    """Controllers that read a sensor that is missing or of another type."""
+def _readers(
+    controllers: Located[ControllersSpec], sensors: dict[str, SensorSpec], robot: RobotModel
+) -> Iterator[Diagnostic]:
+    """Controllers that read a sensor that is missing or of another type, or that does not move with the tool."""
     wrenches = [name for name, spec in sensors.items() if spec.type == "force_torque"]
     for name, spec in controllers.spec.controllers.items():
-        read = getattr(spec, "sensor", None)
-        if not isinstance(read, str) or read in wrenches:
+        force = spec.force if isinstance(spec, CartesianImpedanceSpec) else None
+        read = getattr(spec, "sensor", None) if force is None else force.sensor
+        if not isinstance(read, str):
             continue
-        place = controllers.place("controllers", name, "sensor")
+        place = controllers.place("controllers", name, *(("sensor",) if force is None else ("force", "sensor")))
+        if read in wrenches:
+            own = sensors[read]
+            if not (isinstance(spec, CartesianImpedanceSpec) and isinstance(own, MountedSpec)):
+                continue
+            if reason := _not_along(own, spec, robot):
+                hint = "mount it on the link of the tool; turn it with `at: {rpy: ...}` to the axes of the tool"
+                yield Diagnostic("SENS112", f"controller '{name}': sensor '{read}' {reason}", place, hint)
+            continue
         if read in sensors:
             message = f"controller '{name}': sensor '{read}' is of type '{sensors[read].type}', not 'force_torque'"
         else:
             message = f"controller '{name}': neither robot nor task has a sensor '{read}'"
         yield Diagnostic("SENS111", message, place, did_you_mean(read, wrenches, kind="sensors"))
+
+
+def _not_along(sensor: MountedSpec, spec: CartesianImpedanceSpec, robot: RobotModel) -> str:
+    """Why a sensor does not measure along the axes of the tool; empty if it does."""
+    tool = robot.tool if spec.link is None else None
+    link = (spec.link or "") if tool is None else tool.link
+    parents = {joint.child: joint for joint in robot.joints}
+    if link not in parents or sensor.link not in parents:
+        return ""  # reported for the sensor or the controller
+    R = np.eye(3) if tool is None else np.asarray(tool.X_LT.R)
+    if link not in robot.descendants(sensor.link):
+        return f"does not carry the tool: '{link}' is not below '{sensor.link}'"
+    while link != sensor.link:
+        joint = parents[link]
+        if joint.moves:
+            return f"does not move with the tool: joint '{joint.name}' is between them"
+        R, link = np.asarray(joint.X_PJ.R) @ R, joint.parent
+    cosine = (np.trace(np.asarray(sensor.at.transform.R).T @ R) - 1.0) / 2.0
+    angle = float(np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    return f"is rotated by {angle:.3g} deg from the tool" if angle > PARALLEL else ""
 
 
 def _reflexes(

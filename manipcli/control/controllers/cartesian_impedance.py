@@ -22,6 +22,11 @@ the tool. No singular matrix is inverted: s bounds one inverse, and m_i only sca
 
 At rest, a force F on the tool displaces it by K^-1 F. Hogan, Impedance control (1985); Ott,
 Cartesian Impedance Control of Redundant and Flexible-Joint Robots (2008), chapters 3 and 4.
+
+With `force: {sensor: wrist, axis: z, target: 10 N}` and `axes: tool` the tool presses along its axis z: R is shifted
+along it until the sensor measures the target, at `speed` before contact, and in stiff contact with a time constant of
+1 / (2 pi `bandwidth`). The tool stays a spring in all directions. The sensor is zeroed for 0.1 s when the controller is
+activated: do that at rest and before contact, with `active: false` and the step `switch_controllers`.
 """
 
 from __future__ import annotations
@@ -36,8 +41,16 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
 from manipcli.control.control_loop import ControlLoop, NoLoop
-from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
+from manipcli.control.controller import (
+    BuildContext,
+    ControllerMember,
+    ControllerOutput,
+    FeedForward,
+    JointState,
+    SensorRequest,
+)
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
+from manipcli.control.force_reference import AXES, ForceReference, ForceReferenceSpec
 from manipcli.control.gains import strangers
 from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
@@ -99,6 +112,9 @@ class CartesianImpedanceSpec(ControllerSpec):
     )
     axes: Literal["world", "tool"] = Field("world", description="Axes of stiffness and damping. Default world.")
     posture: PostureSpec = Field(PostureSpec(), description="Stiffness of the joints in the null space of the tool.")
+    force: ForceReferenceSpec | None = Field(
+        None, description="Force that the tool exerts along one of its axes; needs `axes: tool`. Default: none."
+    )
     inverse_dynamics: bool = Field(
         False, description="Add the effort of the reference's acceleration, besides gravity. Default false."
     )
@@ -127,6 +143,7 @@ class CartesianImpedanceController:
         axes: of stiffness and damping.
         posture_stiffness: of each joint [N m/rad or N/m].
         posture_damping_ratio: d = 2 ratio sqrt(k M_jj).
+        force: force of the tool along one of its axes, with `axes` of the tool and a stiffness along it.
         feed_forward: `gravity`; `inverse_dynamics` adds the effort of the reference's acceleration.
         constraints, limits, types, compat: see `JointTrajectoryController`.
 
@@ -136,7 +153,6 @@ class CartesianImpedanceController:
 
     role: Role = "follower"
     senses_contact = False
-    sensors = ()
     interfaces: tuple[Interface, ...] = ("effort",)
 
     def __init__(
@@ -153,6 +169,7 @@ class CartesianImpedanceController:
         axes: Literal["world", "tool"] = "world",
         posture_stiffness: float = 10.0,
         posture_damping_ratio: float = 1.0,
+        force: ForceReferenceSpec | None = None,
         feed_forward: FeedForward = "gravity",
         constraints: ConstraintsSpec | None = None,
         limits: Sequence[JointLimits] | None = None,
@@ -180,6 +197,14 @@ class CartesianImpedanceController:
         self._scale = 2.0 * damping_ratio * np.sqrt(self._stiffness)
         self._posture = posture_stiffness
         self._posture_scale = 2.0 * posture_damping_ratio * np.sqrt(posture_stiffness)
+        self.sensors = () if force is None else (SensorRequest(force.sensor, sensor=force.sensor),)
+        self._force: ForceReference | None = None
+        if force is not None:
+            along = self._stiffness[AXES[force.axis]]
+            if axes != "tool" or along == 0.0:
+                message = f"controller '{name}': a force needs axes of the tool and a stiffness along {force.axis}"
+                raise InvalidArgument("CTRL187", message)
+            self._force = ForceReference(force, float(along))
         self._kinematics, self._link, self._offset = kinematics, link, offset
         self._turns = axes == "tool"
         self._columns = kinematics.robot.indices(self.joints)
@@ -206,6 +231,11 @@ class CartesianImpedanceController:
     def error(self) -> Array:
         """(6) e of the last update, in world axes: from the tool to its reference [m, rad]."""
         return self._error.copy()
+
+    def attach(self, readings: Sequence[Array]) -> None:
+        """Attach the reading (6) of its force/torque sensor."""
+        if self._force is not None:
+            (self._force.reading,) = readings
 
     @property
     def accepts_goals(self) -> bool:
@@ -253,6 +283,8 @@ class CartesianImpedanceController:
         self._follower.deactivate(time, reason)
         self._pose = self._held = None
         self._updates = 0
+        if self._force is not None:
+            self._force.reset()
 
     def update(
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
@@ -271,6 +303,8 @@ class CartesianImpedanceController:
         J = jacobian[:, self._columns]
         error, slip = self._error, output.velocity - measured.velocity
         error[:3] = p_WR - p_WT
+        if self._force is not None:
+            error[:3] += self._force.update(period) * (R_WR @ self._force.axis)
         error[3:] = rotation_vector(R_WR @ R_WT.T)
         along = error
         if self._turns:
@@ -321,6 +355,7 @@ def build(name: str, spec: CartesianImpedanceSpec, context: BuildContext) -> Car
         axes=spec.axes,
         posture_stiffness=spec.posture.stiffness,
         posture_damping_ratio=spec.posture.damping_ratio,
+        force=spec.force,
         feed_forward="inverse_dynamics" if spec.inverse_dynamics else "gravity",
         constraints=spec.constraints,
         limits=[joint.limits for joint in joints],
@@ -343,7 +378,7 @@ def _six(spec: TaskSpaceSpec) -> Array:
 
 def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
     """Tolerances of other joints; a missing tool, a tool that other joints move, too, or that one of its joints does
-    not move; zero stiffness."""
+    not move; zero stiffness; a force without a spring along its axis."""
     yield from strangers(
         robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
     )
@@ -351,6 +386,13 @@ def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
         yield Problem(
             ("stiffness",), "all stiffnesses are 0; it would not move", "give stiffness.translation", "CTRL185"
         )
+    if spec.force is not None:
+        if spec.axes != "tool":
+            hint = "set `axes: tool`: stiffness and force then have the same axes"
+            yield Problem(("force",), "a force needs `axes: tool`", hint, "CTRL187")
+        elif _six(spec.stiffness)[AXES[spec.force.axis]] == 0.0:
+            message = f"stiffness along {spec.force.axis} is 0; the force is that of this spring"
+            yield Problem(("force", "axis"), message, "give stiffness.translation along it", "CTRL187")
     link, _ = _frame(spec, robot)
     names = [own.name for own in robot.links]
     if link not in names:
