@@ -23,13 +23,18 @@ from manipcli.control.compiled import library
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import configuration
 from manipcli.model.state import WorldState
+from manipcli.render.drawing import draw, floors_of
 from manipcli.render.lens import Lens
+from manipcli.render.placing import Placing
 from manipcli.render.scan import Scan
 from manipcli.render.scene_camera import SceneCamera, View
 from manipcli.render.stage import Stage
+from manipcli.replay.camera import framing
+from manipcli.replay.renderer import Renderer
 from manipcli.simulate.camera_messages import points
 from manipcli.simulate.depth_noise import CameraLimits, CameraNoise, DepthMeasurement
 from manipcli.task.load_task import load_task
+from manipcli.task.task import Task
 
 LENS = Lens.of_field(320, 240, math.radians(70.0))
 EYE, TARGET = np.array([1.9, -1.1, 1.2]), np.array([0.55, 0.1, 0.5])
@@ -89,6 +94,18 @@ def own(stage: Stage, state: WorldState, X_WC: Transform) -> Iterator[Row]:
     scan = Scan(stage.surfaces, np.linspace(-2.0, 2.0, 683), 5.6)
     X_WS = Transform.of(xyz=(0.3, -0.6, 0.5), rpy=(0.0, 0.0, 0.8))
     yield "a scan of 683 rays over 240 deg", milliseconds(lambda: scan.distances(*stage.poses(state, X_WS))), ""
+
+
+def pictures(task: Task) -> Iterator[Row]:
+    """Pictures of runs, in which robot and bodies move."""
+    drawing, placing = draw(task.robot, task.scene), Placing(task.robot, task.scene)
+    poses = placing.start(configuration(task.robot))
+    for size in ((640, 480), (960, 720)):
+        camera = framing(drawing, poses, leave_out=floors_of(task.scene))
+        for name, shadows in (("", False), (" with shadows", True)):
+            renderer = Renderer(drawing, size=size, still=placing.still, shadows=shadows)
+            took = milliseconds(partial(renderer.picture, poses, camera))
+            yield f"a picture of a run, {size[0]}x{size[1]}{name}", took, ""
 
 
 def tiny(stage: Stage, view: View, depth: Array) -> Iterator[Row]:
@@ -169,7 +186,7 @@ def main() -> None:
     moved = [each.vertices @ R.T + p for each, R, p in zip(stage.surfaces, view.rotation, view.position, strict=True)]
     firsts = np.cumsum([0, *(len(each) for each in moved)])
     faces = np.concatenate([each.faces + first for each, first in zip(stage.surfaces, firsts, strict=False)])
-    rows = [*own(stage, state, X_WC), *tiny(stage, view, depth)]
+    rows = [*own(stage, state, X_WC), *pictures(task), *tiny(stage, view, depth)]
     if importlib.util.find_spec("embreex"):
         rows += embree(np.concatenate(moved), faces, depth)
     print(f"{len(stage.surfaces)} surfaces, {len(faces)} triangles\n\n| renderer | ms | depth |\n|---|---|---|")

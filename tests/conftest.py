@@ -8,8 +8,8 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
@@ -24,11 +24,31 @@ from mcap.writer import Writer
 
 from manipcli.batch.child import _Beats, _end_of
 from manipcli.cli.app import main
+from manipcli.description.expanded import Description, read_description
 
 ROOT = Path(__file__).parents[1]
 
 hypothesis.settings.register_profile("any machine", deadline=None)
 hypothesis.settings.load_profile("any machine")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def descriptions_read_once() -> Iterator[None]:
+    """The descriptions of our robots are expanded once per process: they do not change, and each takes 50 ms."""
+    found: dict[tuple[object, ...], Description] = {}
+
+    def read(path: Path, **options: Any) -> Description:
+        if ROOT / "robots" not in path.parents:
+            return read_description(path, **options)
+        key = (path, repr(sorted(options.get("arguments", {}).items())), *sorted(options.get("allow_env", ())))
+        if key not in found:
+            found[key] = read_description(path, **options)
+        path.open().close()  # whoever records which files are read sees this one
+        return replace(found[key], packages=options["packages"])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("manipcli.description.lint.examine.read_description", read)
+        yield
 
 
 def pytest_collection_finish() -> None:

@@ -65,6 +65,13 @@ def test_an_example_does_what_its_readme_says(example: Path, tmp_path: Path, cal
     assert expected == words(out)[: len(expected)]
 
 
+@pytest.mark.slow
+def test_without_its_reflex_the_hand_loses_the_cup(tmp_path: Path, call_cli: Callable[..., Any]) -> None:
+    ran = call_cli(*command(ROOT / "examples" / "17_slip")[1:], "--set", "params.reflex=false", cwd=tmp_path)
+    assert ran.code == 1
+    assert "the hand does not carry 'cup': no robot link presses on it" in ran.out
+
+
 def words(text: str) -> list[str]:
     """What stays the same on every machine: not numbers, and not which joint was the worst."""
     return re.findall(r"[A-Za-z_✓✗]\w*", re.sub(r"'?joint_\d'?", "", text))

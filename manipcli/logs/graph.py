@@ -216,6 +216,8 @@ class _Builder:
         for node in self._sensors.nodes():
             self._add(node)
             self._join("engine", node.id)
+        for name, reader, what in self._sensors.asked(self._spec):
+            self._join(node_id(name), reader, what, back=True)
         for controller in self._controllers:
             idle = not self._file.controllers[controller.name].active
             for request in controller.sensors:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -19,7 +20,7 @@ from manipcli.record.foreign.snapshot import transforms
 from manipcli.record.foreign.topics import Topic, Topics, open_topics
 from manipcli.record.read.chunk import Places, singly
 from manipcli.render.drawing import WORLD, link_frame
-from manipcli.replay.pixels import MOST_SIDE, Small, Unshown
+from manipcli.replay.pixels import Small, Unshown
 from manipcli.replay.sensed import CameraFeed, PictureStream, RayFeed, Sensed, TaxelFeed, counted
 from manipcli.replay.thinning import Budget, Thinned
 
@@ -37,7 +38,8 @@ BEFORE = 1.0
 """Messages up to this time before the start are shown [s]."""
 NEARBY = 10.0
 """A stamp that is farther from the log time is of another clock [s]."""
-MOST_REASONS = 8
+MOST_REASONS, MOST_NAMED = 64, 2
+"""Of the reasons why messages of a topic are not shown: counted, and named."""
 
 
 @dataclass(slots=True)
@@ -64,15 +66,16 @@ class _Series(Generic[T]):
             else:
                 self.kept.add(time, size, value)
 
-    def note(self, unit: str, *others: str) -> str:
+    def note(self, shown: int, unit: str, *others: str) -> str:
         """How many of its messages are shown, and why others are not."""
-        parts = [f"{len(self.kept)} of {self.kept.seen} {unit}"] if len(self.kept) < self.kept.seen else []
+        parts = [f"{shown} of {self.kept.seen} {unit}"] if shown < self.kept.seen else []
         return "; ".join([*parts, *(other for other in others if other), *self.failures])
 
     @property
     def failures(self) -> list[str]:
-        """Why messages cannot be shown."""
-        return [f"{count} not shown: {why}" for why, count in self.unread.items()]
+        """Why messages cannot be shown, the most frequent reasons."""
+        often = sorted(self.unread.items(), key=lambda entry: -entry[1])
+        return [f"{count} not shown: {why}" for why, count in often[:MOST_NAMED]]
 
 
 def read_sensed(path: Path, frames: Collection[str], *, begin: int, end: float) -> Sensed:
@@ -157,14 +160,14 @@ def _sweeps(topic: Topic) -> Callable[[CdrReader], tuple[int, Sweep]]:
     return read
 
 
-def _alike(series: _Series[T], key: Callable[[T], object], notes: list[str]) -> list[tuple[float, T]]:
-    """Times and contents; only those of the kind of the first one, so that one scale and one size fit all."""
+def _alike(series: _Series[T], key: Callable[[T], Hashable], notes: list[str]) -> list[tuple[float, T]]:
+    """Times and contents; only those of the most frequent key, so that one scale and one size fit all."""
     found = list(series.kept)
     if not found:
         notes += [f"{series.topic.name}: {text}" for text in series.failures]
         return []
-    first = key(found[0][1])
-    same = [(time, value) for time, value in found if key(value) == first]
+    ((usual, _),) = Counter(key(value) for _, value in found).most_common(1)
+    same = [(time, value) for time, value in found if key(value) == usual]
     if len(same) < len(found):
         notes.append(f"{series.topic.name}: {len(found) - len(same)} messages of another size are not shown")
     return same
@@ -186,7 +189,7 @@ def _cameras(images: list[_Series[Small]], notes: list[str]) -> Iterator[CameraF
             pictures=tuple(small.data for _, small in found),
             low=np.array([small.low for _, small in found]),
             high=np.array([small.high for _, small in found]),
-            note=series.note("pictures", f"at most {MOST_SIDE} pixels" if max(first.size) == MOST_SIDE else ""),
+            note=series.note(len(found), "pictures"),
         )
         cameras.setdefault(group, []).append(stream)
     order = {"colour": 0, "depth": 1, "labels": 2}
@@ -201,7 +204,7 @@ def _taxels(grids: list[_Series[Grid]], notes: list[str]) -> Iterator[TaxelFeed]
             continue
         counts, unit = counted(np.array([grid.force for _, grid in found]))
         first, times = found[0][1], np.array([time for time, _ in found])
-        note = series.note("measurements")
+        note = series.note(len(found), "measurements")
         name = _short(series.topic.name)
         yield TaxelFeed(name, first.rows, first.columns, first.cell, times, counts, unit, note)
 
@@ -234,7 +237,7 @@ def _rays(
             taken=np.where(np.abs(stamps - times) < NEARBY, stamps, times),
             counts=counts,
             unit=unit,
-            note=series.note("scans"),
+            note=series.note(len(found), "scans"),
         )
 
 

@@ -19,8 +19,8 @@ SEGMENTATION = "/segmentation"
 MOST_CELLS = 1 << 14
 MOST_RAYS = 720
 """Of a scan; of more, every second, third, ... is shown."""
-FARTHEST = 1e4
-"""[m]"""
+FARTHEST, STRONGEST = 1e4, 1e6
+"""Largest shown distance [m] and force [N]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,8 @@ def read_grid(reader: CdrReader) -> Grid:
         raise Unshown(f"{rows} x {columns} cells do not fit {count} forces, or are more than {MOST_CELLS}")
     if not (0.0 < width < 1e3 and 0.0 < height < 1e3):
         raise Unshown(f"cells of {width:g} m x {height:g} m")
-    return Grid(rows, columns, (width, height), np.frombuffer(reader.take(8 * count, 8), "<f8"))
+    force = np.frombuffer(reader.take(8 * count, 8), "<f8")
+    return Grid(rows, columns, (width, height), np.where(np.abs(force) <= STRONGEST, force, np.nan))
 
 
 def read_sweep(reader: CdrReader, kind: str) -> Sweep:
@@ -95,7 +96,8 @@ def read_sweep(reader: CdrReader, kind: str) -> Sweep:
     if not (np.isfinite([first, step]).all() and abs(step) * count < 100.0):
         raise Unshown(f"{count} rays from {first:g} rad in steps of {step:g} rad")
     every = max(1, -(-count // MOST_RAYS))
-    distances = np.frombuffer(reader.take(4 * count, 4), "<f4").astype(np.float64)[::every]
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        distances = np.frombuffer(reader.take(4 * count, 4), "<f4").astype(np.float64)[::every]
     return Sweep(
         frame, stamp, first + step * np.arange(count, dtype=np.float64)[::every], _measured(distances, least, most)
     )

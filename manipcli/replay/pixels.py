@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.core.text import shorten
 from manipcli.replay.sensed import PictureKind
 
 if TYPE_CHECKING:
@@ -33,8 +34,10 @@ _COLOURS = {
     "8UC3": (3, (2, 1, 0)), "8UC4": (4, (2, 1, 0)), "mono8": (1, (0, 0, 0)), "8UC1": (1, (0, 0, 0)),
 }  # fmt: skip
 """Bytes of a pixel, and which of them are red, green and blue."""
-_DEPTHS = {"16UC1": ("u2", 1e-3), "mono16": ("u2", 1e-3), "32FC1": ("f4", 1.0)}
-"""Type of a pixel, and its unit [m] (REP 118)."""
+_DEPTHS = {"16UC1": 1e-3, "32FC1": 1.0}
+"""Their unit [m] (REP 118)."""
+_WIDE = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+"""Types of pixels of more than a byte."""
 _DEPTH_HEAD = 12
 """Bytes before the PNG of `compressedDepth`."""
 
@@ -71,10 +74,9 @@ def from_image(
         Unshown: an unknown encoding, or sizes that do not fit the data.
     """
     channels, order = _COLOURS.get(encoding, (1, (0, 0, 0)))
-    code, unit = _DEPTHS.get(encoding, ("u1", 1.0))
-    if encoding not in _COLOURS and encoding not in _DEPTHS:
-        raise Unshown(f"encoding '{encoding[:40]}' is not shown")
-    kind = np.dtype(code).newbyteorder(">" if big else "<")
+    if encoding not in _COLOURS and encoding not in _WIDE:
+        raise Unshown(f"encoding '{shorten(encoding)}' is not shown")
+    kind = np.dtype(_WIDE.get(encoding, "u1")).newbyteorder(">" if big else "<")
     pixel = channels * kind.itemsize
     if not (width > 0 and height > 0 and width * height <= MOST_PIXELS):
         raise Unshown(f"{width} x {height} pixels are not between 1 and {MOST_PIXELS}")
@@ -87,8 +89,11 @@ def from_image(
     if labels and encoding in ("8UC1", "16UC1", "mono8", "mono16"):
         return _labels(rows[..., 0])
     if encoding in _DEPTHS:
-        return _depth(rows[..., 0], unit)
+        return _depth(rows[..., 0], _DEPTHS[encoding])
     from PIL import Image
+
+    if encoding == "mono16":
+        return _colour(_gray(rows[..., 0]))
 
     return _colour(Image.fromarray(np.ascontiguousarray(rows[..., list(order)]).astype(np.uint8)))
 
@@ -113,14 +118,24 @@ def from_compressed(form: str, data: memoryview) -> Small:
             image.draft("RGB", (MOST_SIDE, MOST_SIDE))
             image.load()
             if image.mode in ("I;16", "I"):
-                return _depth(np.asarray(image), _DEPTHS["16UC1"][1])
+                pixels = np.asarray(image)
+                return _depth(pixels, _DEPTHS["16UC1"]) if deep or "16UC1" in form else _colour(_gray(pixels))
             return _colour(image.convert("RGB"))
     except Unshown:
         raise
     except (OSError, SyntaxError, ValueError, EOFError, OverflowError, struct.error, zlib.error) as error:
-        raise Unshown(f"a damaged picture of format '{form[:40]}'") from error
+        raise Unshown(f"a damaged picture of format '{shorten(form)}'") from error
     except Image.DecompressionBombError as error:
         raise Unshown(f"more than {MOST_PIXELS} pixels") from error
+
+
+def _gray(rows: npt.NDArray[np.generic]) -> PillowImage:
+    """Numbers as brightness; the largest are white."""
+    from PIL import Image
+
+    bright = rows.astype(np.float32)
+    most = max(float(np.percentile(bright, SPREAD[1])), 1.0)
+    return Image.fromarray(np.clip(bright * (255.0 / most), 0.0, 255.0).astype(np.uint8))
 
 
 def _factor(width: int, height: int) -> int:
@@ -137,7 +152,8 @@ def _depth(rows: npt.NDArray[np.generic], unit: float) -> Small:
     from PIL import Image
 
     factor = _factor(rows.shape[1], rows.shape[0])
-    metres = rows[::factor, ::factor].astype(np.float32) * np.float32(unit)
+    with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN
+        metres = rows[::factor, ::factor].astype(np.float32) * np.float32(unit)
     known = np.isfinite(metres) & (metres > 0.0)
     low, high = (float(np.percentile(metres[known], part)) for part in SPREAD) if known.any() else (0.0, 0.0)
     spread = max(high - low, 1e-6)

@@ -8,18 +8,22 @@ as all other bodies are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from manipcli.core.geometry import Array, Transform, quat_product, rotate
+from manipcli.core.geometry import Array, Transform, rotate
 from manipcli.model.collision import Carried
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.state import WorldState
 from manipcli.scene.containing import contains, within
 from manipcli.scene.scene import Scene
 from manipcli.task.believed_scene import contents
+
+CONJUGATE: Final = np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(slots=True)
@@ -32,12 +36,14 @@ class _Own:
         covariance: (6, 6) of position [m2] and rotation [rad2] about x, y, z of the world.
         held: the link that carries it, and its believed pose in that link; None while it stays.
         contents: rows of the bodies that were in it at the start.
+        centres: (k, 3) [m] of their bounding boxes in O; None: all zero.
     """
 
     row: int
     X_WO: Transform
     covariance: Array
-    contents: tuple[int, ...]
+    contents: npt.NDArray[np.intp]
+    centres: Array | None
     held: tuple[str, Transform] | None = None
 
 
@@ -60,12 +66,7 @@ class Belief:
         self._row = {body.name: k for k, body in enumerate(scene.movable)}
         uncertain = {body.name: body.known for body in scene.movable if body.known is not None}
         self._own: Mapping[str, _Own] = {
-            name: _Own(
-                row=self._row[name],
-                X_WO=scene.body(name).X_WO,
-                covariance=known.covariance,
-                contents=tuple(self._row[each] for each in contents(truth, name, uncertain)),
-            )
+            name: self._about(name, known.covariance, contents(truth, name, uncertain))
             for name, known in uncertain.items()
         }
         rows = sorted({row for own in self._own.values() for row in (own.row, *own.contents)})
@@ -74,6 +75,12 @@ class Belief:
         self.poses = np.array([[*X.p, *X.quat_xyzw] for X in (scene.body(name).X_WO for name in self.names)])
         self._joints: Array | None = None
         self._state: WorldState | None = None
+
+    def _about(self, name: str, covariance: Array, inside: Sequence[str]) -> _Own:
+        scene = self._scene
+        centres = np.array([scene.body(each).centre for each in inside])
+        rows = np.array([self._row[each] for each in inside], dtype=np.intp)
+        return _Own(self._row[name], scene.body(name).X_WO, covariance, rows, centres if centres.any() else None)
 
     @property
     def uncertain(self) -> tuple[str, ...]:
@@ -102,7 +109,7 @@ class Belief:
                 link, X_LO = own.held
                 own.X_WO = self._kinematics.forward(state.position, link) @ X_LO
             found.body_position[own.row], found.body_quat_xyzw[own.row] = own.X_WO.p, own.X_WO.quat_xyzw
-            if own.contents:
+            if len(own.contents):
                 self._carry(own, state, found)
         self.poses[:, :3] = found.body_position[self._rows]
         self.poses[:, 3:] = found.body_quat_xyzw[self._rows]
@@ -157,13 +164,31 @@ class Belief:
 
     def _carry(self, own: _Own, state: WorldState, found: WorldState) -> None:
         """What is truly in an uncertain container keeps its true pose in it."""
-        container = self._scene.movable[own.row]
-        X_WC = Transform.of(xyz=state.body_position[own.row], quat_xyzw=state.body_quat_xyzw[own.row])
-        assert container.interior is not None  # it has contents
-        rows = np.array(own.contents)
+        interior = self._scene.movable[own.row].interior
+        assert interior is not None  # it has contents
+        rows = own.contents
+        R_WC, L_CW = _rotation(state.body_quat_xyzw[own.row])
         p, q = state.body_position[rows], state.body_quat_xyzw[rows]
-        centres = p + rotate(q, np.array([self._scene.movable[row].centre for row in own.contents]))
-        inside = within(container.interior, X_WC, centres)
-        shift = own.X_WO @ X_WC.inverse()
-        found.body_position[rows[inside]] = p[inside] @ shift.R.T + shift.p
-        found.body_quat_xyzw[rows[inside]] = quat_product(shift.quat_xyzw, q[inside])
+        p_CO = (p - state.body_position[own.row]) @ R_WC
+        centres = p_CO if own.centres is None else p_CO + rotate(q, own.centres) @ R_WC
+        inside = within(interior, centres)
+        if inside.any():
+            L_WC = _rotation(own.X_WO.quat_xyzw * CONJUGATE)[1]
+            moved = rows[inside]
+            found.body_position[moved] = p_CO[inside] @ own.X_WO.R.T + own.X_WO.p
+            found.body_quat_xyzw[moved] = q[inside] @ (L_WC @ L_CW).T
+
+
+def _rotation(quat_xyzw: Array) -> tuple[Array, Array]:
+    """The matrix (3, 3) of a unit quaternion q, and the matrix (4, 4) that multiplies by its conjugate from the left.
+
+    As the products of single numbers: this is called at every tick.
+    """
+    x, y, z, w = quat_xyzw.tolist()
+    R = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    L = [[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z], [x, y, z, w]]
+    return np.array(R), np.array(L)

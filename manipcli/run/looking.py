@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -26,6 +27,8 @@ from manipcli.task.camera_sights import CameraSight
 LATE: Final = 0.1
 """[s] A picture that arrives this much later than its camera can deliver one is lost."""
 
+UNSURE: Final = math.radians(5.0)
+"""[rad] A rotation with a larger standard deviation is not found."""
 UNMOVED: Final = 1e-9
 """[m], and of a rotation matrix: a belief that differs by less from that at the start is still that."""
 
@@ -116,5 +119,9 @@ class Looking:
 
 
 def _quality(found: Localisation) -> str:
+    sigma = math.sqrt(float(found.covariance[5, 5]))
+    unsure = (
+        f"; the picture does not show its rotation, +-{deg(sigma)}" if found.free is None and sigma > UNSURE else ""
+    )
     residual = readable(found.residual, "m")
-    return f"residual {residual}, inliers {share(round(found.inliers, 2))} of {found.pixels} pixels"
+    return f"residual {residual}, inliers {share(round(found.inliers, 2))} of {found.pixels} pixels{unsure}"

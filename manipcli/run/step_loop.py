@@ -12,10 +12,11 @@ from manipcli.core.errors import NotPlannable
 from manipcli.judge.verdict import StepOutcome, StepWord
 from manipcli.plan.block_tree import Unit
 from manipcli.plan.motion import PlanningState
+from manipcli.run.awaited import missing
 from manipcli.run.effort_shortage import effort_shortage
 from manipcli.run.monitors import Monitors
 from manipcli.run.restore import RESUMED
-from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, OFF_PLAN, StepAttempt, missing
+from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, OFF_PLAN, StepAttempt
 from manipcli.simulate.executor import DONE, Alarmed, Lane, MotionEnd
 from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.retry import retried
@@ -280,8 +281,10 @@ class StepLoop(StepAttempt):
         if end.outcome != "done" and self._physics:
             short = effort_shortage(self._session, self._task.scene.gravity)
             end = replace(end, text=f"{short}; {end.text}") if short else end
-        pressed = [c.reflex.report() for c in self._session.manager.controllers if has_reflex(c)]
-        end = replace(end, text="; ".join(filter(None, (end.text, *pressed))))
+        for controller in self._session.manager.controllers:
+            if has_reflex(controller) and (pressed := controller.reflex.report()):
+                self._report(pressed, detail=False)
+                end = replace(end, text=f"{end.text}; {pressed}" if end.text else pressed)
         self._event("step_ended", planned, end.outcome, end.text)
         return end
 

@@ -9,10 +9,9 @@ from manipcli.scene.scene import Body, Interior
 from manipcli.shapes.primitives import Cylinder
 
 
-def within(interior: Interior, X_WC: Transform, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(k,) whether points (k, 3) [m] of the world are in the interior of a container at X_WC."""
-    X_WS = X_WC @ interior.X_OS
-    local = (points - X_WS.p) @ X_WS.R
+def within(interior: Interior, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(k,) whether points (k, 3) [m] in the frame O of a container are in its interior."""
+    local = (points - interior.X_OS.p) @ interior.X_OS.R
     if isinstance(interior.shape, Cylinder):
         level = np.hypot(local[:, 0], local[:, 1]) < interior.shape.radius
         return np.asarray(level & (np.abs(local[:, 2]) < interior.shape.length / 2.0))
@@ -23,4 +22,4 @@ def contains(container: Body, X_WC: Transform, body: Body, X_WO: Transform) -> b
     """Whether the centre of a body at X_WO is in the interior of a container at X_WC."""
     if container.interior is None or container.name == body.name:
         return False
-    return bool(within(container.interior, X_WC, X_WO.apply(body.centre)[None])[0])
+    return bool(within(container.interior, X_WC.inverse().apply(X_WO.apply(body.centre))[None])[0])

@@ -27,7 +27,7 @@ from manipcli.task.changed_files import Changes, Files
 from manipcli.task.consistency import refused_by_engine
 from manipcli.task.named_file import named_file
 from manipcli.task.sensor_checks import refuse, sensor_findings
-from manipcli.task.task import GroundTruth, Task, sensors_of
+from manipcli.task.task import GroundTruth, Task, all_sensors
 from manipcli.task.vary import SENSORS, Varied, draw
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
@@ -105,7 +105,7 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
             robot=robot if _same(changes, seen, "ROBOT") else robot_of(true.robot),
             scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
             controllers=true.controllers,
-            sensors=sensors_of(true.robot.spec, true.task.spec),
+            sensors=all_sensors(true.robot.spec, true.task.spec),
         )
         if any(_of_sensor(quantity) for quantity, _ in changes):
             refuse(sensor_findings(true.task, true.robot, true.controllers, truth.robot, truth.scene))

@@ -84,7 +84,7 @@ class Task:
     @property
     def sensors(self) -> Mapping[str, SensorSpec]:
         """The sensors of the robot file, then those of the task, by name; `true` has those of a sample."""
-        return sensors_of(self.robot_file.spec, self.spec)
+        return all_sensors(self.robot_file.spec, self.spec)
 
     def log_place(self, *path: str | int) -> str:
         """A place without its folder, for logs: `pour.yaml:21:5`."""
@@ -94,6 +94,6 @@ class Task:
         return f"{Path(place.file).name}:{place.line}:{place.column}"
 
 
-def sensors_of(robot: RobotSpec, task: TaskSpec) -> dict[str, SensorSpec]:
+def all_sensors(robot: RobotSpec, task: TaskSpec) -> dict[str, SensorSpec]:
     """The sensors of a robot file, then those of a task, by name."""
     return {**(robot.sensors or {}), **(task.sensors or {})}

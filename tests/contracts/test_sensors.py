@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.sensor import AnySensor
 from manipcli.simulate.sensor_bank import SensorBank
+from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.load import load_robot
 from manipcli.spec.sensors import SensorSpec
@@ -27,7 +29,7 @@ from manipcli.spec.sensors import SensorSpec
 ROBOT = Path(__file__).parents[2] / "robots" / "arm7_hand3" / "robot.yaml"
 NEEDED: dict[str, dict[str, Any]] = {
     "contact": {"threshold": 1.0},
-    "tactile": {"size": (0.1, 0.1), "rows": 2, "columns": 3},
+    "tactile": {"size": (0.1, 0.1), "rows": 2, "columns": 3, "shear": True},
 }
 """Keys without a default."""
 every_sensor = pytest.mark.parametrize("member", SENSORS.members, ids=SENSORS.names)
@@ -83,7 +85,8 @@ def test_its_message_takes_the_numbers_of_a_reading(member: AnySensor) -> None:
         store = get_typestore(Stores.EMPTY)
         store.register(get_types_from_msg(schema_text(topic.type), topic.type))
         template = measured_template(1, topic.type, topic.filled, topic.constant, "place")
-        wanted = reading if topic.derive is None else topic.derive(reading[None])[0]
+        derive = pickle.loads(pickle.dumps(topic.derive))  # a live session sends it to another process
+        wanted = reading if derive is None else derive(reading[None])[0]
         data, first = bytearray(template.data), 0
         for (offset, count), code in zip(template.runs, template.codes, strict=True):
             raw = wanted[first : first + count].astype(code).tobytes()
@@ -94,6 +97,16 @@ def test_its_message_takes_the_numbers_of_a_reading(member: AnySensor) -> None:
         assert message.header.frame_id == "place"
         found = [number for path in topic.filled for number in _numbers(getattr(message, path))]
         np.testing.assert_allclose(found, wanted[:first])
+
+
+@every_sensor
+def test_conditions_get_all_numbers_of_a_reading(member: AnySensor) -> None:
+    spec, nothing = spec_of(member), Scene(bodies=(), frames=(), gravity=np.zeros(3))
+    sensed = sensed_by_name({"it": spec}, robot(), nothing)["it"]
+    assert sensed.type == member.name
+    if member.sensed is not None:
+        assert sensed.width == sum(q.width for q in member.quantities(spec, robot()))
+        assert {*sensed.suffixes} <= {*sensed.messages}
 
 
 def _numbers(value: Any) -> list[float]:

@@ -105,6 +105,8 @@ def test_sensors_are_where_the_files_say_and_feed_who_reads_them(task: Callable[
     assert readers["encoder"] == {"wrist", "wrist_effort", "/sensors/encoder"}
     assert readers["scanner"] == {"/sensors/scanner"}
     assert ("joints", "wrist") in edges, "of roll they get the truth"
+    asks = f"sensors: {json.dumps(sensors)}\nexpect: [wrench: {{sensor: force, force: {{axis: z, above: 5 N}}}}]\n"
+    assert ("sensor force", "task") in _edges(task_graph(task("pybullet", asks)))
     both = {**sensors, "encoder": {"type": "joint"}}
     assert ("joints", "wrist") not in _edges(task_graph(task("pybullet", f"sensors: {json.dumps(both)}\n")))
 

@@ -71,6 +71,13 @@ def test_depth_is_told_in_metres_and_what_is_missing_is_transparent(big: bool) -
         assert told == pytest.approx(metres[12, 10:], abs=0.05)
 
 
+def test_infrared_is_a_picture_and_no_depth() -> None:
+    step, data = rows(np.repeat(np.array([[100, 1000]], dtype="<u2"), 20, axis=1).repeat(HEIGHT, axis=0))
+    small = from_image("mono16", WIDTH, HEIGHT, step, data)
+    assert small.kind == "colour"
+    assert seen(small)[12, [5, 35], 0] == pytest.approx([25, 255], abs=6)
+
+
 def test_compressed_depth_is_a_png_behind_its_head() -> None:
     stream = io.BytesIO()
     Image.fromarray(np.full((HEIGHT, WIDTH), 1234, dtype=np.uint16)).save(stream, "PNG")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
@@ -141,9 +142,13 @@ def _topics(spec: TactileSpec, robot: RobotModel) -> tuple[Topic, ...]:
         return (normal,)
     along = {**grid, "x": none, "y": none}
     return (
-        replace(normal, derive=lambda reading: reading[:, :cells]),
-        Topic("manipcli_msgs/msg/TaxelShear", ("x", "y"), along, "/shear", derive=lambda reading: reading[:, cells:]),
+        replace(normal, derive=partial(_columns, 0, cells)),
+        Topic("manipcli_msgs/msg/TaxelShear", ("x", "y"), along, "/shear", derive=partial(_columns, cells, 3 * cells)),
     )
+
+
+def _columns(first: int, end: int, reading: Array) -> Array:
+    return reading[:, first:end]
 
 
 def _check(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Iterator[Problem]:
