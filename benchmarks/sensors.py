@@ -25,12 +25,13 @@ JOINT: Final = f"joints_: {{type: joint, delay: 1 ms, noise: {{position: {{{NOIS
 WRENCH: Final = f"wrist_: {{type: force_torque, link: palm, filter: 200 Hz, noise: {{force: {{{NOISE}}}}}}}"
 IMU: Final = f"imu_: {{type: imu, link: palm, filter: 200 Hz, noise: {{angular_velocity: {{{NOISE}}}}}}}"
 PAD: Final = "pad_: {type: tactile, link: finger_1_distal_link, size: [2 cm, 4 cm], rows: 8, columns: 4, rate: 100 Hz}"
+SCAN: Final = "scan_: {type: range, frame: world, at: {xyz: [0.3, -0.6, 0.5]}, rays: 683, angle: 240 deg, rate: 100 Hz}"
 SETS: Final = {
     "joint, wrench and IMU at 1 kHz": (f"sensors={{{JOINT}, {WRENCH}, {IMU}}}", 0.15),
     "joint at 1 kHz": (f"sensors={{{JOINT}}}", None),
     "wrench at 1 kHz": (f"sensors={{{WRENCH}}}", None),
     "IMU at 1 kHz": (f"sensors={{{IMU}}}", None),
-    "8 x 4 taxels at 100 Hz": (f"sensors={{{PAD}}}", 0.1),
+    "8 x 4 taxels and 683 rays at 100 Hz": (f"sensors={{{PAD}, {SCAN}}}", 0.1),
 }
 
 

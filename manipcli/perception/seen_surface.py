@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from manipcli.core.geometry import Array, matrix_from_axis_angle
 from manipcli.render.drawing import shape_surfaces
@@ -16,6 +16,9 @@ from manipcli.render.stage import DEVIATION
 from manipcli.render.surface import Surface, surface
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Geometry, Shape, drawn_once
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 PIXELS, AWAY = 64, 4.0
 """Of the pictures that sample what is visible: rows and columns, and the distance in radii of the body."""
@@ -68,6 +71,8 @@ def looks_same(
 @lru_cache(maxsize=32)
 def _visible(geometries: tuple[Geometry, ...]) -> tuple[Array, KDTree, float]:
     """Some visible points (n, 3), a tree of all, and the radius of the body about O [m]."""
+    from scipy.spatial import KDTree
+
     shown = seen_surface(geometries)
     radius = float(np.linalg.norm(shown.vertices, axis=1).max())
     points = _visible_points(shown, radius)

@@ -16,6 +16,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import Look, Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
+from manipcli.run.awaited import missing, no_longer
 from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
@@ -236,7 +237,7 @@ class StepAttempt:
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
-                texts += [end.text + _no_longer(motion, probe)] if end.text else []
+                texts += [end.text + no_longer(motion, probe)] if end.text else []
             self._believed = self._looking.corrected(planned.plan)
             if awaited and until is not None:
                 if step.timeout is None:
@@ -386,15 +387,3 @@ def _moves(planned: PlannedStep) -> bool:
     return any(
         one is not None for motion in planned.plan.motions for one in (motion.trajectory, motion.grip, motion.looks)
     )
-
-
-def missing(end: MotionEnd, probe: Probe | None) -> str:
-    """By how much `until` fails, if the motion ended for it; else ""."""
-    missing = probe.missing if probe is not None and end.awaited else ""
-    return f"; at the end {missing}" if missing else ""
-
-
-def _no_longer(motion: Motion, probe: Probe | None) -> str:
-    """By how much the `until` of a guarded motion fails at rest, after a bounce; "" if it holds."""
-    missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
-    return f"; at rest {missing}" if missing else ""

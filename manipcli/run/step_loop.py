@@ -12,10 +12,11 @@ from manipcli.core.errors import NotPlannable
 from manipcli.judge.verdict import StepOutcome, StepWord
 from manipcli.plan.block_tree import Unit
 from manipcli.plan.motion import PlanningState
+from manipcli.run.awaited import missing
 from manipcli.run.effort_shortage import effort_shortage
 from manipcli.run.monitors import Monitors
 from manipcli.run.restore import RESUMED
-from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, OFF_PLAN, StepAttempt, missing
+from manipcli.run.step_attempt import DEFAULT_UNTIL_TIME, OFF_PLAN, StepAttempt
 from manipcli.simulate.executor import DONE, Alarmed, Lane, MotionEnd
 from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.retry import retried

@@ -167,3 +167,15 @@ def tray(spec: TraySpec, rgba: Rgba) -> BodyShape:
 
 def _placed(shape: Shape, p: tuple[float, float, float], rgba: Rgba) -> Geometry:
     return Geometry(X_LS=Transform.of(xyz=p), shape=shape, rgba=rgba)
+
+
+def too_big(shape: BodyShape, yaw: float, interior: Interior, x: float = 0.0, y: float = 0.0) -> float:
+    """Excess [m] of the outline of the shape at (x, y) [m] and `yaw` [rad] over the interior; <= 0: it fits."""
+    half: Array = shape.size[:2] / 2.0
+    if isinstance(interior.shape, Cylinder):
+        outline = shape.radius if shape.radius is not None else float(np.hypot(*half))
+        return outline + float(np.hypot(x, y)) - interior.shape.radius
+    if shape.radius is None:
+        c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
+        half = np.array([c * half[0] + s * half[1], s * half[0] + c * half[1]])
+    return float(np.max(half + np.abs([x, y]) - np.array(interior.shape.size[:2]) / 2.0))

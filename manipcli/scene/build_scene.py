@@ -7,16 +7,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
-from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import digits
 from manipcli.description.elements import Inertial
 from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
-from manipcli.scene.body_shapes import COLORS, BodyShape
+from manipcli.scene.body_shapes import COLORS, BodyShape, too_big
 from manipcli.scene.drop_test import FORMED, drop_height
 from manipcli.scene.mass_properties import union
 from manipcli.scene.named_frames import in_owner, named_frames, owner
-from manipcli.scene.scene import Body, Interior, Scene
+from manipcli.scene.scene import Body, Scene
 from manipcli.scene.scene_names import Locate, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
@@ -331,12 +331,12 @@ class _Builder:
         if X_WB.R[2, 2] < UPRIGHT:
             self._error("TASK224", f"body '{name}' cannot be inside '{other}': it is tilted", loc, "use `pose` instead")
             return None
-        lack = _too_big(shape, spec.yaw, interior)
+        lack = too_big(shape, spec.yaw, interior)
         if lack > EXACT:
             self._error("TASK224", f"'{name}' is {digits(lack * 1e3)} mm too wide for '{other}'", loc)
             return None
         x, y = spec.at or (0.0, 0.0)
-        lack = _too_big(shape, spec.yaw, interior, x, y)
+        lack = too_big(shape, spec.yaw, interior, x, y)
         if lack > EXACT:
             hint = f"`at` is relative to the centre of '{other}', along its axes"
             message = f"'{name}' is {digits(lack * 1e3)} mm outside the interior of '{other}'"
@@ -386,15 +386,3 @@ def _floor_shape() -> BodyShape:
 def _bottom(shape: BodyShape) -> float:
     """Lowest z [m] of the shape in O."""
     return float(shape.centre[2] - shape.size[2] / 2.0)
-
-
-def _too_big(shape: BodyShape, yaw: float, interior: Interior, x: float = 0.0, y: float = 0.0) -> float:
-    """Excess [m] of the outline of the shape at (x, y) [m] and `yaw` [rad] over the interior; <= 0: it fits."""
-    half: Array = shape.size[:2] / 2.0
-    if isinstance(interior.shape, Cylinder):
-        outline = shape.radius if shape.radius is not None else float(np.hypot(*half))
-        return outline + float(np.hypot(x, y)) - interior.shape.radius
-    if shape.radius is None:
-        c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
-        half = np.array([c * half[0] + s * half[1], s * half[0] + c * half[1]])
-    return float(np.max(half + np.abs([x, y]) - np.array(interior.shape.size[:2]) / 2.0))
