@@ -14,8 +14,10 @@ from manipcli.core.geometry import Array, frozen
 from manipcli.core.prose import share
 from manipcli.core.units import readable
 from manipcli.perception.localise import DepthView, Localisation, NotSeen, Prior, localise
-from manipcli.plan.motion import Look, PlanningState
+from manipcli.plan.motion import Look, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
+from manipcli.plan.prediction import put
+from manipcli.record.write.recorder import Recorder
 from manipcli.run.belief import Belief
 from manipcli.run.replan import between, deg, mm
 from manipcli.simulate.camera_messages import DEPTH, metres
@@ -48,10 +50,12 @@ class Looking:
         session: the world; its camera takes the pictures.
         planner: has the cameras and the believed scene.
         belief: is corrected.
+        recorder: receives the corrected poses.
     """
 
-    def __init__(self, session: Session, planner: Planner, belief: Belief) -> None:
+    def __init__(self, session: Session, planner: Planner, belief: Belief, recorder: Recorder) -> None:
         self._session = session
+        self._recorder = recorder
         self._planner = planner
         self._belief = belief
 
@@ -81,6 +85,11 @@ class Looking:
         now = replace(situation(), position=frozen(joints[tick]))
         return self._correct(looks, sight, now, depth)
 
+    def corrected(self, plan: StepPlan) -> PlanningState:
+        """The state after a plan, with what it located at its new pose."""
+        located = {motion.looks.object for motion in plan.motions if motion.looks is not None}
+        return put(self._planner, plan.end, {name: self._belief.pose(name) for name in located})
+
     def _correct(self, looks: Look, sight: CameraSight, now: PlanningState, depth: Array) -> Found:
         planner, name = self._planner, looks.object
         body = planner.scene.body(name)
@@ -97,6 +106,7 @@ class Looking:
         if np.allclose(before.p, start.p, atol=UNMOVED) and np.allclose(before.R, start.R, atol=UNMOVED):
             planner.starts[name] = found.X_WO
         self._belief.update(name, found.X_WO, found.covariance)
+        self._recorder.believed(self._session.ticks, name, found.X_WO, found.covariance)
         away, turned = between(before, found.X_WO, round_as="" if found.free is None else body.kind)
         return Found("", f"'{name}' is {mm(away)} and {deg(turned)} from where it was believed ({_quality(found)})")
 

@@ -13,8 +13,7 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing, squeeze_force
 from manipcli.model.state import WorldState
-from manipcli.plan.motion import Look, Motion, PlanningState, StepPlan
-from manipcli.plan.prediction import put
+from manipcli.plan.motion import Look, Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
 from manipcli.run.awaited import missing, no_longer
@@ -102,7 +101,7 @@ class StepAttempt:
         self._over = False
         self._at: PlannedStep | None = None
         self._attaching = Attaching(session, self._event)
-        self._looking = Looking(session, plan.planner, belief)
+        self._looking = Looking(session, plan.planner, belief, recorder)
         self.located = False
 
     def _look(self, state: WorldState) -> str:
@@ -239,7 +238,7 @@ class StepAttempt:
                     self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
                 texts += [end.text + no_longer(motion, probe)] if end.text else []
-            self._believed = self._corrected(planned.plan)
+            self._believed = self._looking.corrected(planned.plan)
             if awaited and until is not None:
                 if step.timeout is None:
                     deadline = _sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
@@ -261,16 +260,9 @@ class StepAttempt:
         if found.failure:
             return MotionEnd("failed", found.failure)
         self.located = True
-        name, tick = looks.object, self._session.ticks
-        self._recorder.believed(tick, name, self._belief.pose(name), self._belief.covariance(name))
-        self._event("located", planned, name, found.text)
+        self._event("located", planned, looks.object, found.text)
         self._report(found.text, detail=False)
         return MotionEnd("done", found.text)
-
-    def _corrected(self, plan: StepPlan) -> PlanningState:
-        """The state after a plan, with what it located at its new pose."""
-        located = {motion.looks.object for motion in plan.motions if motion.looks is not None}
-        return put(self._plan.planner, plan.end, {name: self._belief.pose(name) for name in located})
 
     @contextmanager
     def _awaited(self, step: StepSpec) -> Iterator[Probe | None]:

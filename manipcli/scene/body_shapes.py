@@ -90,7 +90,12 @@ def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
     The outer faces of the walls touch the circle of `radius`, their inner faces that of radius - wall. Each box is
     2 R tan(pi / n) wide with R at the middle of the wall: the overlaps inside equal the gaps outside, so the volume of
     the walls is that of the n-sided ring.
+
+    Raises:
+        ValueError: its numbers contradict each other.
     """
+    if spec.wall >= min(spec.radius, spec.height):
+        raise ValueError(f"wall of {spec.wall:g} m is too thick: the cup has no interior")
     middle, inner, n = spec.radius - spec.wall / 2.0, spec.radius - spec.wall, spec.segments
     depth = spec.height - spec.wall
     wall = Box((spec.wall, 2.0 * middle * math.tan(math.pi / n), depth))
@@ -114,8 +119,17 @@ def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
 
 
 def _handle(spec: HandleSpec, start: float, cup: CupSpec, rgba: Rgba) -> list[Geometry]:
-    """Two level bars that begin in the wall, at `start` [m] from the axis, and an upright one between their ends."""
+    """Two level bars that begin in the wall, at `start` [m] from the axis, and an upright one between their ends.
+
+    Raises:
+        ValueError: it is beyond the cup, or has no room for fingers.
+    """
     t, end, middle = spec.thickness, cup.radius + spec.reach, cup.height / 2.0 if spec.middle is None else spec.middle
+    if abs(middle - cup.height / 2.0) > (cup.height - spec.height) / 2.0 + 1e-9:
+        low, high = middle - spec.height / 2.0, middle + spec.height / 2.0
+        raise ValueError(f"handle from {low:g} to {high:g} m is beyond the cup of {cup.height:g} m")
+    if t >= min(spec.reach, spec.height / 2.0):
+        raise ValueError(f"thickness of {t:g} m leaves no room in the handle")
     level, upright = Box((end - start, t, t)), Box((t, t, spec.height - 2.0 * t))
     high = (spec.height - t) / 2.0
     return [
@@ -126,8 +140,14 @@ def _handle(spec: HandleSpec, start: float, cup: CupSpec, rgba: Rgba) -> list[Ge
 
 
 def tray(spec: TraySpec, rgba: Rgba) -> BodyShape:
-    """A floor and four walls on it; the walls along y are between those along x."""
+    """A floor and four walls on it; the walls along y are between those along x.
+
+    Raises:
+        ValueError: its walls leave no interior.
+    """
     (x, y, z), w = spec.size, spec.wall
+    if w >= min(x / 2.0, y / 2.0, z):
+        raise ValueError(f"wall of {w:g} m is too thick: the tray has no interior")
     depth = z - w
     middle = w + depth / 2.0
     along_x, along_y = Box((x, w, depth)), Box((w, y - 2.0 * w, depth))

@@ -167,20 +167,8 @@ class _Builder:
         if spec.cylinder is not None:
             return body_shapes.cylinder(spec.cylinder, rgba)
         if spec.cup is not None:
-            if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
-                raise ValueError(f"wall of {spec.cup.wall:g} m is too thick: the cup has no interior")
-            handle = spec.cup.handle
-            middle = spec.cup.height / 2.0 if handle is None or handle.middle is None else handle.middle
-            if handle is not None and abs(middle - spec.cup.height / 2.0) > (spec.cup.height - handle.height) / 2.0:
-                ends = middle - handle.height / 2.0, middle + handle.height / 2.0
-                raise ValueError(f"handle from {ends[0]:g} to {ends[1]:g} m is beyond the cup of {spec.cup.height:g} m")
-            if handle is not None and handle.thickness >= min(handle.reach, handle.height / 2.0):
-                raise ValueError(f"thickness of {handle.thickness:g} m leaves no room in the handle")
             return body_shapes.cup(spec.cup, rgba)
         if spec.tray is not None:
-            x, y, z = spec.tray.size
-            if spec.tray.wall >= min(x / 2.0, y / 2.0, z):
-                raise ValueError(f"wall of {spec.tray.wall:g} m is too thick: the tray has no interior")
             return body_shapes.tray(spec.tray, rgba)
         if spec.mesh is not None:
             return body_files.mesh(spec.mesh, self.packages, rgba)
