@@ -12,20 +12,20 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.collision import Carried, CollisionQuery
+from manipcli.model.collision import CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan import constrained_motion as timed
 from manipcli.plan.attachment import attached, freed
 from manipcli.plan.blind_grasp import blindly_closed
+from manipcli.plan.closed_around import closed_around
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
-from manipcli.plan.hand import closed_hand, closed_on, handless, no_gripper, posture_values
+from manipcli.plan.hand import closed_hand, handless, no_gripper, posture_values
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
 from manipcli.plan.motion import CLOSING, LOOKING, OPENING, Grip, Look, Motion, PlanningState, Reflex, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
-from manipcli.plan.one_jaw import against_jaw
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.pose_error import Leaving
@@ -257,24 +257,13 @@ class MotionBuilder:
             self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)
             self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=self._allowed))
             return
-        now = against_jaw(planner, self._now, body, grip)
-        closed, touched = closed_on(planner.robot, planner.grasping(now, body), now.position, grip.joints, grip.target)
-        if must_hold and not touched:
-            raise NotPlannable(
-                f"the hand, closed to '{posture}', does not touch '{body}'",
-                hint="move the hand to the object first, or close it further",
-            )
-        stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
-        try:
-            refuse_collision(planner, self._now, self.query(planner.hand_contacts(body)), CLOSING, None, stopped)
-        except NotPlannable as refusal:
-            raise refusal.but(hint=roomier or None) from refusal
-        X_LW = planner.kinematics.forward(closed, planner.tool_link).inverse()
-        carried = Carried(body=body, link=planner.tool_link, X_LO=X_LW @ planner.body_pose(now, body))
         allowed = self._allowed | planner.hand_contacts(body)
+        now = closed_around(
+            planner, self._now, body, grip, posture, allowed=self._allowed, must_hold=must_hold, roomier=roomier
+        )
         takes = None if planner.robot.holding is None else body
         self._motions.append(Motion(CLOSING, None, grip, duration, begins=before, allowed=allowed, takes=takes))
-        self._now = replace(now.moved(closed), carried=carried, closed=True)
+        self._now = now
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
         """Open the hand to a pose; the held object stays where it is. It may touch that, or the body it is `around`.

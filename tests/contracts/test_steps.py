@@ -17,7 +17,6 @@ from manipcli.plan.hand import closing_speed
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
-from manipcli.simulate.sensors.camera import CameraSpec
 from manipcli.task.camera_sights import camera_sights
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
@@ -66,11 +65,8 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "lift": (LIFT, (PICK,)),
     "pour": (("pour", {"object": "cup", "into": "tray"}), (PICK, LIFT)),
     "place": (("place", {"object": "cup"}), (PICK, LIFT)),
-    "locate": (("locate", {"object": "cup", "with": "eye"}), ()),
+    "locate": (("locate", {"object": "cup", "with": "wrist_camera"}), ()),
 }  # fmt: skip
-EYE = CameraSpec.model_validate(
-    {"type": "camera", "link": "palm", "fov": "84 deg", "at": {"xyz": [0.07, 0, 0.02], "rpy": [0, "-90 deg", 0]}}
-)
 TICK = 1e-3
 TOLERANCE = 1.005  # of velocity, acceleration and jerk: half a percent
 
@@ -87,7 +83,7 @@ class Planned:
 
 @pytest.fixture(scope="module")
 def task() -> Task:
-    return load_task(ROOT / "tasks" / "pour.yaml")
+    return load_task(ROOT / "tasks" / "pour_seen.yaml")
 
 
 def make_planner(task: Task, seed: int = 3) -> Planner:
@@ -95,7 +91,7 @@ def make_planner(task: Task, seed: int = 3) -> Planner:
     return Planner(
         task.robot, task.scene, period=TICK, rng=np.random.default_rng(seed),
         gripper_joints=gripper.joints, gripper_speed=closing_speed(task.robot, gripper.joints, gripper.speed),
-        sights=camera_sights({"eye": EYE}, task.robot, task.scene),
+        sights=camera_sights(task.sensors, task.robot, task.scene),
     )  # fmt: skip
 
 

@@ -32,7 +32,7 @@ activated: do that at rest and before contact, with `active: false` and the step
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar, Final, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +52,7 @@ from manipcli.control.controller import (
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.force_reference import AXES, ForceReference, ForceReferenceSpec
 from manipcli.control.gains import strangers
+from manipcli.control.impedance_spec import NotNegative, PostureSpec, TaskSpaceSpec, six
 from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
 from manipcli.control.trajectory_goal import TrajectoryGoal
@@ -64,7 +65,6 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.pose_error import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.spec.base import Model
 from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, Interface, Role
 
 SINGULAR: Final = 1e-3
@@ -73,26 +73,6 @@ LIGHTEST: Final = 1e-9
 """[1/kg] or [1/(kg m2)] Lower bound for mobilities."""
 WEIGHED: Final = 10
 """Updates between two computations of the masses, which only scale the damping and change slowly."""
-
-
-NotNegative = Annotated[float, Field(ge=0)]
-Axes3 = tuple[NotNegative, NotNegative, NotNegative]
-
-
-class TaskSpaceSpec(Model):
-    """Values along and about three axes: one number for all three, or a list of x, y, z."""
-
-    translation: NotNegative | Axes3 = Field(description="Stiffness [N/m] or damping [N s/m], 0 or more.")
-    rotation: NotNegative | Axes3 = Field(description="Stiffness [N m/rad] or damping [N m s/rad], 0 or more.")
-
-
-class PostureSpec(Model):
-    """Stiffness of the joints towards the reference configuration, in the null space of the tool."""
-
-    stiffness: NotNegative = Field(10.0, description="Of each joint [N m/rad or N/m], 0 or more. Default 10.")
-    damping_ratio: NotNegative = Field(
-        1.0, description="Damping 2 ratio sqrt(stiffness x inertia) of each joint, 0 or more. Default 1."
-    )
 
 
 class CartesianImpedanceSpec(ControllerSpec):
@@ -349,9 +329,9 @@ def build(name: str, spec: CartesianImpedanceSpec, context: BuildContext) -> Car
         kinematics=context.kinematics(),
         link=link,
         offset=offset,
-        stiffness=_six(spec.stiffness),
+        stiffness=six(spec.stiffness),
         damping_ratio=spec.damping_ratio,
-        damping=None if spec.damping is None else _six(spec.damping),
+        damping=None if spec.damping is None else six(spec.damping),
         axes=spec.axes,
         posture_stiffness=spec.posture.stiffness,
         posture_damping_ratio=spec.posture.damping_ratio,
@@ -372,17 +352,13 @@ def _frame(spec: CartesianImpedanceSpec, robot: RobotModel) -> tuple[str, Transf
     return ("", None) if robot.tool is None else (robot.tool.link, robot.tool.X_LT)
 
 
-def _six(spec: TaskSpaceSpec) -> Array:
-    return np.concatenate([np.broadcast_to(part, (3,)) for part in (spec.translation, spec.rotation)])
-
-
 def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
     """Tolerances of other joints; a missing tool, a tool that other joints move, too, or that one of its joints does
     not move; zero stiffness; a force without a spring along its axis."""
     yield from strangers(
         robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
     )
-    if not _six(spec.stiffness).any() and spec.posture.stiffness == 0.0:
+    if not six(spec.stiffness).any() and spec.posture.stiffness == 0.0:
         yield Problem(
             ("stiffness",), "all stiffnesses are 0; it would not move", "give stiffness.translation", "CTRL185"
         )
@@ -390,7 +366,7 @@ def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
         if spec.axes != "tool":
             hint = "set `axes: tool`: stiffness and force then have the same axes"
             yield Problem(("force",), "a force needs `axes: tool`", hint, "CTRL187")
-        elif _six(spec.stiffness)[AXES[spec.force.axis]] == 0.0:
+        elif six(spec.stiffness)[AXES[spec.force.axis]] == 0.0:
             message = f"stiffness along {spec.force.axis} is 0; the force is that of this spring"
             yield Problem(("force", "axis"), message, "give stiffness.translation along it", "CTRL187")
     link, _ = _frame(spec, robot)

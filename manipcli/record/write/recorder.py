@@ -47,6 +47,8 @@ from manipcli.scene.scene import Scene
 from manipcli.spec.recording import JUDGED
 
 BLOCK_SECONDS = 0.5
+CHUNK = 1 << 24
+"""[byte] Pictures and clouds beyond this begin a new block: readers refuse chunks of more than 64 MiB."""
 
 
 class Recorder:
@@ -102,6 +104,7 @@ class Recorder:
         capacity = max(1, round(BLOCK_SECONDS / period))
         self._block = Block(robot, scene, controllers, table, selection, period, capacity, sensors, belief.bodies)
         self._singles: list[Single] = []
+        self._room = CHUNK
         self._sequences: Counter[int] = Counter()
         self._contact_encoder = messages.ContactEncoder()
         self._container = Container(path, overwrite=overwrite)
@@ -155,7 +158,7 @@ class Recorder:
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         """Record the state and the controller outputs at `tick`; the arrays can be reused afterwards."""
-        if self._block.count == self._block.capacity:
+        if self._block.count == self._block.capacity or self._room < 0:
             self._send()
         self._block.add(tick, state, outputs)
 
@@ -238,6 +241,7 @@ class Recorder:
         """Encode the block and hand it to the writer thread after its previous block; write errors are raised here or
         in the next flush."""
         singles, self._singles = self._singles, []
+        self._room = CHUNK
         changes = self._block.idle
         content = self._block.encode(singles)
         self._written()
@@ -304,6 +308,7 @@ class Recorder:
         if channel is None:  # left out
             return
         self._sequences[channel] += 1
+        self._room -= len(data)
         self._singles.append(Single(ns, channel, message_record(channel, self._sequences[channel], ns, data)))
 
 
