@@ -48,7 +48,10 @@ from manipcli.spec.recording import JUDGED
 
 BLOCK_SECONDS = 0.5
 CHUNK = 1 << 24
-"""[byte] Pictures and clouds beyond this begin a new block: readers refuse chunks of more than 64 MiB."""
+"""[byte] Pictures and clouds beyond this begin a new block, and so do measurements of numbers."""
+MOST_CHUNK = 3 << 24
+"""[byte] A picture with which the block would have more than this begins a new one, within a tick, too: readers refuse
+chunks of more than 64 MiB."""
 
 
 class Recorder:
@@ -101,7 +104,8 @@ class Recorder:
         table = [channel for channel in everything if selection.holds(channel)]
         self._period = period
         self._ids = {channel.topic: channel.id for channel in table}
-        capacity = max(1, round(BLOCK_SECONDS / period))
+        measured = sum(8 * sensor.width / sensor.every for sensor in sensors)  # [byte] per tick
+        capacity = max(1, min(round(BLOCK_SECONDS / period), int(CHUNK / max(1.0, measured))))
         self._block = Block(robot, scene, controllers, table, selection, period, capacity, sensors, belief.bodies)
         self._singles: list[Single] = []
         self._room = CHUNK
@@ -181,7 +185,10 @@ class Recorder:
         """Record a message of a sensor that arrives at `tick` and was taken at the tick `taken`."""
         if topic in self._ids or self.listener is not _nobody:
             kind, frame = self._frames[topic]
-            self._single(topic, self._ns(tick), encode(kind, fields, ns=self._ns(taken), frame=frame).data)
+            data = encode(kind, fields, ns=self._ns(taken), frame=frame).data
+            if topic in self._ids and CHUNK - self._room + len(data) > MOST_CHUNK:
+                self._send()
+            self._single(topic, self._ns(tick), data)
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
         """Record all contacts from `tick` until the next call; see `contact_filter.py`."""

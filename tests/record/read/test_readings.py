@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
@@ -154,6 +155,48 @@ def test_a_lost_message_is_found(tmp_path: Path, make_run: Callable[[int], Any],
     list(open_recording(cut).spans)
     with pytest.raises(Thinned):
         list(with_readings(open_recording(cut), SENSED).spans)
+
+
+def test_pictures_of_one_tick_can_be_in_different_chunks(
+    tmp_path: Path, make_run: Callable[[int], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    depths = [MeasuredChannel(f"/sensors/{k}/depth", "sensor_msgs/msg/Image", "eye_optical") for k in range(2)]
+
+    def record(path: Path) -> None:
+        run = make_run(20)
+        writing = run.recorder(path, sensors=(*CHANNELS, *depths))
+        writing.attach(np.zeros(9))
+        for k in range(20):
+            for part in range(3 if k in (0, 7, 19) else 0):  # of a tick, as those of several cameras
+                image = {"height": 4, "width": 5, "encoding": "8UC1", "step": 5, "data": bytes([part] * 20)}
+                writing.measured(k, k, "/sensors/eye/segmentation" if part == 2 else f"/sensors/{part}/depth", image)
+            run.feed(writing, k, k + 1)
+        writing.finish({})
+
+    record(tmp_path / "one.mcap")
+    monkeypatch.setattr("manipcli.record.write.recorder.MOST_CHUNK", 100)  # [byte] one picture
+    record(tmp_path / "many.mcap")
+    one, many = (messages_and_chunks(tmp_path / name) for name in ("one.mcap", "many.mcap"))
+    assert many[0] == one[0]
+    assert many[1] == one[1] + 8, "all but the first of them, which nothing is before"
+    readings = [
+        next(iter(with_readings(open_recording(tmp_path / name), SENSED).whole().spans)).readings["eye"]
+        for name in ("one.mcap", "many.mcap")
+    ]
+    np.testing.assert_array_equal(readings[0].times, readings[1].times)
+    np.testing.assert_array_equal(readings[0].values, readings[1].values)
+
+
+def messages_and_chunks(path: Path) -> tuple[dict[str, list[tuple[int, bytes]]], int]:
+    found: dict[str, list[tuple[int, bytes]]] = {}
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            found.setdefault(channel.topic, []).append((message.log_time, message.data))
+        summary = reader.get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    return found, summary.statistics.chunk_count
 
 
 def test_a_picture_of_a_wrong_size_is_refused(tmp_path: Path, make_run: Callable[[int], Any]) -> None:
