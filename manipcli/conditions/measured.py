@@ -10,8 +10,10 @@ from manipcli.conditions.condition import CheckContext, Problem, World
 from manipcli.conditions.robustness import Mask, Robustness, robustness
 from manipcli.conditions.sensed import Sensed
 from manipcli.conditions.state_window import StateWindow
+from manipcli.core.errors import Loc
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, listed
+from manipcli.core.units import readable
 
 
 def unmeasured(sensor: str, world: World, *, of_forces: bool) -> str | None:
@@ -44,6 +46,18 @@ def unknown_sensor(context: CheckContext, name: str, types: tuple[str, ...]) -> 
 def sensed_by(context: CheckContext, name: str) -> Sensed | None:
     """The sensor, None if sensors are unknown."""
     return None if context.sensors is None else context.sensors[name]
+
+
+def beyond(
+    sensed: Sensed, quantity: str, least: float, unit: str, loc: Loc, *, times: float = 1.0
+) -> tuple[Problem, ...]:
+    """A problem if no reading of a sensor can be as large as `least`; `times`: what a number of it is multiplied by."""
+    most = times * sensed.most.get(quantity, np.inf)
+    if least <= most:
+        return ()
+    found, wanted = (readable(value, unit, digits=7) for value in (most, least))
+    message = f"it never holds: the sensor measures at most {found}, not {wanted}"
+    return (Problem(loc, message, "lower it, or raise the range of the sensor under `sensors:`"),)
 
 
 def of_readings(

@@ -30,6 +30,8 @@ class Sensed:
         forces: of a sensor of touch: how many numbers at the start of a reading are normal forces [N].
         shear: whether as many forces along x follow, then along y.
         threshold: of a switch: the force [N] that closes it.
+        most: quantity -> largest reading of each of its numbers: `force` [N], `torque` [N m],
+            `pixels` of a camera.
     """
 
     type: str
@@ -40,6 +42,7 @@ class Sensed:
     forces: int = 0
     shear: bool = False
     threshold: float | None = None
+    most: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def width(self) -> int:

@@ -31,10 +31,12 @@ SCENE = build_scene(TaskSpec.model_construct(task="t", floor=False, scene={"cup"
 CELLS = (("", "force", 6), ("/shear", "x", 6), ("/shear", "y", 6))
 SENSORS = {
     "switch": Sensed("contact", (("", "force", 1),), forces=1, threshold=2.0),
-    "pad": Sensed("tactile", CELLS[:1], forces=6),
+    "pad": Sensed("tactile", CELLS[:1], forces=6, most={"force": 2.0}),
     "skin": Sensed("tactile", CELLS, forces=6, shear=True),
-    "wrist": Sensed("force_torque", (("", "wrench", 6),)),
-    "eye": Sensed("camera", picture="/segmentation", parts=("world", "robot/base", "robot/tip", "cup")),
+    "wrist": Sensed("force_torque", (("", "wrench", 6),), most={"force": 100.0, "torque": 5.0}),
+    "eye": Sensed(
+        "camera", picture="/segmentation", parts=("world", "robot/base", "robot/tip", "cup"), most={"pixels": 76_800}
+    ),
     "blind": Sensed("camera"),
     "encoder": Sensed("joint"),
 }
@@ -167,6 +169,11 @@ def test_slip_begins_at_a_share_of_the_friction_and_needs_a_touch() -> None:
         ("sees", {"sensor": "eye", "object": "cap"}, ("object",), "'cap' is not a body"),
         ("slips", {"sensor": "pad", "friction": 1.0}, ("sensor",), "sensor 'pad' measures no tangential forces"),
         ("slips", {"sensor": "encoder", "friction": 1.0}, ("sensor",), "the condition needs `tactile`"),
+        ("sees", {"sensor": "eye", "object": "cup", "pixels": 76_801}, ("pixels",), "at most 76800 px, not 76801 px"),
+        ("touches", {"sensor": "pad", "force": 12.1}, ("force",), "at most 12 N"),  # 6 cells of 2 N
+        ("wrench", {"sensor": "wrist", "force": {"axis": "z", "above": 101.0}}, ("force", "above"), "at most 100 N"),
+        ("wrench", {"sensor": "wrist", "torque": {"axis": "x", "below": -6.0}}, ("torque", "below"), "at most 5 N m"),
+        ("wrench", {"sensor": "wrist", "force": {"above": 174.0}}, ("force", "above"), "at most 173.2051 N"),
     ],
 )  # fmt: skip
 def test_what_a_sensor_cannot_answer_is_refused(name: str, written: Any, loc: Any, message: str) -> None:
@@ -178,6 +185,19 @@ def test_what_a_sensor_cannot_answer_is_refused(name: str, written: Any, loc: An
     assert problem.hint
     unknown_sensors = replace(CONTEXT, sensors=None)  # of a file that is refused
     assert condition.check(spec, unknown_sensors) == ((problem,) if loc == ("object",) else ())
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("sees", {"sensor": "eye", "object": "cup", "pixels": 76_800}),
+        ("touches", {"sensor": "pad", "force": 12.0}),
+        ("wrench", {"sensor": "wrist", "force": {"above": 173.0}, "torque": {"axis": "x", "below": 6.0}}),
+    ],
+)
+def test_what_a_sensor_can_just_measure_is_accepted(name: str, written: Any) -> None:
+    condition: Condition[Any] = CONDITIONS[name]
+    assert condition.check(condition.spec.model_validate(written), CONTEXT) == ()
 
 
 @pytest.mark.parametrize(

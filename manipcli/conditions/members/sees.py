@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
-from manipcli.conditions.measured import of_readings, sensed_by, unknown_sensor, unmeasured
+from manipcli.conditions.measured import beyond, of_readings, sensed_by, unknown_sensor, unmeasured
 from manipcli.conditions.robustness import Robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import is_part, unknown_part
@@ -55,11 +55,13 @@ def monitor(spec: SeesSpec, world: World) -> Monitor:
 
 
 def check(spec: SeesSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """An unknown camera or object, or a camera that does not tell parts apart."""
+    """An unknown camera or object, a camera that does not tell parts apart, or more pixels than it has."""
     found = (*unknown_sensor(context, spec.sensor, ("camera",)), *unknown_part(context, spec.object, ("object",)))
     sensed = None if found else sensed_by(context, spec.sensor)
-    if sensed is None or sensed.parts:
+    if sensed is None:
         return found
+    if sensed.parts:
+        return beyond(sensed, "pixels", spec.pixels, "px", ("pixels",))
     message = f"camera '{spec.sensor}' does not publish which part each pixel shows"
     return (Problem(("sensor",), message, f"add `segmentation: true` to '{spec.sensor}' under `sensors:`"),)
 

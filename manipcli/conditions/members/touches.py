@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
-from manipcli.conditions.measured import of_readings, sensed_by, unknown_sensor, unmeasured
+from manipcli.conditions.measured import beyond, of_readings, sensed_by, unknown_sensor, unmeasured
 from manipcli.conditions.robustness import Robustness
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
@@ -51,11 +51,15 @@ def monitor(spec: TouchesSpec, world: World) -> Monitor:
 
 
 def check(spec: TouchesSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """An unknown sensor, one of another type, and a missing force."""
+    """An unknown sensor, one of another type, a missing force, and one above its limits."""
     unknown = unknown_sensor(context, spec.sensor, TYPES)
     sensed = None if unknown else sensed_by(context, spec.sensor)
-    if sensed is None or spec.force is not None or sensed.threshold is not None:
+    if sensed is None:
         return unknown
+    if spec.force is not None:
+        return beyond(sensed, "force", spec.force, "N", ("force",), times=sensed.forces)
+    if sensed.threshold is not None:
+        return ()
     message = f"`force` is missing: sensor '{spec.sensor}' of type `{sensed.type}` has no threshold"
     return (Problem((), message, "add `force: 0.5 N`"),)
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, World
-from manipcli.conditions.measured import of_readings, unknown_sensor, unmeasured
+from manipcli.conditions.measured import beyond, of_readings, sensed_by, unknown_sensor, unmeasured
 from manipcli.conditions.robustness import Robustness, least
 from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
@@ -147,8 +147,18 @@ def clause(spec: WrenchSpec, robot: RobotModel) -> str:
 
 
 def check(spec: WrenchSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """An unknown sensor, or one of another type."""
-    return unknown_sensor(context, spec.sensor, ("force_torque",))
+    """An unknown sensor, one of another type, or a limit beyond what it measures."""
+    unknown = unknown_sensor(context, spec.sensor, ("force_torque",))
+    sensed = None if unknown else sensed_by(context, spec.sensor)
+    if sensed is None:
+        return unknown
+    found: list[Problem] = []
+    for quantity, unit, _, limits in spec.limited:
+        times = np.sqrt(3.0) if limits.axis == "magnitude" else 1.0
+        for word, limit in _bounds(limits):
+            least = limit if word == "above" else -limit
+            found += beyond(sensed, quantity, least, unit, (quantity, word), times=times)
+    return tuple(found)
 
 
 WRENCH = Condition(

@@ -84,7 +84,8 @@ def _check(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
 
 
 def _sensed(spec: ContactSpec, robot: RobotModel, scene: Scene) -> Sensed:
-    return Sensed("contact", fields=(("", "force", 1),), forces=1, threshold=spec.threshold)
+    most = {quantity.name: quantity.most for quantity in _quantities(spec, robot)}
+    return Sensed("contact", fields=(("", "force", 1),), forces=1, threshold=spec.threshold, most=most)
 
 
 MEMBER = SensorMember(

@@ -158,7 +158,9 @@ def _check(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Iterator[Probl
 def _sensed(spec: TactileSpec, robot: RobotModel, scene: Scene) -> Sensed:
     cells = spec.rows * spec.columns
     fields = (("", "force", cells), ("/shear", "x", cells), ("/shear", "y", cells))
-    return Sensed("tactile", fields=fields if spec.shear else fields[:1], forces=cells, shear=bool(spec.shear))
+    most = {quantity.name: quantity.most for quantity in _quantities(spec, robot)}
+    shown = fields if spec.shear else fields[:1]
+    return Sensed("tactile", fields=shown, forces=cells, shear=bool(spec.shear), most=most)
 
 
 MEMBER = SensorMember(
