@@ -247,7 +247,7 @@ def _remember(parents: dict[str, tuple[str, Transform]], data: bytes, places: Pl
         for _, reader in singly(data, places):
             for parent, child, pose in transforms(reader):
                 length = float(np.linalg.norm(pose[3:]))
-                if np.isfinite(pose).all() and length > 0.0:
+                if np.isfinite(pose).all() and 0.0 < length < np.inf:
                     parents[child] = parent, Transform.of(xyz=pose[:3], quat_xyzw=np.array(pose[3:]) / length)
     except CdrError:
         return

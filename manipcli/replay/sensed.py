@@ -118,6 +118,6 @@ def counted(values: Array) -> tuple[Counts, float]:
     """Values as counts, and their unit; negative values are 0, those that are not finite are unknown."""
     known = np.isfinite(values)
     most = float(values[known].max(initial=0.0))
-    unit = most / MOST_COUNT if most > 0.0 else 1.0
+    unit = most / MOST_COUNT or 1.0  # of denormal numbers, too
     counts = np.clip(np.rint(np.where(known, values, 0.0) / unit), 0, MOST_COUNT)
     return np.where(known, counts, UNKNOWN).astype(np.uint16), unit

@@ -25,7 +25,7 @@ from manipcli.scene.scene import Scene
 from manipcli.simulate.hand_pads import hand_pads
 from manipcli.simulate.sensor_layout import sensed_by_name, ticks_per_measurement
 from manipcli.simulate.sensors import SENSORS
-from manipcli.simulate.sensors.camera import CameraSpec
+from manipcli.simulate.sensors.camera import MOST_PIXELS, CameraSpec
 from manipcli.simulate.sensors.tactile import TactileSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
@@ -41,6 +41,8 @@ LOG_FOLDER: Final = "sensors"
 OF_CONTROLLERS: Final = ("controller_state", "reference", "error", "wrench")
 PARALLEL: Final = 1.0
 """[deg] Accepted rotation between the frame of a sensor and the tool whose force it measures."""
+MOST_WAITING, MOST_STREAM = 1e9, 2e9
+"""[byte] Of the measurements of a sensor on their way; [byte/s] of its measurements."""
 WHOLE: Final = 1e-6
 """Accepted deviation of a number of ticks from a whole number, as a share."""
 
@@ -91,6 +93,7 @@ def sensor_findings(
     found = [finding for own in sensors for finding in _of_one(own, robot, scene)]
     period = task.spec.simulation.control_period
     found += [own.finding(problem) for own in sensors for problem in _times(own.spec, period)]
+    found += [own.finding(problem) for own in sensors for problem in _amounts(own.spec, robot, period)]
     found += _names(sensors, controllers, robot, scene)
     found += _measured_twice(sensors, robot)
     if controllers is not None and robot_file is not None:
@@ -153,6 +156,25 @@ def _times(spec: SensorSpec, period: float) -> Iterator[Problem]:
         near = [f"'{1e3 * period * whole:.10g} ms'" for whole in (math.floor(delay), math.ceil(delay))]
         message = f"delay {1e3 * spec.delay:g} ms is not a whole number of control periods, {1e3 * period:g} ms"
         yield Problem(("delay",), message, f"write {' or '.join(near)}", "SENS107")
+
+
+def _amounts(spec: SensorSpec, robot: RobotModel, period: float) -> Iterator[Problem]:
+    """More data than memory or disk can hold."""
+    if isinstance(spec, CameraSpec):
+        if spec.resolution[0] * spec.resolution[1] > MOST_PIXELS:  # reported already
+            return
+        size = float(spec.bytes)
+    else:
+        size = 8.0 * sum(quantity.width for quantity in SENSORS[spec.type].quantities(spec, robot))
+    rate = 1.0 / period if spec.rate is None else min(spec.rate, 1.0 / period)
+    if size * rate > MOST_STREAM:
+        message = f"it measures {size * rate / 1e9:.3g} GB per second, more than {MOST_STREAM / 1e9:g} GB"
+        hint = f"lower its rate to {MOST_STREAM / size:.3g} Hz or less, or take smaller pictures"
+        yield Problem(("rate",) if "rate" in spec.model_fields_set else (), message, hint, "SENS113")
+    elif size * rate * spec.delay > MOST_WAITING:
+        waiting = f"{size * rate * spec.delay / 1e9:.3g} GB of measurements are on their way during its delay"
+        hint = f"lower `delay` to {MOST_WAITING / (size * rate):.3g} s or less, or its rate"
+        yield Problem(("delay",), f"{waiting}, more than {MOST_WAITING / 1e9:g} GB", hint, "SENS113")
 
 
 def _near_rates(ticks: float, period: float) -> list[str]:
@@ -224,6 +246,8 @@ def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterato
         else:
             message = f"sensor '{name}' is of type '{spec.type}', not 'camera'"
         near = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
+        if isinstance(spec, CameraSpec) and not able:
+            near = f"write `depth: true` for '{name}' under `sensors:`"
         yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=near)
 
 

@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from manipcli.logs import sensed
 from manipcli.logs.sensed import read_sensed
 from manipcli.record.schemas import DEFINITIONS, schema_text
-from manipcli.replay.sensed import UNKNOWN
+from manipcli.replay.sensed import UNKNOWN, counted
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 TYPES.register(get_types_from_msg(DEFINITIONS["manipcli_msgs/Taxels"], "manipcli_msgs/msg/Taxels"))
@@ -191,3 +191,10 @@ def test_a_log_without_sensors_has_nothing_to_show(tmp_path: Path) -> None:
     text = make("std_msgs/msg/String", data="x")
     log = write(tmp_path / "a.mcap", [("/chatter", 0.0, "std_msgs/msg/String", text)])
     assert not read_sensed(log, FRAMES, begin=BEGIN, end=1.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_too_small_for_a_unit_are_shown_as_nothing() -> None:
+    counts, unit = counted(np.array([5e-324, 0.0, -1.0, np.nan]))
+    assert unit > 0.0
+    assert counts.tolist() == [0, 0, 0, UNKNOWN]

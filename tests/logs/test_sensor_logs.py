@@ -91,6 +91,9 @@ WRONG = [
     ("a: {type: imu, link: palm, noise: {angular_velocity: {white: -1}}}", "TASK204", "white"),
     ("a: {type: imu, link: palm, noise: {angular_velocty: {white: 1}}}", "TASK201", "'angular_velocity'"),
     ("a: {type: imo, link: palm}", "TASK203", "'imu'"),
+    ("a: {type: camera, resolution: [1920, 1080], rate: 1 kHz}", "SENS113", "Hz or less"),
+    ("a: {type: camera, rate: 100 Hz, delay: 10 s, cloud: true}", "SENS113", "`delay`"),
+    ("a: {type: camera, resolution: [2048, 2048], cloud: true, rate: 1 Hz}", "SENS131", "resolution"),
 ]
 
 

@@ -72,8 +72,8 @@ class GraspSpec(Model):
     @model_validator(mode="after")
     def _room_to_press(self) -> GraspSpec:
         most = self.reflex.force if isinstance(self.reflex, ReflexSpec) else None
-        if most is not None and most < self.force:
-            message = f"the reflex never presses: its limit of {most:g} N is below the force of {self.force:g} N"
+        if most is not None and most <= self.force:
+            message = f"the reflex never presses: its limit of {most:g} N is not above the force of {self.force:g} N"
             raise problem("range", message, at=("reflex", "force"), hint="raise the limit, or lower `force`")
         return self
 

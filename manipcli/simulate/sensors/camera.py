@@ -38,8 +38,8 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.mounted_sensor import MountedSpec
 from manipcli.spec.quantity import Angle, Frequency, Length
 
-MOST_PIXELS = 1 << 22
-"""Of a picture."""
+MOST_PIXELS, MOST_POINTS = 1 << 22, 4_000_000
+"""Of a picture; of a cloud, which is one message, and readers refuse more than 64 MiB."""
 OPTICAL = "_optical"
 
 
@@ -91,6 +91,12 @@ class CameraSpec(MountedSpec):
         given = self.intrinsics
         return Lens(*self.resolution, given.fx, given.fy, given.cx, given.cy)
 
+    @property
+    def bytes(self) -> int:
+        """Of the messages of a picture."""
+        width, height = self.resolution
+        return width * height * (3 * self.color + 2 * self.depth + 2 * self.segmentation + 16 * self.cloud)
+
 
 def check(spec: CameraSpec, robot: RobotModel, scene: Scene) -> Iterator[Problem]:
     """Pictures that cannot be: a lens of 180 deg or more, too many pixels."""
@@ -101,10 +107,11 @@ def check(spec: CameraSpec, robot: RobotModel, scene: Scene) -> Iterator[Problem
             hint = f"a number is in rad: write '{spec.fov:g} deg'"
         yield Problem(("fov",), f"a field of view of {degrees:.4g} deg is not between 0 and 180 deg", hint, "SENS130")
     width, height = spec.resolution
-    if width * height > MOST_PIXELS:
+    most, with_ = (MOST_POINTS, " with `cloud`") if spec.cloud else (MOST_PIXELS, "")
+    if width * height > most:
         hint = "lower the resolution; 640x480 is 0.3 million pixels"
-        message = f"{width} x {height} is {width * height / 1e6:.3g} million pixels, more than {MOST_PIXELS / 1e6:.2g}"
-        yield Problem(("resolution",), message + " million", hint, "SENS131")
+        message = f"{width} x {height} is {width * height / 1e6:.3g} million pixels, more than {most / 1e6:.2g} million"
+        yield Problem(("resolution",), message + with_, hint, "SENS131")
 
 
 def topics(spec: CameraSpec, robot: RobotModel) -> tuple[Topic, ...]:
@@ -127,7 +134,9 @@ def frames(spec: CameraSpec) -> Mapping[str, Transform]:
 
 def sensed(spec: CameraSpec, robot: RobotModel, scene: Scene) -> Sensed:
     """How many pixels show each part, if it tells them apart."""
-    return Sensed("camera", picture=messages.SEGMENTATION, parts=frame_names(robot, scene) if spec.segmentation else ())
+    width, height = spec.resolution
+    parts = frame_names(robot, scene) if spec.segmentation else ()
+    return Sensed("camera", picture=messages.SEGMENTATION, parts=parts, most={"pixels": width * height})
 
 
 class CameraExposure:

@@ -15,7 +15,7 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.conditions.sensed import Sensed
 from manipcli.core.geometry import Array
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import listed
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
@@ -75,8 +75,13 @@ def _quantities(spec: ForceTorqueSpec, robot: RobotModel) -> tuple[Quantity, ...
 def _check(spec: ForceTorqueSpec, robot: RobotModel, scene: Scene) -> Iterator[Problem]:
     if spec.link == robot.root:
         carried = [joint.child for joint in robot.joints]
-        hint = did_you_mean(spec.link, carried, kind="links")
+        hint = f"choose a link that another one carries: {listed(carried)}"
         yield Problem(("link",), f"link '{spec.link}' is the root and has no parent to press on", hint, "SENS103")
+
+
+def _sensed(spec: ForceTorqueSpec, robot: RobotModel, scene: Scene) -> Sensed:
+    most = {quantity.name: quantity.most for quantity in _quantities(spec, robot)}
+    return Sensed("force_torque", fields=(("", "wrench", 6),), most=most)
 
 
 MEMBER = SensorMember(
@@ -87,5 +92,5 @@ MEMBER = SensorMember(
     open=ForceTorque,
     check=_check,
     needs_link=True,
-    sensed=lambda spec, robot, scene: Sensed("force_torque", fields=(("", "wrench", 6),)),
+    sensed=_sensed,
 )
