@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,14 +15,17 @@ from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape, too_big
 from manipcli.scene.drop_test import FORMED, drop_height
+from manipcli.scene.layers import GAP, Cell, cells, offsets
 from manipcli.scene.mass_properties import union
 from manipcli.scene.named_frames import in_owner, named_frames, owner
 from manipcli.scene.scene import Body, Scene
-from manipcli.scene.scene_names import Locate, misnamed
+from manipcli.scene.scene_names import Locate, miscounted, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
 from manipcli.spec.base import Model
+from manipcli.spec.counted import flat_scene, group, members, written
+from manipcli.spec.explain import distinct
 from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
@@ -56,10 +60,13 @@ class _Builder:
     """Builds one scene and collects the findings of all bodies."""
 
     def __init__(self, spec: TaskSpec, place: Locate, packages: Packages) -> None:
-        self.spec = spec
-        self.place = place
+        self.counted = {name: body for name, body in spec.scene.items() if body.count is not None}
+        self.spec = spec.model_copy(update={"scene": flat_scene(spec.scene)}) if self.counted else spec
+        self.place: Locate = (lambda loc: place(written(loc, spec.scene))) if self.counted else place
+        self.cells: dict[str, dict[str, Cell]] = {}
+        self.filled: dict[str, float] = {}
         self.packages = packages
-        self.findings = list(misnamed(spec, place))
+        self.findings = list(distinct((*misnamed(self.spec, self.place), *miscounted(spec, place))))
         self.shapes: dict[str, BodyShape] = {}
         self.kinds: dict[str, str] = {}
         self.poses: dict[str, Transform] = {}
@@ -257,9 +264,45 @@ class _Builder:
         X_WB = self._pose(other) if known else None
         if X_WB is None or name not in self.shapes or other not in self.shapes:
             return None
+        if (owner := group(name, self.counted)) is not None:
+            return self._layered(name, owner, spec, other, X_WB)
         if word == "inside":
             return self._inside(name, spec, other, X_WB)
         return self._resting(name, spec, other, X_WB)
+
+    def _layered(self, name: str, owner: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
+        """X_WO of a body of a `count`: over its cell of the layers, which begin above earlier layers in a container."""
+        if spec.inside is not None and (self.shapes[other].interior is None or spec.at is not None):
+            return self._inside(name, spec, other, X_WB)  # refuses it, or `miscounted` did
+        if owner not in self.cells:
+            self._lay(owner, spec, other)
+        cell = self.cells[owner].get(name)
+        if cell is None:
+            return None
+        x, y = (cell.x, cell.y) if spec.at is None else (spec.at[0] + cell.x, spec.at[1] + cell.y)
+        moved = spec.model_copy(update={"at": (x, y)})
+        place = self._inside if spec.inside is not None else self._resting
+        X_WO = place(name, moved, other, X_WB)
+        return None if X_WO is None else Transform.of(xyz=(0.0, 0.0, cell.lift)) @ X_WO
+
+    def _lay(self, owner: str, spec: BodySpec, other: str) -> None:
+        """Lays out the cells of the bodies of a `count`, with a finding if not all fit into their container."""
+        body, shape = self.counted[owner], self.shapes[f"{owner}[0]"]
+        assert body.count is not None
+        interior = self.shapes[other].interior if spec.inside is not None else None
+        below = self.filled.get(other, 0.0) if interior is not None else 0.0
+        found = cells(shape, spec.yaw, body.count, body.grid, interior, below=below)
+        if len(found) < body.count:
+            message = f"only {len(found)} of {body.count} '{owner}' fit into '{other}'"
+            hint = "write a smaller `count`, or use a larger container: they start in layers, apart by a tenth of their size"
+            self._error("TASK293", message, ("scene", owner, "count"), hint)
+        elif interior is not None:
+            self.filled[other] = found[-1].lift + float(shape.size[2]) * (1.0 + GAP)
+        away = offsets(shape, spec.yaw, body.count, seed=self.spec.simulation.seed, name=owner)
+        self.cells[owner] = {
+            name: replace(cell, x=cell.x + float(dx), y=cell.y + float(dy))
+            for name, cell, (dx, dy) in zip(members(owner, body.count), found, away, strict=False)
+        }
 
     def _frame_pose(self, name: str) -> Transform | None:
         """X_WF of the `frame` of a body at the start; None with a finding, here or elsewhere."""
@@ -348,7 +391,10 @@ class _Builder:
     # -- findings
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
-        self.findings.append(Diagnostic(code=code, message=message, place=self.place(loc), hint=hint))
+        place = self.place(loc)
+        if self.counted and any(found.code == code and found.place == place for found in self.findings):
+            return  # the same of another body of a `count`
+        self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint))
 
 
 def _written(value: object, loc: Loc) -> Iterator[Loc]:
