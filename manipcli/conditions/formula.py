@@ -106,7 +106,7 @@ def leaves(spec: ConditionSpec, scene: Scene | None = None) -> Iterator[Conditio
 
 
 def over_selection(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
-    """The monitor of a condition over the bodies of a selection: the least, the greatest or the n-th greatest margin."""
+    """The monitor of a condition over the bodies of a selection: the n-th greatest of their margins."""
     monitors = [_named(member, opened(member, world, seam)) for member in each(spec, world.scene)]
     wanted = least_number(spec, len(monitors))
 

@@ -294,7 +294,9 @@ class _Builder:
         found = cells(shape, spec.yaw, body.count, body.grid, interior, below=below)
         if len(found) < body.count:
             message = f"only {len(found)} of {body.count} '{owner}' fit into '{other}'"
-            hint = "write a smaller `count`, or use a larger container: they start in layers, apart by a tenth of their size"
+            hint = (
+                "write a smaller `count`, or use a larger container: a tenth of their size is between them"
+            )
             self._error("TASK293", message, ("scene", owner, "count"), hint)
         elif interior is not None:
             self.filled[other] = found[-1].lift + float(shape.size[2]) * (1.0 + GAP)

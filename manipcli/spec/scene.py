@@ -138,9 +138,9 @@ class BodySpec(Model):
     inside: BodyName | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
     count: Annotated[int, Field(ge=1, le=MOST)] | None = Field(
         None,
-        description=f"How many of it there are, 1 to {MOST}: bodies `NAME[0]`, `NAME[1]`, ..., upright in layers `inside` "
-        "a container, or around `at` on what they rest on; apart by a tenth of their size, of which the seed draws half "
-        "as an offset. They fall and settle before the start. Default: one body, NAME.",
+        description=f"How many of it there are, 1 to {MOST}: bodies `NAME[0]`, `NAME[1]`, ..., upright in layers "
+        "`inside` a container, or around `at` on what they rest on; apart by a tenth of their size, of which the seed "
+        "draws half as an offset. They fall and settle before the start. Default: one body, NAME.",
     )
     grid: tuple[Positive, Positive] | None = Field(
         None,
