@@ -145,7 +145,9 @@ def nth_greatest(readings: Sequence[Robustness], n: int) -> Robustness:
 
     def pick(values: Array, *, axis: int) -> npt.NDArray[np.intp]:
         ranked = np.argsort(-values, axis=axis, kind="stable")[n - 1]
-        return np.where(np.isnan(values).any(axis=axis), np.argmax(values, axis=axis), ranked)
+        return np.asarray(
+            np.where(np.isnan(values).any(axis=axis), np.argmax(values, axis=axis), ranked), dtype=np.intp
+        )
 
     return _counting(_picked(readings, pick), readings)
 

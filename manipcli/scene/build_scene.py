@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,23 +14,22 @@ from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape, too_big
 from manipcli.scene.drop_test import FORMED, drop_height
-from manipcli.scene.layers import GAP, Cell, cells, offsets
+from manipcli.scene.layers import Layers
 from manipcli.scene.mass_properties import union
 from manipcli.scene.named_frames import in_owner, named_frames, owner
 from manipcli.scene.scene import Body, Scene
 from manipcli.scene.scene_names import Locate, miscounted, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
+from manipcli.shapes.primitives import Cylinder, Rgba
 from manipcli.spec.base import Model
-from manipcli.spec.counted import flat_scene, group, members, written
+from manipcli.spec.counted import flat_scene, group, written
 from manipcli.spec.explain import distinct
 from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "frame", "at", "yaw")
-FLOOR_SIZE = (10.0, 10.0, 0.1)
 LONGEST = 10.0
 """[m] Longest movable body: a longer one was probably meant in millimetres."""
 _SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
@@ -63,8 +61,7 @@ class _Builder:
         self.counted = {name: body for name, body in spec.scene.items() if body.count is not None}
         self.spec = spec.model_copy(update={"scene": flat_scene(spec.scene)}) if self.counted else spec
         self.place: Locate = (lambda loc: place(written(loc, spec.scene))) if self.counted else place
-        self.cells: dict[str, dict[str, Cell]] = {}
-        self.filled: dict[str, float] = {}
+        self.layers = Layers(self.counted, spec.simulation.seed if self.counted else 0)
         self.packages = packages
         self.findings = list(distinct((*misnamed(self.spec, self.place), *miscounted(spec, place))))
         self.shapes: dict[str, BodyShape] = {}
@@ -76,8 +73,8 @@ class _Builder:
     def build(self) -> Scene:
         bodies: list[Body] = []
         if self.spec.floor:
-            self._add_shape("floor", "floor", _floor_shape())
-            self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -FLOOR_SIZE[2] / 2.0))
+            self._add_shape("floor", "floor", body_shapes.floor())
+            self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -body_shapes.FLOOR_SIZE[2] / 2.0))
             bodies.append(self._body("floor", BodySpec(fixed=True), self.poses["floor"]))
         for name, body in self.spec.scene.items():
             self._shape(name, body)
@@ -271,40 +268,20 @@ class _Builder:
         return self._resting(name, spec, other, X_WB)
 
     def _layered(self, name: str, owner: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
-        """X_WO of a body of a `count`: over its cell of the layers, which begin above earlier layers in a container."""
-        if spec.inside is not None and (self.shapes[other].interior is None or spec.at is not None):
-            return self._inside(name, spec, other, X_WB)  # refuses it, or `miscounted` did
-        if owner not in self.cells:
-            self._lay(owner, spec, other)
-        cell = self.cells[owner].get(name)
-        if cell is None:
-            return None
-        x, y = (cell.x, cell.y) if spec.at is None else (spec.at[0] + cell.x, spec.at[1] + cell.y)
-        moved = spec.model_copy(update={"at": (x, y)})
-        place = self._inside if spec.inside is not None else self._resting
-        X_WO = place(name, moved, other, X_WB)
-        return None if X_WO is None else Transform.of(xyz=(0.0, 0.0, cell.lift)) @ X_WO
-
-    def _lay(self, owner: str, spec: BodySpec, other: str) -> None:
-        """Lays out the cells of the bodies of a `count`, with a finding if not all fit into their container."""
-        body, shape = self.counted[owner], self.shapes[f"{owner}[0]"]
-        assert body.count is not None
+        """X_WO of a body of a `count`: at its place in the layers, which begin above earlier ones in a container."""
         interior = self.shapes[other].interior if spec.inside is not None else None
-        below = self.filled.get(other, 0.0) if interior is not None else 0.0
-        found = cells(shape, spec.yaw, body.count, body.grid, interior, below=below)
-        if len(found) < body.count:
-            message = f"only {len(found)} of {body.count} '{owner}' fit into '{other}'"
-            hint = (
-                "write a smaller `count`, or use a larger container: a tenth of their size is between them"
-            )
+        if spec.inside is not None and (interior is None or spec.at is not None):
+            return self._inside(name, spec, other, X_WB)  # refused there, or by `miscounted`
+        cell = self.layers.cell(name, owner, self.shapes[name], other, interior)
+        if isinstance(cell, int):
+            message = f"only {cell} of {self.counted[owner].count} '{owner}' fit into '{other}'"
+            hint = "write a smaller `count`, or use a larger container: a tenth of their size is between them"
             self._error("TASK293", message, ("scene", owner, "count"), hint)
-        elif interior is not None:
-            self.filled[other] = found[-1].lift + float(shape.size[2]) * (1.0 + GAP)
-        away = offsets(shape, spec.yaw, body.count, seed=self.spec.simulation.seed, name=owner)
-        self.cells[owner] = {
-            name: replace(cell, x=cell.x + float(dx), y=cell.y + float(dy))
-            for name, cell, (dx, dy) in zip(members(owner, body.count), found, away, strict=False)
-        }
+            return None
+        x, y = spec.at or (0.0, 0.0)
+        moved = spec.model_copy(update={"at": (x + cell.x, y + cell.y)})
+        X_WO = (self._resting if spec.inside is None else self._inside)(name, moved, other, X_WB)
+        return None if X_WO is None else Transform.of(xyz=(0.0, 0.0, cell.lift)) @ X_WO
 
     def _frame_pose(self, name: str) -> Transform | None:
         """X_WF of the `frame` of a body at the start; None with a finding, here or elsewhere."""
@@ -394,9 +371,8 @@ class _Builder:
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
         place = self.place(loc)
-        if self.counted and any(found.code == code and found.place == place for found in self.findings):
-            return  # the same of another body of a `count`
-        self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint))
+        if not self.counted or all((found.code, found.place) != (code, place) for found in self.findings):
+            self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint))
 
 
 def _written(value: object, loc: Loc) -> Iterator[Loc]:
@@ -416,19 +392,8 @@ def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
     if shape.inertial is None:
         return union(shape.geometries, spec.mass or 1.0)  # a missing mass is already reported
     mass = spec.mass or shape.inertial.mass
-    scale = mass / shape.inertial.mass
-    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=frozen(shape.inertial.inertia * scale))
-
-
-def _floor_shape() -> BodyShape:
-    # A thick box instead of PyBullet's plane: the same body for contact, collision checks and drawing.
-    return BodyShape(
-        geometries=(Geometry(X_LS=Transform.identity(), shape=Box(FLOOR_SIZE), rgba=COLORS["floor"]),),
-        interior=None,
-        size=frozen(FLOOR_SIZE),
-        centre=frozen(np.zeros(3)),
-        flat_top=True,
-    )
+    inertia = frozen(shape.inertial.inertia * (mass / shape.inertial.mass))
+    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=inertia)
 
 
 def _bottom(shape: BodyShape) -> float:

@@ -7,7 +7,8 @@ gap in x and y, drawn from the seed and the name, keeps columns of bodies from s
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,8 @@ from manipcli.core.geometry import Array
 from manipcli.scene.body_shapes import BodyShape, too_big
 from manipcli.scene.scene import Interior
 from manipcli.shapes.primitives import Cylinder
+from manipcli.spec.counted import members
+from manipcli.spec.scene import BodySpec
 
 GAP: Final = 0.1
 """Between two bodies, as a share of their size."""
@@ -28,6 +31,48 @@ class Cell:
     x: float
     y: float
     lift: float
+
+
+class Layers:
+    """The cells of all bodies with a `count`, each laid out when the first of them is asked for.
+
+    Args:
+        counted: what is written, by name.
+        seed: of the offsets.
+    """
+
+    def __init__(self, counted: Mapping[str, BodySpec], seed: int) -> None:
+        self._counted = counted
+        self._seed = seed
+        self._cells: dict[str, dict[str, Cell]] = {}
+        self._full: dict[str, float] = {}
+
+    def cell(self, name: str, owner: str, shape: BodyShape, other: str, interior: Interior | None) -> Cell | int:
+        """The cell of a body with its offset; if not all fit, how many do.
+
+        Args:
+            name, owner: of the body, and as written.
+            shape: of each body.
+            other: the container or support.
+            interior: of a container.
+        """
+        if owner not in self._cells:
+            self._cells[owner] = self._laid(owner, shape, other, interior)
+        found = self._cells[owner]
+        return found[name] if len(found) == self._counted[owner].count else len(found)
+
+    def _laid(self, owner: str, shape: BodyShape, other: str, interior: Interior | None) -> dict[str, Cell]:
+        body = self._counted[owner]
+        count = body.count or 0
+        below = 0.0 if interior is None else self._full.get(other, 0.0)
+        found = cells(shape, body.yaw, count, body.grid, interior, below=below)
+        if found and interior is not None:
+            self._full[other] = found[-1].lift + float(shape.size[2]) * (1.0 + GAP)
+        away = offsets(shape, body.yaw, count, seed=self._seed, name=owner)
+        return {
+            name: replace(cell, x=cell.x + float(dx), y=cell.y + float(dy))
+            for name, cell, (dx, dy) in zip(members(owner, count), found, away, strict=False)
+        }
 
 
 def cells(

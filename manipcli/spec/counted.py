@@ -43,7 +43,7 @@ def flat_scene(scene: Mapping[str, BodySpec]) -> dict[str, BodySpec]:
 def group(name: str, scene: Mapping[str, BodySpec]) -> str | None:
     """The body with a `count` that a body of the flat scene belongs to; None for any other name."""
     found = _MEMBER.fullmatch(name)
-    owner = None if found is None else found[1]
+    owner = "" if found is None else str(found[1])
     return owner if owner in scene and scene[owner].count is not None else None
 
 
