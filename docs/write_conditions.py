@@ -75,8 +75,8 @@ whole tolerance is left, and signs are kept: 5 mm of 20 mm left (0.25) is less t
 
 ## Many bodies
 
-A body with a [`count`](task.md#many-bodies) is named by number, `ball[3]`; `ball[*]` is the selection of all of them. Three
-words take one condition with a selection in place of a body (in quotes: YAML reads brackets as a list):
+A body with a [`count`](task.md#many-bodies) is named by number, `ball[3]`; `ball[*]` is the selection of all of them.
+Three words take one condition with a selection in place of a body (in quotes: YAML reads brackets as a list):
 
 ```yaml
   - at_least: {n: 18, meet: {inside: {object: 'ball[*]', of: tray}}}
@@ -84,8 +84,8 @@ words take one condition with a selection in place of a body (in quotes: YAML re
   - any_of: {touches: {a: 'ball[*]', b: desk}}
 ```
 
-The margin is the n-th greatest of those of the bodies (the least for `all_of`, the greatest for `any_of`), so it is 0 or
-more exactly if the condition holds for as many. Reports show how many hold, and the body that decides.
+The margin is the n-th greatest of those of the bodies (the least for `all_of`, the greatest for `any_of`), so it is 0
+or more exactly if the condition holds for as many. Reports show how many hold, and the body that decides.
 
 ## Not evaluated
 
