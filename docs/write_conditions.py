@@ -81,7 +81,7 @@ Three words take one condition with a selection in place of a body (in quotes: Y
 ```yaml
   - at_least: {n: 18, meet: {inside: {object: 'ball[*]', of: tray}}}
   - all_of: {at_rest: {object: 'ball[*]'}}
-  - any_of: {touches: {a: 'ball[*]', b: desk}}
+  - any_of: {inside: {object: 'ball[*]', of: cup}}
 ```
 
 The margin is the n-th greatest of those of the bodies (the least for `all_of`, the greatest for `any_of`), so it is 0

@@ -60,6 +60,11 @@ def selection_problems(
         )
         return (Problem(loc, f"the condition of `{spec.name}` {what}, expected one", hint),)
     if named[0] not in known:
+        owner = named[0].removesuffix(ALL)
+        if any(body.name == owner for body in context.scene.bodies):
+            return (
+                Problem(loc, f"'{owner}' is one body: it has no `count`", f"name it '{owner}', without `{spec.name}`"),
+            )
         message = f"'{named[0]}' selects no body: no body of the scene has this name and a `count`"
         return (Problem(loc, message, did_you_mean(named[0], known, kind="selections")),)
     count = len(known[named[0]])

@@ -237,7 +237,13 @@ _CONDITION = "Condition"
 def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[KeyedSpec]:
     """`base` with the field `all`, `any` (a list of conditions), `not`, ... (a condition), or `at_least`."""
     if name == "at_least":
-        meet = (condition, Field(description="The condition, with the selection in place of one body."))
+        meet = (
+            condition,
+            Field(
+                description="The condition, with the selection in place of a body: "
+                "`meet: {inside: {object: 'ball[*]', of: tray}}`."
+            ),
+        )
         counted = create_model("AtLeast", __base__=AtLeastSpec, __doc__=AtLeastSpec.__doc__, **{MEET: meet})  # type: ignore[call-overload]
         return _keyed(base, name, counted, COMBINATIONS[name])
     # `condition` is a type only at run time; type checkers cannot follow it.
