@@ -13,7 +13,7 @@ from manipcli.description.elements import Inertial
 from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape, too_big
-from manipcli.scene.drop_test import FORMED, drop_height
+from manipcli.scene.drop_test import FORMED, bottom, drop_height
 from manipcli.scene.layers import Layers
 from manipcli.scene.mass_properties import union
 from manipcli.scene.named_frames import in_owner, named_frames, owner
@@ -318,7 +318,7 @@ class _Builder:
             x, y, _ = X_WF.apply([*at, 0.0])
             at, yaw = (float(x), float(y)), yaw + float(X_WF.rpy[2])
         top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
-        X_WO = Transform.of(xyz=(*at, top - _bottom(shape)), rpy=(0.0, 0.0, yaw))
+        X_WO = Transform.of(xyz=(*at, top - bottom(shape, Transform.identity())), rpy=(0.0, 0.0, yaw))
         x, y = X_WB.inverse().apply(X_WO.p)[:2] - support.centre[:2]
         beside = (
             np.hypot(x, y) > support.radius
@@ -365,7 +365,11 @@ class _Builder:
             self._error("TASK224", message, ("scene", name, "at"), hint)
             return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
-        return X_WB @ interior.X_OS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        return (
+            X_WB
+            @ interior.X_OS
+            @ Transform.of(xyz=(x, y, -floor / 2.0 - bottom(shape, Transform.identity())), rpy=(0.0, 0.0, spec.yaw))
+        )
 
     # -- findings
 
@@ -394,8 +398,3 @@ def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
     mass = spec.mass or shape.inertial.mass
     inertia = frozen(shape.inertial.inertia * (mass / shape.inertial.mass))
     return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=inertia)
-
-
-def _bottom(shape: BodyShape) -> float:
-    """Lowest z [m] of the shape in O."""
-    return float(shape.centre[2] - shape.size[2] / 2.0)
