@@ -162,6 +162,27 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
+class Stream:
+    """Where what is poured is predicted to pass the plane of the receiver's rim.
+
+    Attributes:
+        beyond: [m] of its middle beyond the middle of the opening, in the direction of the pour.
+        spread: [m] by which the landing is uncertain.
+        margin: [m] from the outermost body to the wall of the opening, less the spread; negative: it may miss.
+        speed: [m/s] with which the fastest body leaves the rim.
+        tilt: [rad] of the cup when the last body leaves it.
+        moved: whether the lip was moved, or the tilt slowed down, for it.
+    """
+
+    beyond: float
+    spread: float
+    margin: float
+    speed: float
+    tilt: float
+    moved: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class StepPlan:
     """The motions of one step, and the state after them.
 
@@ -170,6 +191,7 @@ class StepPlan:
         end: the state after them.
         placed: the body that it sets down at its pose in `end`; "" for none.
         poured: the bodies that it pours into the container `into`.
+        stream: where they land; None if the plan does not predict it.
     """
 
     motions: tuple[Motion, ...]
@@ -177,6 +199,7 @@ class StepPlan:
     placed: str = ""
     poured: tuple[str, ...] = ()
     into: str = ""
+    stream: Stream | None = None
 
     @property
     def duration(self) -> float:
