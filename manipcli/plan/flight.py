@@ -6,8 +6,8 @@ With e_u the axis of the cup, e_w = w turned with it, theta(t) the tilt, and X e
     a_u = Y'' - X theta'' - Y theta'^2,    a_w = Y theta'' + 2 Y' theta' - X theta'^2
     a_u = -g cos(theta) + F,               a_w = g sin(theta) - N         (forces per mass)
 
-A ball of inertia k m r^2 that rolls has F = -k (Y'' + r theta''); it slips where that exceeds mu N. At the rim it pivots
-about the edge while gravity presses it there harder than its curve lifts it, v^2 / r; then it flies.
+A ball of inertia k m r^2 that rolls has F = -k (Y'' + r theta''); it slips where that exceeds mu N. At the rim it
+pivots about the edge while gravity presses it there harder than its curve lifts it, v^2 / r; then it flies.
 """
 
 from __future__ import annotations
@@ -151,5 +151,3 @@ def room(shape: Cylinder | Box, p_S: Array) -> float:
         return shape.radius - math.hypot(p_S[0], p_S[1])
     d = np.abs(p_S[:2]) - np.array(shape.size[:2]) / 2.0
     return -float(np.linalg.norm(np.maximum(d, 0.0)) + min(float(np.max(d)), 0.0))
-
-

@@ -101,7 +101,7 @@ class Pouring:
             ends.append(p_WT + (float(each.position[0]) + ways[-1]) * w)
         spread = PLACE_ERROR + SPEED_ERROR * max(map(abs, ways))
         widest = max(max(body.size) / 2.0 for body, _ in self.heights)
-        margin = min(room(hollow.shape, X_WS.inverse().apply(end)) for end in ends) - widest - spread
+        margin = float(min(room(hollow.shape, X_WS.inverse().apply(end)) for end in ends)) - widest - spread
         beyond = [float((end - X_WS.p) @ w) for end in ends]
         fastest = max(each.speed for each in out)
         return Stream((max(beyond) + min(beyond)) / 2.0, spread, margin, fastest, max(each.tilt for each in out))

@@ -6,9 +6,9 @@
 
 The lip (the lowest point of the rim when tilted) is placed above the centre of the container if what leaves the rim
 then lands well within the container's opening, else so far before it that it lands in the middle; where that is too
-uncertain, the cup tilts slower. What leaves the cup flies on in the direction w; see `plan.flight`. With c the centre of
-the rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup tips, all from O in the
-world, a rotation R by theta about a puts the lip at
+uncertain, the cup tilts slower. What leaves the cup flies on in the direction w; see `plan.flight`. With c the centre
+of the rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup tips, all from O in
+the world, a rotation R by theta about a puts the lip at
 
     p_O + R (c + r w) = p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z
 
@@ -82,10 +82,10 @@ class PourSpec(Model):
         description="Where what is poured lands: beyond the centre of the receiving rim in the direction of the pour "
         "[m]; negative: before it. Default: the centre, or elsewhere at least 1 cm inside the rim.",
     )
-    offset: Length | None = Field(
-        None,
-        description="Instead of an aim: how far the lip is before the centre of the receiving rim, against the "
-        "direction of the pour [m]; negative: beyond it. Default: chosen by where what is poured lands.",
+    offset: Length = Field(
+        0.0,
+        description="How far the lip is before the centre of the receiving rim, against the direction of the pour [m]; "
+        "negative: beyond it. The lip is then not aimed; at 0 it is.",
     )
     velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying and tilting."
@@ -107,7 +107,7 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     poured = frozenset((name, spec.into) for name in contents)
     over = spec.tilt > math.pi / 2
     pouring = Pouring.of(planner, state, spec.object, spec.into) if over else None
-    if pouring is not None and spec.offset is None:
+    if pouring is not None and not spec.offset:
         _refuse_narrow(pouring)
 
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
@@ -161,9 +161,9 @@ def _aimed(
     Raises:
         NotPlannable: wherever the lip is, and however slow the tilt, they may miss it.
     """
-    ahead = 0.0 if spec.offset is None else -spec.offset
+    ahead = -spec.offset
     builder, stream = tilted(ahead, 1.0)
-    if stream is None or spec.offset is not None:
+    if stream is None or spec.offset:
         return builder, stream
     best = builder, stream
     for share in SLOWER:
@@ -244,12 +244,12 @@ def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     found = unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
     if found:
         return found
-    if spec.aim is not None and spec.offset is not None:
+    if spec.aim is not None and spec.offset:
         hint = "remove `offset`: the lip is placed by the aim"
         return (Problem(loc=("offset",), message="`aim` and `offset` cannot both be given", hint=hint),)
     reach = float(max(scene.body(spec.into).size[:2]) / 2)
     hint = f"'{spec.into}' reaches {readable(reach, 'm')} from its centre"
-    for key, what, away in (("offset", "the lip", spec.offset or 0.0), ("aim", "the aim", spec.aim or 0.0)):
+    for key, what, away in (("offset", "the lip", spec.offset), ("aim", "the aim", spec.aim or 0.0)):
         if abs(away) >= reach:
             message = f"{what} is {readable(abs(away), 'm')} from the centre of '{spec.into}', outside its rim"
             return (Problem(loc=(key,), message=message, hint=hint),)
