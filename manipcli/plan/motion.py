@@ -188,8 +188,8 @@ class Stream:
         side = "beyond" if self.beyond >= 0.0 else "before"
         aim = "; the lip and the speed are chosen for it" if self.moved else ""
         return (
-            f"is to land {1000.0 * abs(self.beyond):.1f} mm {side} the centre, uncertain by {1000.0 * self.spread:.1f} mm: "
-            f"margin {1000.0 * self.margin:.1f} mm to the rim; it leaves at {self.speed:.2f} m/s, tilted "
+            f"is to land {1000.0 * abs(self.beyond):.1f} mm {side} the centre, uncertain by "
+            f"{1000.0 * self.spread:.1f} mm: margin {1000.0 * self.margin:.1f} mm to the rim; it leaves at {self.speed:.2f} m/s, tilted "
             f"{math.degrees(self.tilt):.0f} deg{aim}"
         )
 
