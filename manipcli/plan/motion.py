@@ -187,11 +187,9 @@ class Stream:
         """`is to land 1.2 mm beyond the centre, uncertain by 14.0 mm: margin 12.5 mm to the rim; it leaves at ...`."""
         side = "beyond" if self.beyond >= 0.0 else "before"
         aim = "; the lip and the speed are chosen for it" if self.moved else ""
-        return (
-            f"is to land {1000.0 * abs(self.beyond):.1f} mm {side} the centre, uncertain by "
-            f"{1000.0 * self.spread:.1f} mm: margin {1000.0 * self.margin:.1f} mm to the rim; it leaves at {self.speed:.2f} m/s, tilted "
-            f"{math.degrees(self.tilt):.0f} deg{aim}"
-        )
+        uncertain = f"uncertain by {1000.0 * self.spread:.1f} mm: margin {1000.0 * self.margin:.1f} mm to the rim"
+        leaves = f"it leaves at {self.speed:.2f} m/s, tilted {math.degrees(self.tilt):.0f} deg"
+        return f"is to land {1000.0 * abs(self.beyond):.1f} mm {side} the centre, {uncertain}; {leaves}{aim}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -175,7 +175,7 @@ def _aimed(
             if landed is None:
                 break
             stream = replace(landed, moved=True)
-            best = max(best, (builder, stream), key=lambda one: one[1].margin)
+            best = max(best, (builder, stream), key=lambda one: _merit(spec, one[1]))
     builder, stream = best
     if stream.margin >= 0.0:
         return builder, stream
@@ -188,7 +188,14 @@ def _aimed(
 
 def _hits(spec: PourSpec, stream: Stream) -> bool:
     """Whether the contents land well within the opening, and where the step says."""
-    return stream.margin >= ENOUGH and (spec.aim is None or abs(stream.beyond - spec.aim) <= EXACT)
+    if spec.aim is None:
+        return stream.margin >= ENOUGH
+    return stream.margin >= 0.0 and abs(stream.beyond - spec.aim) <= EXACT
+
+
+def _merit(spec: PourSpec, stream: Stream) -> float:
+    """[m] Its margin, less how far it misses the aim of the step."""
+    return stream.margin - (0.0 if spec.aim is None else abs(stream.beyond - spec.aim))
 
 
 def _refuse_narrow(pouring: Pouring) -> None:
