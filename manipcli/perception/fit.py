@@ -33,7 +33,7 @@ LONGEST, WIDEST = 0.03, 0.25
 JUMP = 0.01
 """Depth by which a pixel is off, beyond its noise, that is as wrong as any more [m]."""
 HELD, HELD_ROTATION = 2e-3, 0.05
-"""Standard deviations of a step [m] and [rad] where the picture tells nothing."""
+"""Standard deviations of a step [m] and [rad] where the picture contains no information."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,7 @@ class Picture:
         depth: (h, w) measured [m]; NaN: not measured, NOTHING: neither measured nor expected.
         noise: (h, w) its standard deviation [m].
         expected: (h, w) depth without the body [m]; NOTHING where nothing is.
-        floor: (h, w) depth [m] from which on a pixel cannot be told from what was expected.
+        floor: (h, w) depth [m] beyond which a pixel is not different from what was expected.
         shown: (h, w) where something unexpected is.
         near: (h, w) where it is in the volume that the body can be in.
         pixel: (2,) size of a pixel of the camera at z = 1.

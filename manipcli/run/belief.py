@@ -8,7 +8,7 @@ as all other bodies are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -54,15 +54,23 @@ class Belief:
         scene: the believed scene at the start: its bodies with `known` are uncertain.
         truth: the true scene at the start.
         kinematics: of the robot, as the planner knows it.
+        positions: true state -> (n) joint positions as the robot measures them; None: they are the true ones.
 
     Attributes:
         names: the bodies that may be elsewhere than believed: uncertain ones, and what is in them at the start.
         poses: (k, 7) position and quaternion xyzw of each of `names`, as of the last `look`.
     """
 
-    def __init__(self, scene: Scene, truth: Scene, kinematics: Kinematics) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        truth: Scene,
+        kinematics: Kinematics,
+        positions: Callable[[WorldState], Array] | None = None,
+    ) -> None:
         self._scene = scene
         self._kinematics = kinematics
+        self._positions = positions
         self._row = {body.name: k for k, body in enumerate(scene.movable)}
         uncertain = {body.name: body.known for body in scene.movable if body.known is not None}
         self._own: Mapping[str, _Own] = {
@@ -73,7 +81,6 @@ class Belief:
         self.names = tuple(scene.movable[row].name for row in rows)
         self._rows = np.array(rows, dtype=np.intp)
         self.poses = np.array([[*X.p, *X.quat_xyzw] for X in (scene.body(name).X_WO for name in self.names)])
-        self._joints: Array | None = None
         self._state: WorldState | None = None
 
     def _about(self, name: str, covariance: Array, inside: Sequence[str]) -> _Own:
@@ -103,11 +110,10 @@ class Belief:
         found.numbers[:] = state.numbers
         found.time[...] = state.time
         found.body_linear[:], found.body_angular[:] = state.body_linear, state.body_angular
-        self._joints = found.position
         for own in self._own.values():
             if own.held is not None:
                 link, X_LO = own.held
-                own.X_WO = self._kinematics.forward(state.position, link) @ X_LO
+                own.X_WO = self._link(state, link) @ X_LO
             found.body_position[own.row], found.body_quat_xyzw[own.row] = own.X_WO.p, own.X_WO.quat_xyzw
             if len(own.contents):
                 self._carry(own, state, found)
@@ -137,7 +143,7 @@ class Belief:
         believed = self.look(state)
         body, k = self._scene.body(carried.body), self._row[carried.body]
         X_WC = Transform.of(xyz=believed.body_position[k], quat_xyzw=believed.body_quat_xyzw[k])
-        X_LW = self._kinematics.forward(state.position, carried.link).inverse()
+        X_LW = self._link(state, carried.link).inverse()
         for name, own in self._own.items():
             if name == carried.body or contains(body, X_WC, self._scene.body(name), own.X_WO):
                 own.held = carried.link, X_LW @ own.X_WO
@@ -156,11 +162,14 @@ class Belief:
     def update(self, name: str, X_WO: Transform, covariance: Array) -> None:
         """An uncertain body is at X_WO now, with a covariance (6, 6); see `covariance`. What is in it moves along."""
         own = self._own[name]
-        own.X_WO, own.covariance = X_WO, covariance
         if own.held is not None:
-            assert self._joints is not None  # `hold` has looked
-            link, _ = own.held
-            own.held = link, self._kinematics.forward(self._joints, link).inverse() @ X_WO
+            link, X_LO = own.held
+            own.held = link, X_LO @ own.X_WO.inverse() @ X_WO  # as of the last `look`
+        own.X_WO, own.covariance = X_WO, covariance
+
+    def _link(self, state: WorldState, link: str) -> Transform:
+        """X_WL as measured."""
+        return self._kinematics.forward(state.position if self._positions is None else self._positions(state), link)
 
     def _carry(self, own: _Own, state: WorldState, found: WorldState) -> None:
         """What is truly in an uncertain container keeps its true pose in it."""

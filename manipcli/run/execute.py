@@ -166,7 +166,7 @@ def record_sensors(session: Session, recorder: Recorder, live: Live) -> None:
 def belief_of(task: Task, plan: Plan, session: Session) -> Belief:
     """What the robot believes at the start of a run, or of a part of it."""
     planner, state = plan.planner, task.part.state
-    belief = Belief(task.scene, task.true.scene, planner.kinematics)
+    belief = Belief(task.scene, task.true.scene, planner.kinematics, session.sensors.positions)
     if state is not None:
         restore_belief(belief, state, planner, session)
     return belief

@@ -58,6 +58,7 @@ class Looking:
         self._recorder = recorder
         self._planner = planner
         self._belief = belief
+        planner.starts.clear()  # of another run with this plan
 
     def look(self, looks: Look, situation: Callable[[], PlanningState], deadline: float | None) -> Lane[Found]:
         """Hold still until the next picture has arrived, and correct the belief.
@@ -70,17 +71,18 @@ class Looking:
         sight = self._planner.sights[looks.sensor]
         assert isinstance(sight, CameraSight)
         session = self._session
-        latest = min(session.time + sight.latency + LATE, np.inf if deadline is None else deadline)
+        began = session.time
+        latest = min(began + sight.latency + LATE, np.inf if deadline is None else deadline)
         joints: dict[int, Array] = {}
         with self._pictures(looks.sensor) as taken:
             while not taken:
                 if session.time > latest:
-                    return Found(f"no picture of '{looks.sensor}' arrived within {readable(latest, 's')}")
+                    return Found(f"no picture of '{looks.sensor}' arrived within {readable(latest - began, 's')}")
                 state = yield
                 if session.manager.faults:
                     return Found(session.manager.faults[-1].message)
                 # What the robot knows of its joints when the picture is taken, which arrives later.
-                joints[session.ticks - 1] = (session.sensors.joints or state).position.copy()
+                joints[session.ticks - 1] = session.sensors.positions(state).copy()
         (tick, depth), *_ = taken
         now = replace(situation(), position=frozen(joints[tick]))
         return self._correct(looks, sight, now, depth)

@@ -67,7 +67,7 @@ class Measured:
         """
         self._lost = ""
         state = self._belief.look(self._session.engine.read())
-        measured = np.array(state.position)
+        measured = np.array(self._session.sensors.positions(state))
         position = self._commanded(measured)
         if not self._physics:
             return believed.moved(position)

@@ -355,6 +355,7 @@ class StepAttempt:
         if pinch_force(self._session.touching, body) < GRIP_FORCE:
             return ""
         self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
+        self._belief.hold(before.carried, self._state)
         (_, first), (_, second), *_ = pressing(self._session.touching, body)
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
 

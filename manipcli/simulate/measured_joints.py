@@ -16,12 +16,14 @@ class MeasuredJoints:
 
     Attributes:
         position, velocity, effort: (n); always the same arrays.
+        known: whether there was a tick.
     """
 
     def __init__(self, joints: int) -> None:
         self._block = np.zeros(3 * joints)
         self.position, self.velocity, self.effort = self._block.reshape(3, joints)
         self._unsensed: npt.NDArray[np.intp] = np.arange(joints)
+        self.known = False
         self._sensors: list[tuple[slice | npt.NDArray[np.intp], Array]] = []
 
     def add(self, joints: Sequence[int], reading: Array) -> None:
@@ -35,6 +37,7 @@ class MeasuredJoints:
 
     def update(self, state: WorldState) -> None:
         """At every tick, after the readings."""
+        self.known = True
         if len(self._unsensed):
             at = self._unsensed
             self.position[at], self.velocity[at], self.effort[at] = (

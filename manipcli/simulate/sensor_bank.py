@@ -140,6 +140,14 @@ class SensorBank:
         """Whether a measurement of a sensor of numbers has arrived since `reset`."""
         return self._each[name].heard
 
+    def positions(self, state: WorldState) -> Array:
+        """(n) the joint positions as the robot knows them: as they are measured, and true for joints without a sensor.
+
+        Args:
+            state: the true one.
+        """
+        return self.joints.position if self.joints is not None and self.joints.known else state.position
+
     def reset(self) -> None:
         """The next tick is tick 0: noise begins again, and what is on its way is dropped."""
         for each in self._each.values():

@@ -188,6 +188,26 @@ def test_the_hand_carries_the_believed_pose_whatever_the_body_does(world: World3
     np.testing.assert_allclose(left, held, atol=1e-12)
 
 
+def test_a_held_body_follows_the_measured_joints(world: World3) -> None:
+    """Encoders with offsets that change between two looks: the belief follows them, wherever the arm truly is."""
+    rng = np.random.default_rng(8)
+    task, scene = world.task, world.task.true.scene
+    n = len(task.robot.joint_names)
+    measured = rng.uniform(-1.0, 1.0, n)
+    belief = Belief(task.scene, scene, world.kinematics, lambda _: measured)
+    state = world.state(np.zeros(n), scene.body("cup").X_WO, scene.body("ball").X_WO)
+    believed = pose(belief.look(state), 0)
+    belief.hold(Carried("cup", "palm", Transform.identity()), state)
+    inverse = np.linalg.inv(matrix(world.kinematics.forward(measured, "palm")))
+    measured = rng.uniform(-1.0, 1.0, n)
+    state = world.state(np.zeros(n), scene.body("cup").X_WO, scene.body("ball").X_WO)
+    held = matrix(world.kinematics.forward(measured, "palm")) @ inverse @ believed
+    np.testing.assert_allclose(pose(belief.look(state), 0), held, atol=1e-12)
+    X_WO = Transform.of(xyz=(0.1, 0.2, 0.3), rpy=(0.4, 0.5, 0.6))
+    belief.update("cup", X_WO, np.eye(6))
+    np.testing.assert_allclose(pose(belief.look(state), 0), matrix(X_WO), atol=1e-12)
+
+
 def test_what_is_inside_moves_with_the_belief_and_is_exact_outside(world: World3) -> None:
     rng = np.random.default_rng(4)
     scene, belief = world.task.true.scene, world.belief

@@ -19,10 +19,12 @@ from manipcli.model.state import Contact
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.run import replan
+from manipcli.run.belief import Belief
 from manipcli.run.execute import build_manager
 from manipcli.run.replan import COMMANDED, Measured, after
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
+from manipcli.simulate.measured_joints import MeasuredJoints
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.step import StepSpec
@@ -99,7 +101,9 @@ def world_at(task: Task, plan: Plan) -> WorldOf:
             period=0.001,
         )  # fmt: skip
         session._touching = (Contact("block", "robot/panda_leftfinger", 5.0, 0.0),)
-        world = World(task, plan, session, Measured(session, plan.planner, ReplanSpec(), physics=True))
+        belief = Belief(task.scene, task.scene, plan.planner.kinematics)
+        measured = Measured(session, plan.planner, ReplanSpec(), physics=True, belief=belief)
+        world = World(task, plan, session, measured)
         world.stand(world.before(step))
         return world
 
@@ -122,6 +126,23 @@ def test_where_all_is_as_planned_nothing_is_told_and_the_situation_is_the_planne
     for here, there in zip(now.bodies, planned.bodies, strict=True):
         np.testing.assert_allclose(here.matrix, there.matrix, atol=1e-12)
     assert (now.carried is None) == (planned.carried is None)
+
+
+def test_the_joints_of_the_situation_are_those_that_sensors_measure(world_at: WorldOf) -> None:
+    """Not the true ones, from the first tick on: encoders with an offset shift the arm and what it carries."""
+    world = world_at(LIFT)
+    planned, sensors = world.before(LIFT), world.session.sensors
+    sensors.joints = MeasuredJoints(len(planned.position))
+    assert np.array_equal(world.measured.situation(planned).position, planned.position)
+    offset = np.zeros(len(planned.position))
+    offset[3] = 0.05
+    sensors.joints.update(world.session.engine.read())
+    sensors.joints.position[:] = planned.position + offset
+    now = world.measured.situation(planned)
+    np.testing.assert_allclose(now.position, planned.position + offset, atol=1e-12)
+    assert now.carried is not None
+    X_WL = world.plan.planner.kinematics.forward(now.position, now.carried.link)
+    np.testing.assert_allclose((X_WL @ now.carried.X_LO).matrix, planned.bodies[0].matrix, atol=1e-9)
 
 
 @pytest.mark.parametrize(("x", "turn"), [(0.0049, 0.0), (0.0, math.radians(1.9))])
@@ -255,7 +276,8 @@ def test_without_physics_bodies_are_where_they_were_predicted(world_at: WorldOf)
     world = world_at(PLACE)
     before = world.before(PLACE)
     world.put("block", shifted(before.bodies[0], 1.0))
-    measured = Measured(world.session, world.plan.planner, ReplanSpec(), physics=False)
+    belief = Belief(world.task.scene, world.task.scene, world.plan.planner.kinematics)
+    measured = Measured(world.session, world.plan.planner, ReplanSpec(), physics=False, belief=belief)
     assert measured.differences(before, measured.situation(before), world.task.spec.steps[PLACE]) == ()
 
 
