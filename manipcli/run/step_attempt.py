@@ -23,6 +23,7 @@ from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.looking import Looking
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
+from manipcli.run.pour_watch import PourWatch
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
 from manipcli.run.step_results import PLACED, counted, from_place, not_placed, not_poured, not_squeezed
@@ -102,6 +103,7 @@ class StepAttempt:
         self._over = False
         self._at: PlannedStep | None = None
         self._attaching = Attaching(session, self._event)
+        self._pour: PourWatch | None = None
         self._looking = Looking(session, plan.planner, belief, recorder)
         self.located = False
 
@@ -114,6 +116,8 @@ class StepAttempt:
         """Update the grasp."""
         if self._physics and self._session.ticks % SLOW == 0:
             self._measured.grasp.look(self._belief.look(state), self._session.touching)
+            if self._pour is not None:
+                self._pour.look(state, self._session.touching)
         self._attaching.look(self._at)
 
     @property
@@ -179,7 +183,10 @@ class StepAttempt:
 
     def _guarded(self, planned: PlannedStep, motions: Lane[MotionEnd], found: str = "") -> Lane[MotionEnd]:
         """The motions of a step, ended by alarms; a failure also reports what was `found`, and saturated joints."""
-        before = saturations_of(self._session)
+        before, plan = saturations_of(self._session), planned.plan
+        pour = None
+        if plan.poured and plan.end.carried is not None:
+            pour = self._pour = PourWatch(self._task.true.scene, plan.end.carried.body, plan.into, plan.poured)
         try:
             end = yield from motions
         except Alarmed as alarm:
@@ -190,9 +197,13 @@ class StepAttempt:
             text = str(failure) + saturated_since(before, self._session)
             self._event("step_ended", planned, "failed", text)
             raise
+        finally:
+            if pour is not None:
+                self._pour = None
         if end.outcome == "done":
             return end
-        return MotionEnd(end.outcome, end.text + found + saturated_since(before, self._session))
+        flown = "" if pour is None or not pour.text() else f"; {pour.text()}"
+        return MotionEnd(end.outcome, end.text + flown + found + saturated_since(before, self._session))
 
     def _motions(
         self, step: StepSpec, planned: PlannedStep, before: PlanningState, executor: Executor, limit: float | None
@@ -255,6 +266,8 @@ class StepAttempt:
         left = left or self._without_result(step, planned)
         if not left and selections(planned.plan.poured) and self._physics:
             texts.append(counted(self._plan.planner, planned.plan, self._measured.situation(planned.plan.end)))
+        stream = planned.plan.stream
+        texts += [f"what is poured {stream.text}"] if stream is not None and stream.moved else []
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
