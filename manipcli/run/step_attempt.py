@@ -16,7 +16,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import Look, Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
-from manipcli.run.awaited import missing, no_longer
+from manipcli.run.awaited import missing, no_longer, sooner
 from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
@@ -26,11 +26,10 @@ from manipcli.run.observer import Progress
 from manipcli.run.pour_watch import PourWatch
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import PLACED, counted, from_place, not_placed, not_poured, not_squeezed
+from manipcli.run.step_results import PLACED, from_place, not_placed, not_poured, not_squeezed, poured_texts
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
-from manipcli.spec.counted import selections
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.plan_steps import PlannedStep
@@ -209,7 +208,7 @@ class StepAttempt:
         self, step: StepSpec, planned: PlannedStep, before: PlanningState, executor: Executor, limit: float | None
     ) -> Lane[MotionEnd]:
         """All motions of the plan, which starts in `before`, and the wait for `until`; both up to `limit` [s]."""
-        deadline = _sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
+        deadline = sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
         if before.carried is not None and self._physics:
             self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
@@ -228,7 +227,7 @@ class StepAttempt:
                 self._attaching.before(motion, planned)
                 over = deadline
                 if motion.awaits and until is not None and step.timeout is None:
-                    over = _sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
+                    over = sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
                 if motion.looks is not None:
                     end = yield from self._look_at(motion.looks, planned, over)
                 else:
@@ -253,7 +252,7 @@ class StepAttempt:
             self._believed = self._looking.corrected(planned.plan)
             if awaited and until is not None:
                 if step.timeout is None:
-                    deadline = _sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
+                    deadline = sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
                 end = yield from executor.waiting(until, deadline=deadline or 0.0)
                 if end.outcome != "done":
                     return replace(end, text=end.text + missing(end, probe))
@@ -264,10 +263,8 @@ class StepAttempt:
             self._measured.grasp.release()
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
-        if not left and selections(planned.plan.poured) and self._physics:
-            texts.append(counted(self._plan.planner, planned.plan, self._measured.situation(planned.plan.end)))
-        stream = planned.plan.stream
-        texts += [f"what is poured {stream.text}"] if stream is not None and stream.moved else []
+        situation = self._measured.situation if self._physics else None
+        texts += poured_texts(self._plan.planner, planned.plan, situation)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
@@ -393,10 +390,6 @@ class StepAttempt:
         self._recorder.event(
             self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
         )
-
-
-def _sooner(a: float | None, b: float | None) -> float | None:
-    return min((one for one in (a, b) if one is not None), default=None)
 
 
 def _moves(planned: PlannedStep) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import radians
 from typing import Final
@@ -16,6 +16,7 @@ from manipcli.model.state import Contact
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.run.replan import between, deg, mm
+from manipcli.spec.counted import selections
 
 PLACED: Final = 0.01
 """[m] A placed object further than this from its planned pose is not placed."""
@@ -70,6 +71,18 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
     where = f"still in '{_held(plan)}'" if first in _kept(planner, plan, now) else f"at {_at(planner, now, first)}"
     counts = f"; {counted(planner, plan, now)}" if len(plan.poured) > 1 else ""
     return f"'{first}' is not in '{plan.into}', it is {where}{counts}"
+
+
+def poured_texts(
+    planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
+) -> list[str]:
+    """What a pour that is done reports: how many bodies are where, and a stream that was moved.
+
+    `situation`: measures the state; None without physics.
+    """
+    counts = [counted(planner, plan, situation(plan.end))] if situation is not None and selections(plan.poured) else []
+    moved = plan.stream is not None and plan.stream.moved
+    return [*counts, *([f"what is poured {plan.stream.text}"] if plan.stream is not None and moved else [])]
 
 
 def counted(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
