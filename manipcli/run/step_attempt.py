@@ -26,10 +26,11 @@ from manipcli.run.observer import Progress
 from manipcli.run.pour_watch import PourWatch
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import PLACED, from_place, not_placed, not_poured, not_squeezed
+from manipcli.run.step_results import PLACED, counted, from_place, not_placed, not_poured, not_squeezed
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
+from manipcli.spec.counted import selections
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.plan_steps import PlannedStep
@@ -263,6 +264,8 @@ class StepAttempt:
             self._measured.grasp.release()
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
+        if not left and selections(planned.plan.poured) and self._physics:
+            texts.append(counted(self._plan.planner, planned.plan, self._measured.situation(planned.plan.end)))
         stream = planned.plan.stream
         texts += [f"what is poured {stream.text}"] if stream is not None and stream.moved else []
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
