@@ -65,7 +65,7 @@ def _step(step: PlannedStep) -> Json:
             {"name": one.name or None, "stage": stage_of(one.refusal.cause), "cause": one.refusal.cause}
             for one in step.dropped
         ],
-        **({} if stream is None else {"stream": asdict(stream)}),
+        "stream": None if stream is None else asdict(stream),
     }
 
 
