@@ -73,6 +73,22 @@ Margins in one unit are compared directly. In a combination of different units e
 tolerance (`within`, `below`, ...; the section of a condition without a tolerance names the divisor). 1 means that the
 whole tolerance is left, and signs are kept: 5 mm of 20 mm left (0.25) is less than 2 deg of 5 deg left (0.4).
 
+## Many bodies
+
+A body with a [`count`](task.md#many-bodies) is named by number, `ball[3]`; `ball[*]` is the selection of all of them.
+Three words take one condition with a selection in place of a body (in quotes: YAML reads brackets as a list):
+
+```yaml
+  - at_least: {n: 18, meet: {inside: {object: 'ball[*]', of: tray}}}
+  - all_of: {at_rest: {object: 'ball[*]'}}
+  - any_of: {inside: {object: 'ball[*]', of: cup}}
+```
+
+The margin is the n-th greatest of those of the bodies (the least for `all_of`, the greatest for `any_of`), so it is 0
+or more exactly if the condition holds for as many. Reports show how many hold, and the body that decides.
+
+## Not evaluated
+
 An expectation that cannot be evaluated is `not_evaluated`, which does not pass, and reports the reason: a step that
 never ran, an engine without physics (no motion of objects, no efforts, ideal tracking), a topic missing in the log, an
 object that was never held, a state that is not finite. A combination with one such member is `not_evaluated`, whatever

@@ -5,7 +5,8 @@ from __future__ import annotations
 from manipcli.conditions.formula import Seams, scopes
 from manipcli.core.prose import amount, listing, named, sentence
 from manipcli.model.robot import RobotModel
-from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec
+from manipcli.spec.condition import END, SELECTING, AtLeastSpec, ConditionSpec, ExpectationSpec
+from manipcli.spec.counted import selected
 
 
 def condition_clause(spec: ConditionSpec, robot: RobotModel, seam: Seams) -> str:
@@ -18,6 +19,17 @@ def condition_clause(spec: ConditionSpec, robot: RobotModel, seam: Seams) -> str
         return f"it is not true that {inner[0]}"
     if spec.name == "believed":
         return f"the robot believes that {inner[0]}"
+    if spec.name in SELECTING:
+        (selection,) = selected(spec.members[0]) or ("",)
+        body = spec.body if spec.name == "at_least" else None
+        many = (
+            f"at least {body.n}"
+            if isinstance(body, AtLeastSpec)
+            else "all"
+            if spec.name == "all_of"
+            else "at least one"
+        )
+        return f"for {many} of {named(selection)}, {inner[0]}"
     if len(inner) == 1:
         return inner[0]
     if any(len(member.members) > 1 for member in spec.members):

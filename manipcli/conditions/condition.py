@@ -20,6 +20,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
+from manipcli.spec.counted import one_of_many
 
 if TYPE_CHECKING:
     from manipcli.model.kinematics import Kinematics
@@ -186,6 +187,8 @@ def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) ->
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
         return ()
+    if (several := one_of_many(name, known)) is not None:
+        return (Problem(loc, *several),)
     word = "a movable body of the scene" if movable else "in the scene"
     body, _, part = name.partition("/")
     apart = (

@@ -1,4 +1,5 @@
-"""Combinations of conditions: monitors, checks and scopes of formulas with `all`, `any`, `not` and `believed`.
+"""Combinations of conditions: monitors, checks and scopes of formulas with `all`, `any`, `not`, `believed`, and of one
+condition over the bodies of a selection, `all_of`, `any_of`, `at_least`.
 
 all: [{upright: {...}}, {any: [{near: {...}}, {not: {inside: {...}}}]}]
 """
@@ -9,11 +10,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from manipcli.conditions.condition import CheckContext, Condition, Monitor, Problem, Scope, World
-from manipcli.conditions.robustness import Robustness, greatest, least, named, opposite
+from manipcli.conditions.robustness import Robustness, greatest, least, named, nth_greatest, opposite
+from manipcli.conditions.selection import each, least_number, selection_problems
 from manipcli.conditions.state_window import StateWindow
-from manipcli.core.errors import Loc
 from manipcli.core.registry import Seam
-from manipcli.spec.condition import SINGLE, ConditionSpec
+from manipcli.scene.scene import Scene
+from manipcli.spec.condition import SELECTING, ConditionSpec
 
 # Any: the members of a seam have different specs; each is called with its own.
 Seams = Seam[Condition[Any]]
@@ -27,6 +29,8 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
         return monitor
     if spec.name == "believed":
         return believing(spec.members[0], world, seam)
+    if spec.name in SELECTING:
+        return over_selection(spec, world, seam)
     members = [_named(member, opened(member, world, seam)) for member in spec.members]
 
     def look(window: StateWindow) -> Robustness:
@@ -52,7 +56,7 @@ def _named(spec: ConditionSpec, monitor: Monitor) -> Monitor:
 
 def absent(spec: ConditionSpec, world: World, seam: Seams) -> str | None:
     """Why the first of its conditions that cannot be evaluated in this world cannot; None if all can."""
-    for leaf in leaves(spec):
+    for leaf in leaves(spec, world.scene):
         reason: str | None = seam[leaf.name].absent(leaf.body, world)
         if reason is not None:
             return reason
@@ -63,8 +67,9 @@ def problems(spec: ConditionSpec, context: CheckContext, seam: Seams) -> tuple[P
     """Every unknown name in it; `loc` begins with the name of the condition."""
     found: list[Problem] = []
     if spec.combines:
-        for k, member in enumerate(spec.members):
-            loc: Loc = (spec.name,) if spec.name in SINGLE else (spec.name, k)
+        if spec.name in SELECTING:
+            return selection_problems(spec, context, lambda member: problems(member, context, seam))
+        for loc, member in zip(spec.where, spec.members, strict=True):
             found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(member, context, seam)]
         return tuple(found)
     own = seam[spec.name].check(spec.body, context)
@@ -90,9 +95,22 @@ def sensors_of(spec: ConditionSpec, seam: Seams) -> tuple[str, ...]:
     return tuple(dict.fromkeys(sensor(body) for sensor, body in asked if sensor is not None))
 
 
-def leaves(spec: ConditionSpec) -> Iterator[ConditionSpec]:
-    """The conditions in it, without combinations."""
+def leaves(spec: ConditionSpec, scene: Scene | None = None) -> Iterator[ConditionSpec]:
+    """The conditions in it, without combinations; with a `scene`, one for each body of a selection."""
     if not spec.combines:
         yield spec
     for member in spec.members:
-        yield from leaves(member)
+        chosen = each(spec, scene) if scene is not None and spec.name in SELECTING else (member,)
+        for one in chosen:
+            yield from leaves(one, scene)
+
+
+def over_selection(spec: ConditionSpec, world: World, seam: Seams) -> Monitor:
+    """The monitor of a condition over the bodies of a selection: the n-th greatest of their margins."""
+    monitors = [_named(member, opened(member, world, seam)) for member in each(spec, world.scene)]
+    wanted = least_number(spec, len(monitors))
+
+    def look(window: StateWindow) -> Robustness:
+        return nth_greatest([monitor(window) for monitor in monitors], wanted)
+
+    return look

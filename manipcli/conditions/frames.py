@@ -15,6 +15,7 @@ from manipcli.model.batch_motion import frames
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import BodyPose, WorldState, body_pose
 from manipcli.scene.scene import SEPARATOR, Scene
+from manipcli.spec.counted import one_of_many
 
 WORDS: Final = ("world", "base", "tool")
 """Frames that every task has."""
@@ -62,6 +63,8 @@ def unknown_frame(robot: RobotModel, scene: Scene, name: str, loc: Loc) -> tuple
     if name in (*WORDS, *bodies) or scene.frame(name) is not None:
         return ()
     owner, separator, part = name.rpartition(SEPARATOR)
+    if (several := one_of_many(owner if separator else name, bodies)) is not None:
+        return (Problem(loc, *several),)
     if owner == ROBOT and separator:
         links = [link.name for link in robot.links]
         if part in links:

@@ -137,6 +137,32 @@ def greatest(readings: Sequence[Robustness]) -> Robustness:
     return _picked(readings, np.argmax)
 
 
+def nth_greatest(readings: Sequence[Robustness], n: int) -> Robustness:
+    """`at_least`: the n-th greatest margin of each tick; NaN if a member has it.
+
+    The text is that of the deciding member, after the number of members that hold.
+    """
+
+    def pick(values: Array, *, axis: int) -> npt.NDArray[np.intp]:
+        ranked = np.argsort(-values, axis=axis, kind="stable")[n - 1]
+        return np.asarray(
+            np.where(np.isnan(values).any(axis=axis), np.argmax(values, axis=axis), ranked), dtype=np.intp
+        )
+
+    return _counting(_picked(readings, pick), readings)
+
+
+def _counting(of: Robustness, readings: Sequence[Robustness]) -> Robustness:
+    """The same; its texts begin with the number of members that hold."""
+
+    def found(k: int) -> Measured:
+        measured = of.found(k)
+        holding = sum(bool(reading.margins[k] >= 0.0) for reading in readings)
+        return replace(measured, text=f"{holding} of {len(readings)}: {measured.text}")
+
+    return replace(of, found=found)
+
+
 def opposite(of: Robustness, *, word: str = "not ") -> Robustness:
     """`not`: the negated margin, at most -`EDGE` where `of` holds; `word` is put before the text."""
 

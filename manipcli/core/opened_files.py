@@ -40,6 +40,8 @@ def _install() -> None:
     def hook(event: str, arguments: tuple[object, ...]) -> None:
         if event == "open" and _recording and isinstance(arguments[0], str | bytes):
             path = Path(os.fsdecode(arguments[0])).absolute()
+            if path.parent.name == "__pycache__":  # written by the first import of a module
+                return
             for stamps in _recording:
                 stamps.setdefault(path, stamp(path))
 
@@ -47,7 +49,7 @@ def _install() -> None:
 
 
 def opened_by(call: Callable[[], T]) -> tuple[T, OpenedFiles]:
-    """Calls, and records every file that Python opens meanwhile, for reading or writing.
+    """Calls, and records every file that Python opens meanwhile, for reading or writing, but for its compiled modules.
 
     A file is stamped before it is read: if it changes meanwhile, the stamp is that of the older content.
     """

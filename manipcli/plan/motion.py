@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -162,6 +163,36 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
+class Stream:
+    """Where what is poured is predicted to pass the plane of the receiver's rim.
+
+    Attributes:
+        beyond: [m] of its middle beyond the middle of the opening, in the direction of the pour.
+        spread: [m] by which the landing is uncertain.
+        margin: [m] from the outermost body to the wall of the opening, less the spread; negative: it may miss.
+        speed: [m/s] with which the fastest body leaves the rim.
+        tilt: [rad] of the cup when the last body leaves it.
+        moved: whether the lip was moved, or the tilt slowed down, for it.
+    """
+
+    beyond: float
+    spread: float
+    margin: float
+    speed: float
+    tilt: float
+    moved: bool = False
+
+    @property
+    def text(self) -> str:
+        """`is to land 1.2 mm beyond the centre, uncertain by 14.0 mm: margin 12.5 mm to the rim; it leaves at ...`."""
+        side = "beyond" if self.beyond >= 0.0 else "before"
+        aim = "; the lip and the speed are chosen for it" if self.moved else ""
+        uncertain = f"uncertain by {1000.0 * self.spread:.1f} mm: margin {1000.0 * self.margin:.1f} mm to the rim"
+        leaves = f"it leaves at {self.speed:.2f} m/s, tilted {math.degrees(self.tilt):.0f} deg"
+        return f"is to land {1000.0 * abs(self.beyond):.1f} mm {side} the centre, {uncertain}; {leaves}{aim}"
+
+
+@dataclass(frozen=True, slots=True)
 class StepPlan:
     """The motions of one step, and the state after them.
 
@@ -170,6 +201,7 @@ class StepPlan:
         end: the state after them.
         placed: the body that it sets down at its pose in `end`; "" for none.
         poured: the bodies that it pours into the container `into`.
+        stream: where they land; None if the plan does not predict it.
     """
 
     motions: tuple[Motion, ...]
@@ -177,6 +209,7 @@ class StepPlan:
     placed: str = ""
     poured: tuple[str, ...] = ()
     into: str = ""
+    stream: Stream | None = None
 
     @property
     def duration(self) -> float:

@@ -24,7 +24,7 @@ from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.letting_go import refuse_pressing
 from manipcli.plan.limit_check import verify
 from manipcli.plan.line import Walk
-from manipcli.plan.motion import CLOSING, LOOKING, OPENING, Grip, Look, Motion, PlanningState, Reflex, StepPlan
+from manipcli.plan.motion import CLOSING, LOOKING, OPENING, Grip, Look, Motion, PlanningState, StepPlan
 from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.path import follow_poses, joint_path, linear_path, rotated
 from manipcli.plan.planner import NOTHING, Pairs, Planner
@@ -225,10 +225,7 @@ class MotionBuilder:
             timed.refuse_violation(self._planner, self._now, label, trajectory)
         self._add(label, trajectory, None)
 
-    def close(
-        self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "",
-        reflex: Reflex | None = None,
-    ) -> None:  # fmt: skip
+    def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
         """Close the hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
         The fingers are predicted to stop where the first link of each touches the body, or any if it is not known.
@@ -239,7 +236,6 @@ class MotionBuilder:
             must_hold: whether holding nothing is a failure.
             body: what it closes on, if known.
             roomier: the hint if the fingers are in collision: how to grasp where they have more room.
-            reflex: while the hand holds.
 
         Raises:
             NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and does not touch it.
@@ -251,7 +247,6 @@ class MotionBuilder:
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise no_gripper(posture)
-        grip = replace(grip, reflex=reflex)
         before, duration = self._now, grip_time(planner, self._now, grip)
         if body is None:
             self._now = replace(before.moved(blindly_closed(planner, before, grip)), closed=True)

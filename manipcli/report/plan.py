@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TextIO
 
 from manipcli.core.geometry import Array
@@ -55,6 +56,7 @@ def _path(plan: Plan) -> dict[str, Json]:
 
 
 def _step(step: PlannedStep) -> Json:
+    stream = step.plan.stream
     return {
         "id": step.id,
         "verb": step.verb,
@@ -63,6 +65,7 @@ def _step(step: PlannedStep) -> Json:
             {"name": one.name or None, "stage": stage_of(one.refusal.cause), "cause": one.refusal.cause}
             for one in step.dropped
         ],
+        "stream": None if stream is None else asdict(stream),
     }
 
 

@@ -34,6 +34,8 @@ def render_text(task: str, plan: Plan, *, every: bool = False) -> str:
             parts += [_motions(part, margins), _margins(part, margins)]
     parts.append("\n".join(_stated(plan, each) for each in plan.stated_clearances()))
     parts.append(_grasps(plan))
+    poured = [(step, step.plan.stream) for step in plan.every if step.plan.stream is not None]
+    parts.append("\n".join(f"{step.id}: what is poured {stream.text}" for step, stream in poured))
     chosen = [step for step in plan.every if step.dropped and step.candidate]
     parts.append("\n".join(f"{step.id} takes candidate {len(step.dropped) + 1}: {step.candidate}" for step in chosen))
     parts.append(render_refused(by_stage([(step.id, one) for step in plan.every for one in step.dropped]), every=every))

@@ -1,4 +1,4 @@
-"""Texts of an `until` that does not hold."""
+"""Deadlines, and texts of an `until` that does not hold."""
 
 from __future__ import annotations
 
@@ -17,3 +17,8 @@ def no_longer(motion: Motion, probe: Probe | None) -> str:
     """By how much the `until` of a guarded motion fails at rest, after a bounce; "" if it holds."""
     missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
     return f"; at rest {missing}" if missing else ""
+
+
+def sooner(a: float | None, b: float | None) -> float | None:
+    """The earlier of two deadlines [s]; None: no deadline."""
+    return min((one for one in (a, b) if one is not None), default=None)

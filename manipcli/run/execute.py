@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,10 +26,9 @@ from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
 from manipcli.run.restore import restore_belief, restore_controllers, scene_at
 from manipcli.run.saturation_counts import saturations_of
+from manipcli.run.settling import settle
 from manipcli.run.step_loop import StepLoop
-from manipcli.scene.drop_test import SETTLED_SHIFT
 from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.executor import Executor
 from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.sensor import Picture
 from manipcli.simulate.sensor_layout import sensed_by_name
@@ -38,9 +37,6 @@ from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 S = TypeVar("S", bound=Session)
-
-SETTLED_SPEED: Final = 0.02
-"""Bodies slower than this [m/s] have settled."""
 
 
 def build_manager(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
@@ -144,7 +140,7 @@ def open_session(task: Task, plan: Plan, manager: ControllerManager, kind: type[
                 seed=simulation.seed,
             )
             if state is None:
-                _settle(task, session)
+                settle(task, session)
             else:
                 restore_controllers(session, state)
             yield session
@@ -198,32 +194,3 @@ def live_world(task: Task, session: Session, belief: Belief) -> World:
         period=task.spec.simulation.control_period,
         sensors=sensed_by_name(task.sensors, task.true.robot, task.true.scene),
     )
-
-
-def _settle(task: Task, session: Session) -> None:
-    """Let all bodies settle, and refuse a start from which a body slides, falls or is thrown.
-
-    Raises:
-        SimulationFailed: names the body, and how far or how fast it moved.
-    """
-    try:
-        Executor(session).hold(task.spec.simulation.settle)
-    except SimulationFailed as failed:
-        what, mark, advice = failed.cause.partition("; ")
-        cause = f"{what} while settling before the start{mark}{advice}"
-        raise SimulationFailed(cause, time=failed.time) from failed
-    state = session.engine.read()
-    for k, body in enumerate(task.true.scene.movable):
-        shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))
-        speed = float(np.linalg.norm(state.body_linear[k]))
-        if not shift < SETTLED_SHIFT:
-            raise SimulationFailed(
-                f"'{body.name}' moved {1000 * shift:.1f} mm while settling, the limit is {1000 * SETTLED_SHIFT:g} mm: "
-                "it overlaps another body, has no support, or was hit",
-                time=0.0,
-            )
-        if not speed < SETTLED_SPEED:
-            raise SimulationFailed(
-                f"'{body.name}' still moves at {speed:.3g} m/s after settling, the limit is {SETTLED_SPEED:g} m/s",
-                time=0.0,
-            )

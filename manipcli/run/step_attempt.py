@@ -16,16 +16,17 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import Look, Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
-from manipcli.run.awaited import missing, no_longer
+from manipcli.run.awaited import missing, no_longer, sooner
 from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.looking import Looking
 from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
+from manipcli.run.pour_watch import PourWatch
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import PLACED, from_place, not_placed, not_poured, not_squeezed
+from manipcli.run.step_results import PLACED, from_place, not_placed, not_poured, not_squeezed, poured_texts
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -101,6 +102,7 @@ class StepAttempt:
         self._over = False
         self._at: PlannedStep | None = None
         self._attaching = Attaching(session, self._event)
+        self._pour: PourWatch | None = None
         self._looking = Looking(session, plan.planner, belief, recorder)
         self.located = False
 
@@ -113,6 +115,8 @@ class StepAttempt:
         """Update the grasp."""
         if self._physics and self._session.ticks % SLOW == 0:
             self._measured.grasp.look(self._belief.look(state), self._session.touching)
+            if self._pour is not None:
+                self._pour.look(state, self._session.touching)
         self._attaching.look(self._at)
 
     @property
@@ -178,7 +182,10 @@ class StepAttempt:
 
     def _guarded(self, planned: PlannedStep, motions: Lane[MotionEnd], found: str = "") -> Lane[MotionEnd]:
         """The motions of a step, ended by alarms; a failure also reports what was `found`, and saturated joints."""
-        before = saturations_of(self._session)
+        before, plan = saturations_of(self._session), planned.plan
+        pour = None
+        if plan.poured and plan.end.carried is not None:
+            pour = self._pour = PourWatch(self._task.true.scene, plan.end.carried.body, plan.into, plan.poured)
         try:
             end = yield from motions
         except Alarmed as alarm:
@@ -189,15 +196,19 @@ class StepAttempt:
             text = str(failure) + saturated_since(before, self._session)
             self._event("step_ended", planned, "failed", text)
             raise
+        finally:
+            if pour is not None:
+                self._pour = None
         if end.outcome == "done":
             return end
-        return MotionEnd(end.outcome, end.text + found + saturated_since(before, self._session))
+        flown = "" if pour is None or not pour.text() else f"; {pour.text()}"
+        return MotionEnd(end.outcome, end.text + flown + found + saturated_since(before, self._session))
 
     def _motions(
         self, step: StepSpec, planned: PlannedStep, before: PlanningState, executor: Executor, limit: float | None
     ) -> Lane[MotionEnd]:
         """All motions of the plan, which starts in `before`, and the wait for `until`; both up to `limit` [s]."""
-        deadline = _sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
+        deadline = sooner(None if step.timeout is None else self._session.time + step.timeout, limit)
         if before.carried is not None and self._physics:
             self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
@@ -216,7 +227,7 @@ class StepAttempt:
                 self._attaching.before(motion, planned)
                 over = deadline
                 if motion.awaits and until is not None and step.timeout is None:
-                    over = _sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
+                    over = sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
                 if motion.looks is not None:
                     end = yield from self._look_at(motion.looks, planned, over)
                 else:
@@ -241,7 +252,7 @@ class StepAttempt:
             self._believed = self._looking.corrected(planned.plan)
             if awaited and until is not None:
                 if step.timeout is None:
-                    deadline = _sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
+                    deadline = sooner(deadline, self._session.time + DEFAULT_UNTIL_TIME)
                 end = yield from executor.waiting(until, deadline=deadline or 0.0)
                 if end.outcome != "done":
                     return replace(end, text=end.text + missing(end, probe))
@@ -252,6 +263,8 @@ class StepAttempt:
             self._measured.grasp.release()
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
+        situation = self._measured.situation if self._physics else None
+        texts += poured_texts(self._plan.planner, planned.plan, situation)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
@@ -377,10 +390,6 @@ class StepAttempt:
         self._recorder.event(
             self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
         )
-
-
-def _sooner(a: float | None, b: float | None) -> float | None:
-    return min((one for one in (a, b) if one is not None), default=None)
 
 
 def _moves(planned: PlannedStep) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import radians
 from typing import Final
+
+import numpy as np
 
 from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pressing
@@ -13,6 +16,7 @@ from manipcli.model.state import Contact
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.run.replan import between, deg, mm
+from manipcli.spec.counted import selections
 
 PLACED: Final = 0.01
 """[m] A placed object further than this from its planned pose is not placed."""
@@ -63,12 +67,58 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
     missing = [name for name in plan.poured if name not in inside]
     if not missing:
         return ""
-    held = plan.end.carried.body if plan.end.carried is not None else ""
-    kept = set(planner.contents(now, held)) if held else set()
-    where = {name: f"still in '{held}'" if name in kept else f"at {_at(planner, now, name)}" for name in missing}
     first = missing[0]
-    more = f"; {len(missing)} of {len(plan.poured)} bodies are not" if len(plan.poured) > 1 else ""
-    return f"'{first}' is not in '{plan.into}', it is {where[first]}{more}"
+    where = f"still in '{_held(plan)}'" if first in _kept(planner, plan, now) else f"at {_at(planner, now, first)}"
+    counts = f"; {counted(planner, plan, now)}" if len(plan.poured) > 1 else ""
+    return f"'{first}' is not in '{plan.into}', it is {where}{counts}"
+
+
+def poured_texts(
+    planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
+) -> list[str]:
+    """What a pour that is done reports: how many bodies are where, and a stream that was moved.
+
+    `situation`: measures the state; None without physics.
+    """
+    counts = [counted(planner, plan, situation(plan.end))] if situation is not None and selections(plan.poured) else []
+    moved = plan.stream is not None and plan.stream.moved
+    return [*counts, *([f"what is poured {plan.stream.text}"] if plan.stream is not None and moved else [])]
+
+
+def counted(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
+    """Where the bodies are that a step pours: `18 of 20 in 'tray', 1 still in 'cup', 1 on 'desk'`."""
+    inside = set(planner.contents(replace(now, carried=None), plan.into))
+    kept = _kept(planner, plan, now)
+    others = Counter(
+        f"still in '{_held(plan)}'" if name in kept else _below(planner, now, name)
+        for name in plan.poured
+        if name not in inside
+    )
+    arrived = sum(name in inside for name in plan.poured)
+    rest = (f"{number} {where}" for where, number in sorted(others.items()))
+    return ", ".join((f"{arrived} of {len(plan.poured)} in '{plan.into}'", *rest))
+
+
+def _held(plan: StepPlan) -> str:
+    return plan.end.carried.body if plan.end.carried is not None else ""
+
+
+def _kept(planner: Planner, plan: StepPlan, now: PlanningState) -> set[str]:
+    """What is still in the body that a step pours from."""
+    return set(planner.contents(now, _held(plan))) if _held(plan) else set()
+
+
+def _below(planner: Planner, now: PlanningState, name: str) -> str:
+    """`on 'desk'`: the highest fixed body whose bounding box is below the centre of a body; else `elsewhere`."""
+    body = planner.scene.body(name)
+    p = planner.body_pose(now, name).apply(body.centre)
+    found: list[tuple[float, str]] = []
+    for other in planner.scene.bodies:
+        half = np.abs(other.X_WO.R) @ other.size / 2.0
+        away = p - other.X_WO.apply(other.centre)
+        if other.fixed and bool(np.all(np.abs(away[:2]) <= half[:2])) and away[2] >= half[2]:
+            found.append((float(half[2] - away[2]), other.name))
+    return f"on '{max(found)[1]}'" if found else "elsewhere"
 
 
 def not_squeezed(contacts: Sequence[Contact], body: str) -> str:

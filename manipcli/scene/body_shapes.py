@@ -28,6 +28,7 @@ COLORS: dict[str, Rgba] = {
     "urdf": (0.70, 0.66, 0.58, 1.0),
 }
 """By kind of body; `desk` is a fixed box."""
+FLOOR_SIZE = (10.0, 10.0, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,17 @@ class BodyShape:
     radius: float | None = None
     flat_top: bool = False
     inertial: Inertial | None = None
+
+
+def floor() -> BodyShape:
+    # A thick box instead of PyBullet's plane: the same body for contact, collision checks and drawing.
+    return BodyShape(
+        geometries=(Geometry(X_LS=Transform.identity(), shape=Box(FLOOR_SIZE), rgba=COLORS["floor"]),),
+        interior=None,
+        size=frozen(FLOOR_SIZE),
+        centre=frozen(np.zeros(3)),
+        flat_top=True,
+    )
 
 
 def box(spec: BoxSpec, rgba: Rgba) -> BodyShape:

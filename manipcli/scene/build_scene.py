@@ -13,21 +13,23 @@ from manipcli.description.elements import Inertial
 from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape, too_big
-from manipcli.scene.drop_test import FORMED, drop_height
+from manipcli.scene.drop_test import FORMED, bottom, drop_height
+from manipcli.scene.layers import Layers
 from manipcli.scene.mass_properties import union
 from manipcli.scene.named_frames import in_owner, named_frames, owner
 from manipcli.scene.scene import Body, Scene
-from manipcli.scene.scene_names import Locate, misnamed
+from manipcli.scene.scene_names import Locate, miscounted, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
+from manipcli.shapes.primitives import Cylinder, Rgba
 from manipcli.spec.base import Model
+from manipcli.spec.counted import flat_scene, group, written
+from manipcli.spec.explain import distinct
 from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "frame", "at", "yaw")
-FLOOR_SIZE = (10.0, 10.0, 0.1)
 LONGEST = 10.0
 """[m] Longest movable body: a longer one was probably meant in millimetres."""
 _SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
@@ -56,10 +58,12 @@ class _Builder:
     """Builds one scene and collects the findings of all bodies."""
 
     def __init__(self, spec: TaskSpec, place: Locate, packages: Packages) -> None:
-        self.spec = spec
-        self.place = place
+        self.counted = {name: body for name, body in spec.scene.items() if body.count is not None}
+        self.spec = spec.model_copy(update={"scene": flat_scene(spec.scene)}) if self.counted else spec
+        self.place: Locate = (lambda loc: place(written(loc, spec.scene))) if self.counted else place
+        self.layers = Layers(self.counted, spec.simulation.seed if self.counted else 0)
         self.packages = packages
-        self.findings = list(misnamed(spec, place))
+        self.findings = list(distinct((*misnamed(self.spec, self.place), *miscounted(spec, place))))
         self.shapes: dict[str, BodyShape] = {}
         self.kinds: dict[str, str] = {}
         self.poses: dict[str, Transform] = {}
@@ -69,8 +73,8 @@ class _Builder:
     def build(self) -> Scene:
         bodies: list[Body] = []
         if self.spec.floor:
-            self._add_shape("floor", "floor", _floor_shape())
-            self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -FLOOR_SIZE[2] / 2.0))
+            self._add_shape("floor", "floor", body_shapes.floor())
+            self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -body_shapes.FLOOR_SIZE[2] / 2.0))
             bodies.append(self._body("floor", BodySpec(fixed=True), self.poses["floor"]))
         for name, body in self.spec.scene.items():
             self._shape(name, body)
@@ -257,9 +261,27 @@ class _Builder:
         X_WB = self._pose(other) if known else None
         if X_WB is None or name not in self.shapes or other not in self.shapes:
             return None
+        if (owner := group(name, self.counted)) is not None:
+            return self._layered(name, owner, spec, other, X_WB)
         if word == "inside":
             return self._inside(name, spec, other, X_WB)
         return self._resting(name, spec, other, X_WB)
+
+    def _layered(self, name: str, owner: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
+        """X_WO of a body of a `count`: at its place in the layers, which begin above earlier ones in a container."""
+        interior = self.shapes[other].interior if spec.inside is not None else None
+        if spec.inside is not None and (interior is None or spec.at is not None):
+            return self._inside(name, spec, other, X_WB)  # refused there, or by `miscounted`
+        cell = self.layers.cell(name, owner, self.shapes[name], other, interior)
+        if isinstance(cell, int):
+            message = f"only {cell} of {self.counted[owner].count} '{owner}' fit into '{other}'"
+            hint = "write a smaller `count`, or use a larger container: a tenth of their size is between them"
+            self._error("TASK293", message, ("scene", owner, "count"), hint)
+            return None
+        x, y = spec.at or (0.0, 0.0)
+        moved = spec.model_copy(update={"at": (x + cell.x, y + cell.y)})
+        X_WO = (self._resting if spec.inside is None else self._inside)(name, moved, other, X_WB)
+        return None if X_WO is None else Transform.of(xyz=(0.0, 0.0, cell.lift)) @ X_WO
 
     def _frame_pose(self, name: str) -> Transform | None:
         """X_WF of the `frame` of a body at the start; None with a finding, here or elsewhere."""
@@ -296,7 +318,7 @@ class _Builder:
             x, y, _ = X_WF.apply([*at, 0.0])
             at, yaw = (float(x), float(y)), yaw + float(X_WF.rpy[2])
         top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
-        X_WO = Transform.of(xyz=(*at, top - _bottom(shape)), rpy=(0.0, 0.0, yaw))
+        X_WO = Transform.of(xyz=(*at, top - bottom(shape, Transform.identity())), rpy=(0.0, 0.0, yaw))
         x, y = X_WB.inverse().apply(X_WO.p)[:2] - support.centre[:2]
         beside = (
             np.hypot(x, y) > support.radius
@@ -343,12 +365,18 @@ class _Builder:
             self._error("TASK224", message, ("scene", name, "at"), hint)
             return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
-        return X_WB @ interior.X_OS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        return (
+            X_WB
+            @ interior.X_OS
+            @ Transform.of(xyz=(x, y, -floor / 2.0 - bottom(shape, Transform.identity())), rpy=(0.0, 0.0, spec.yaw))
+        )
 
     # -- findings
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
-        self.findings.append(Diagnostic(code=code, message=message, place=self.place(loc), hint=hint))
+        place = self.place(loc)
+        if not self.counted or all((found.code, found.place) != (code, place) for found in self.findings):
+            self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint))
 
 
 def _written(value: object, loc: Loc) -> Iterator[Loc]:
@@ -368,21 +396,5 @@ def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
     if shape.inertial is None:
         return union(shape.geometries, spec.mass or 1.0)  # a missing mass is already reported
     mass = spec.mass or shape.inertial.mass
-    scale = mass / shape.inertial.mass
-    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=frozen(shape.inertial.inertia * scale))
-
-
-def _floor_shape() -> BodyShape:
-    # A thick box instead of PyBullet's plane: the same body for contact, collision checks and drawing.
-    return BodyShape(
-        geometries=(Geometry(X_LS=Transform.identity(), shape=Box(FLOOR_SIZE), rgba=COLORS["floor"]),),
-        interior=None,
-        size=frozen(FLOOR_SIZE),
-        centre=frozen(np.zeros(3)),
-        flat_top=True,
-    )
-
-
-def _bottom(shape: BodyShape) -> float:
-    """Lowest z [m] of the shape in O."""
-    return float(shape.centre[2] - shape.size[2] / 2.0)
+    inertia = frozen(shape.inertial.inertia * (mass / shape.inertial.mass))
+    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=inertia)

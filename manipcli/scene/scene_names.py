@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.text import did_you_mean
 from manipcli.scene.scene import FACES, RIM, SEPARATOR
+from manipcli.spec.counted import members
 from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
@@ -46,6 +47,35 @@ def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
             yield Diagnostic("TASK227", message, place(("frames", name, "parent")), hint=other)
         elif frame.parent not in ("world", *bodies):
             yield _unknown("TASK227", frame.parent, ("world", *bodies), place(("frames", name, "parent")))
+
+
+def miscounted(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
+    """TASK220: invalid name of a body with a `count`. TASK294: a key that does not go with `count`, or `grid` alone."""
+    flat = [name for name, body in spec.scene.items() if body.count is None]
+    for name, body in spec.scene.items():
+        if body.count is None:
+            if body.grid is not None:
+                hint = "add `count: 20`, or remove `grid`"
+                yield Diagnostic(
+                    "TASK294", f"body '{name}' has `grid` without `count`", place(("scene", name, "grid")), hint
+                )
+            continue
+        if name in RESERVED or "[" in name:
+            why = "'[' is not allowed with `count`" if "[" in name else "the name is reserved"
+            yield Diagnostic("TASK220", f"invalid name of a body: '{name}': {why}", place(("scene", name)), "rename it")
+        for taken in (one for one in members(name, body.count) if one in flat):
+            message = f"body '{taken}' is already one of the {body.count} bodies '{name}'"
+            yield Diagnostic("TASK294", message, place(("scene", taken)), hint="rename one of them")
+        at_inside = body.at is not None and body.inside is not None
+        for key, given, why in (
+            ("pose", body.pose is not None, "write `inside: CONTAINER`, or `rests_on: BODY` with `at: [x, y]`"),
+            ("at", at_inside, "remove `at`: they fill the container from its floor"),
+            ("fixed", body.fixed, "remove `fixed`: they fall and settle before the start"),
+            ("known", body.known is not None, "remove `known`: they are known exactly, relative to their container"),
+        ):
+            if given:
+                message = f"body '{name}' has both `count` and `{key}`"
+                yield Diagnostic("TASK294", message, place(("scene", name, key)), hint=why)
 
 
 def parts_of(body: BodySpec) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
+from manipcli.core.errors import Loc
 from manipcli.spec.base import Model, problem
 from manipcli.spec.names import StepName
 from manipcli.spec.quantity import Time
@@ -30,9 +31,16 @@ COMBINATIONS = {
     "any": "At least one of these conditions holds.",
     "not": "This condition does not hold.",
     "believed": "This condition holds for the poses that the robot believes, not for the true ones.",
+    "all_of": "This condition, which names a selection such as `ball[*]`, holds for each of its bodies.",
+    "any_of": "This condition, which names a selection such as `ball[*]`, holds for at least one of its bodies.",
+    "at_least": "A condition that names a selection such as `ball[*]` holds for at least `n` of its bodies.",
 }
-SINGLE = ("not", "believed")
+SINGLE = ("not", "believed", "all_of", "any_of")
 """Combinations of one condition."""
+SELECTING = ("all_of", "any_of", "at_least")
+"""Combinations of one condition over the bodies of a selection."""
+MEET = "meet"
+"""Key of the condition in `at_least`."""
 QUANTIFIERS = {
     "always": "This condition holds all the time.",
     "never": "This condition never holds.",
@@ -76,7 +84,22 @@ class ConditionSpec(KeyedSpec):
         if not self.combines:
             return ()
         found = getattr(self, self.word)
+        if isinstance(found, AtLeastSpec):
+            return (getattr(found, MEET),)
         return (found,) if self.word in SINGLE else found
+
+    @property
+    def where(self) -> tuple[Loc, ...]:
+        """Where each of the members is written in this condition."""
+        if self.word == "at_least":
+            return ((self.word, MEET),)
+        return ((self.word,),) if self.word in SINGLE else tuple((self.word, k) for k in range(len(self.members)))
+
+
+class AtLeastSpec(Model):
+    """At least `n` of the bodies of a selection meet a condition."""
+
+    n: Annotated[int, Field(ge=1, description="Least number of bodies, up to that of the selection.")]
 
 
 class ExpectationSpec(ConditionSpec):

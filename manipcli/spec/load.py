@@ -15,6 +15,7 @@ from manipcli.core.text import any_of, escape, listed, nearest_file
 from manipcli.spec.base import Model
 from manipcli.spec.condition import ID_HINT
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.counted import flat_names
 from manipcli.spec.dropped import faults
 from manipcli.spec.explain import distinct
 from manipcli.spec.expression import substitute
@@ -210,7 +211,7 @@ def _flat_source(
     refused = {finding.place for finding in in_text if finding.place is not None}
     root, scope = substitute(source.root, refused=refused)
     scene = child(root, "scene")
-    bodies = tuple(scene.entries) if isinstance(scene, MappingNode) else ()
+    bodies = tuple(flat_names(scene)) if isinstance(scene, MappingNode) else ()
 
     def change(steps: Sequence[FlatStep]) -> tuple[FlatStep, ...]:
         changed, wrong = apply_to_steps(steps, late, model)

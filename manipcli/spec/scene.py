@@ -13,6 +13,9 @@ from manipcli.spec.quantity import Length, Mass, Turn
 from manipcli.spec.robot import PoseSpec
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
+MOST: Final = 200
+"""Largest `count` of a body."""
+Positive = Annotated[int, Field(ge=1, le=MOST)]
 Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
 
 
@@ -102,6 +105,8 @@ class BodySpec(Model):
 
     Placement: `pose` in `frame`, or `rests_on: BODY` with `at: [x, y]` in `frame` (yaw by `yaw`), or `inside:
     CONTAINER`, in its middle or offset from it by `at: [x, y]`.
+
+    `count: 20` makes this body `ball` many, `ball[0]` to `ball[19]`, in layers on what they rest on or in a container.
     """
 
     box: BoxSpec | None = Field(None, description="Shape: a solid box.")
@@ -131,6 +136,17 @@ class BodySpec(Model):
         "Default 0.",
     )
     inside: BodyName | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
+    count: Annotated[int, Field(ge=1, le=MOST)] | None = Field(
+        None,
+        description=f"How many of it there are, 1 to {MOST}: bodies `NAME[0]`, `NAME[1]`, ..., upright in layers "
+        "`inside` a container, or around `at` on what they rest on; apart by a tenth of their size, of which the seed "
+        "draws half as an offset. They fall and settle before the start. Default: one body, NAME.",
+    )
+    grid: tuple[Positive, Positive] | None = Field(
+        None,
+        description="Only with `count`: how many there are along x and along y in a layer. Default: as many as fit "
+        "`inside` the container; with `rests_on`, all in one layer.",
+    )
     fixed: bool = Field(
         False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
     )

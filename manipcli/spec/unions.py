@@ -23,9 +23,11 @@ from manipcli.spec.base import Model, about, problem
 from manipcli.spec.block import BlockSpec
 from manipcli.spec.condition import (
     COMBINATIONS,
+    MEET,
     QUANTIFIERS,
     SINGLE,
     WATCHED,
+    AtLeastSpec,
     ConditionSpec,
     ExpectationSpec,
     KeyedSpec,
@@ -233,7 +235,17 @@ _CONDITION = "Condition"
 
 
 def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[KeyedSpec]:
-    """`base` with the field `all`, `any` (a list of conditions) or `not` (a condition)."""
+    """`base` with the field `all`, `any` (a list of conditions), `not`, ... (a condition), or `at_least`."""
+    if name == "at_least":
+        meet = (
+            condition,
+            Field(
+                description="The condition, with the selection in place of a body: "
+                "`meet: {inside: {object: 'ball[*]', of: tray}}`."
+            ),
+        )
+        counted = create_model("AtLeast", __base__=AtLeastSpec, __doc__=AtLeastSpec.__doc__, **{MEET: meet})  # type: ignore[call-overload]
+        return _keyed(base, name, counted, COMBINATIONS[name])
     # `condition` is a type only at run time; type checkers cannot follow it.
     listed = Annotated[tuple[condition, ...], Field(min_length=1)]  # type: ignore[valid-type]
     return _keyed(base, name, condition if name in SINGLE else listed, COMBINATIONS[name])

@@ -140,9 +140,14 @@ def _unpourable(scene: Scene, name: str, into: str, before: Sequence[Model]) -> 
     containers = [body.name for body in scene.bodies if body.interior is not None]
     hint = f"containers: {', '.join(containers)}" if containers else "add a `cup` or a `tray` to the scene"
     for key, one, verb in (("object", name, "from"), ("into", into, "into")):
-        if scene.body(one).kind in SOLID:
-            message = f"nothing can be poured {verb} '{one}': a {scene.body(one).kind} has no hollow"
+        body = scene.body(one)
+        if body.kind in SOLID:
+            message = f"nothing can be poured {verb} '{one}': a {body.kind} has no hollow"
             yield key, NO_HOLLOW, message, hint
+        elif body.interior is None and len(body.geometries) == 1:  # a file: one solid, or one convex hull of a mesh
+            message = f"nothing can be poured {verb} '{one}': it is one convex part, which has no hollow"
+            parts = "a mesh with a hollow has `collision: parts`; " if body.kind == "mesh" else ""
+            yield key, NO_HOLLOW, message, parts + hint
     if any(isinstance(step, PourSpec) and step.object == name for step in before):
         return  # what it held at the start may be elsewhere
     taken = {getattr(step, "object", None) for step in before}

@@ -15,23 +15,24 @@ from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
 from manipcli.scene.scene import SEPARATOR, Body, Frame, Interior, Scene
 from manipcli.shapes.primitives import Box
+from manipcli.spec.counted import flat_scene
 from manipcli.spec.task import TaskSpec
 
 
 def named_scene(spec: TaskSpec) -> Scene:
     """A scene with the names of the task's bodies and frames. Every body fits every use, so that only unknown names
     are reported."""
-    box = Box((1.0, 1.0, 1.0))
+    box, scene = Box((1.0, 1.0, 1.0)), flat_scene(spec.scene)
     origin = Transform.identity()
     bodies = tuple(
         Body(
             name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
-            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name not in spec.scene, X_WO=origin,
+            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name not in scene, X_WO=origin,
             interior=Interior(X_OS=origin, shape=box), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
         )
-        for name in (*(("floor",) if spec.floor else ()), *spec.scene)
+        for name in (*(("floor",) if spec.floor else ()), *scene)
     )  # fmt: skip
-    parts = (f"{name}{SEPARATOR}{part}" for name, body in spec.scene.items() for part in body.parts or ())
+    parts = (f"{name}{SEPARATOR}{part}" for name, body in scene.items() for part in body.parts or ())
     frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in (*spec.frames, *parts))
     return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from manipcli.core.errors import InvalidInput
 from manipcli.scene.scene import FACES, RIM, SEPARATOR
 from manipcli.scene.scene_names import RESERVED
+from manipcli.spec.counted import flat_names
 from manipcli.spec.load import load_controllers, task_source
 from manipcli.spec.located import Source
 from manipcli.spec.names import NameKind
@@ -74,19 +75,19 @@ def _named(source: Source, path: Path, key: str) -> Path | None:
 
 def _of_scene(source: Source) -> dict[NameKind, set[str]]:
     scene, frames = child(source.root, "scene"), child(source.root, "frames")
-    bodies = scene.entries if isinstance(scene, MappingNode) else {}
+    bodies = flat_names(scene) if isinstance(scene, MappingNode) else {}
     floor = child(source.root, "floor")
     ground = set() if isinstance(floor, ScalarNode) and floor.value is False else {"floor"}
     frame = {"world", "base", "tool", *bodies, *ground}
     frame |= {*frames.entries} if isinstance(frames, MappingNode) else set()
-    for name, entry in bodies.items():
-        parts = child(entry.node, "parts")
+    for name, node in bodies.items():
+        parts = child(node, "parts")
         own = parts.entries if isinstance(parts, MappingNode) else {}
         frame |= {f"{name}{SEPARATOR}{part}" for part in (*own, *FACES, RIM)}
     return {
         "body": {*bodies, *ground},
-        "movable": {name for name, entry in bodies.items() if not _is_true(child(entry.node, "fixed"))},
-        "container": {name for name, entry in bodies.items() if any(child(entry.node, key) for key in HOLLOW)},
+        "movable": {name for name, node in bodies.items() if not _is_true(child(node, "fixed"))},
+        "container": {name for name, node in bodies.items() if any(child(node, key) for key in HOLLOW)},
         "part": {*bodies, *ground, "robot"},
         "frame": frame - {*RESERVED} | (frame & {"world", "base", "tool", "floor"}),
     }

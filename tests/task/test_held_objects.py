@@ -69,6 +69,24 @@ def test_hollows_are_needed_and_large_enough(tmp_path: Path, steps: str, number:
     assert codes(tmp_path, steps) == [(f"TASK{number}", 2)]
 
 
+def test_a_mesh_that_is_one_convex_part_has_no_hollow(tmp_path: Path) -> None:
+    """A tetrahedron; as parts it might have one."""
+    corners = ["0 0 0", "0.1 0 0", "0 0.1 0", "0 0 0.1"]
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    (tmp_path / "wedge.obj").write_text(
+        "".join(f"v {p}\n" for p in corners) + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces)
+    )
+    wedge = "  wedge: {mesh: {file: wedge.obj}, mass: 100 g, pose: {xyz: [0.6, 0.1, 0.2]}}\nsteps:\n"
+    file = tmp_path / "task.yaml"
+    file.write_text(HEAD.replace("steps:\n", wedge) + "  - pick: {object: cup}\n" + POUR + "wedge}\n")
+    with pytest.raises(InvalidInput) as invalid:
+        load_task(file, allow_outside=True)
+    (found,) = invalid.value.findings
+    assert found.code == f"TASK{NO_HOLLOW}"
+    assert found.message.endswith("nothing can be poured into 'wedge': it is one convex part, which has no hollow")
+    assert found.hint == "a mesh with a hollow has `collision: parts`; containers: cup, pot"
+
+
 @pytest.mark.parametrize("steps", [PICK + LIFT, PICK + PLACE + PICK, "  - grasp: {object: a}\n" + LIFT])
 def test_what_is_held_in_order_is_not_refused(tmp_path: Path, steps: str) -> None:
     assert load(tmp_path, steps).spec.steps

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -87,32 +88,28 @@ def plan(spec: GraspSpec, planner: Planner, state: PlanningState) -> StepPlan:
     if spec.object is not None:
         planner.free_hand(state, spec.object)
     builder = MotionBuilder(planner, state)
-    close(builder, spec, planner, spec.object)
-    return builder.plan()
+    close(builder, spec, spec.object)
+    return with_reflex(builder.plan(), spec, planner, spec.object)
 
 
-def close(builder: MotionBuilder, spec: GraspSpec, planner: Planner, body: str | None, *, roomier: str = "") -> None:
+def close(builder: MotionBuilder, spec: GraspSpec, body: str | None, *, roomier: str = "") -> None:
     """Close the hand on a body; see `MotionBuilder.close`."""
-    builder.close(
-        spec.posture,
-        force=spec.force,
-        must_hold=spec.until == "contact",
-        body=body,
-        roomier=roomier,
-        reflex=_reflex(spec, planner, body),
-    )
+    builder.close(spec.posture, force=spec.force, must_hold=spec.until == "contact", body=body, roomier=roomier)
 
 
-def _reflex(spec: GraspSpec, planner: Planner, body: str | None) -> Reflex | None:
-    """The reflex of a grasp of a body, or of something unknown; None without one."""
+def with_reflex(plan: StepPlan, spec: GraspSpec, planner: Planner, body: str | None) -> StepPlan:
+    """The plan of a grasp of a body, or of something unknown; its closing motions have the reflex of the spec."""
     if not spec.reflex:
-        return None
+        return plan
     given = ReflexSpec() if spec.reflex is True else spec.reflex
     mu = given.friction
     if mu is None:
         assert body is not None  # refused by `check`
         mu = friction_coefficient(planner.robot, planner.scene.body(body))
-    return Reflex(mu, given.onset, given.force)
+    reflex = Reflex(mu, given.onset, given.force)
+    grips = [None if m.grip is None or m.grip.force is None else replace(m.grip, reflex=reflex) for m in plan.motions]
+    motions = (replace(m, grip=grip or m.grip) for m, grip in zip(plan.motions, grips, strict=True))
+    return replace(plan, motions=tuple(motions))
 
 
 def ungripped(spec: GraspSpec, robot: RobotModel, claims: Claims, loc: Loc) -> tuple[Problem, ...]:

@@ -37,7 +37,7 @@ from manipcli.plan.planner import CLEARANCE, NOTHING, Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.reached_frames import reached_frames
 from manipcli.plan.step import StepMember
-from manipcli.plan.steps.grasp import GraspSpec, close, pressing_more, ungripped
+from manipcli.plan.steps.grasp import GraspSpec, close, pressing_more, ungripped, with_reflex
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, overlaps, too_wide
 from manipcli.plan.unknown_names import unknown_posture
@@ -230,8 +230,8 @@ def candidates(spec: PickSpec, planner: Planner, state: PlanningState) -> Candid
             if bent.reason == "line":
                 lines.setdefault(frame, (distance, slope, builder.now.position))
             raise
-        close(builder, spec.grasp, planner, spec.object, roomier=_HIGHER)
-        planned = builder.plan()
+        close(builder, spec.grasp, spec.object, roomier=_HIGHER)
+        planned = with_reflex(builder.plan(), spec.grasp, planner, spec.object)
         planned = replace(planned, motions=(*before.motions, *planned.motions))
         if spec.grasp.until == "contact" and len(weak) < WEAK and not carries(planner, planned):
             weak.append(Candidate(lambda: planned, name=f"{frame.name}, by a weak grasp", grasp=frame.X_WT.R))

@@ -4,10 +4,11 @@
       until: {inside: {object: ball, of: tray}}
       timeout: 15 s
 
-The lip (the lowest point of the rim when tilted) is placed above the centre of the container, or `offset` before it:
-what leaves the cup flies on in the direction w. With c the centre of the
-rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup tips, all from O in the
-world, a rotation R by theta about a puts the lip at
+The lip (the lowest point of the rim when tilted) is placed above the centre of the container if what leaves the rim
+then lands well within the container's opening, else so far before it that it lands in the middle; where that is too
+uncertain, the cup tilts slower. What leaves the cup flies on in the direction w; see `plan.flight`. With c the centre
+of the rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup tips, all from O in
+the world, a rotation R by theta about a puts the lip at
 
     p_O + R (c + r w) = p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z
 
@@ -18,9 +19,10 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from pydantic import Field
@@ -35,12 +37,14 @@ from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.clauses import at_share
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.flight import PLACE_ERROR, room
+from manipcli.plan.motion import PlanningState, StepPlan, Stream
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
+from manipcli.plan.stream import Pouring, tilting
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.names import ContainerName, MovableName
@@ -49,6 +53,14 @@ from manipcli.spec.quantity import Angle, Length, Pause
 YAWS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
 """Candidate rotations of the hand about the vertical, relative to how the cup is held."""
 UP = np.array([0.0, 0.0, 1.0])
+ENOUGH: Final = 0.01
+"""[m] With this margin the lip stays above the centre."""
+EXACT: Final = 0.002
+"""[m] An `aim` is met within this."""
+SLOWER: Final = (1.0, 0.5, 0.2)
+"""Shares of the speed of the tilt, tried in this order."""
+ROUNDS: Final = 2
+"""How often the lip is moved per speed: another place of the lip changes the tilt a little."""
 
 
 class PourSpec(Model):
@@ -65,10 +77,15 @@ class PourSpec(Model):
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
     dwell: Annotated[Pause, Field(ge=0, description="Time to stay tilted [s], at most 1 h; extended by `until`.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
+    aim: Length | None = Field(
+        None,
+        description="Where what is poured lands: beyond the centre of the receiving rim in the direction of the pour "
+        "[m]; negative: before it. Default: the centre, or elsewhere at least 1 cm inside the rim.",
+    )
     offset: Length = Field(
         0.0,
-        description="How far the lip is before the centre of the receiving rim, against the direction of the pour [m]: "
-        "what pours out fast lands further; negative: beyond it.",
+        description="How far the lip is before the centre of the receiving rim, against the direction of the pour [m]; "
+        "negative: beyond it. The lip is then not aimed; at 0 it is.",
     )
     velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying and tilting."
@@ -88,19 +105,32 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
 
     contents = planner.contents(state, spec.object)
     poured = frozenset((name, spec.into) for name in contents)
+    over = spec.tilt > math.pi / 2
+    pouring = Pouring.of(planner, state, spec.object, spec.into) if over else None
+    if pouring is not None and not spec.offset:
+        _refuse_narrow(pouring)
 
     def attempt(clearance: float, yaw: float, sense: float) -> StepPlan:
         R_WT0 = matrix_from_axis_angle(UP, yaw) @ R_WT
         a = _horizontal_axis(R_WT0)
         theta, w = sense * spec.tilt, sense * np.cross(a, UP)
-        lip = mouth + clearance * UP - spec.offset * w
         R_tilt = matrix_from_axis_angle(a, theta)
-        p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, w) + R_WT0 @ X_TO.p)
-        builder = MotionBuilder(planner, state, allowed=poured)
-        carry(planner, builder, "carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
-        builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
+        p_LT = -R_tilt @ (_lip(body, R_WT0 @ X_TO.R, w) + R_WT0 @ X_TO.p)
+
+        def tilted(ahead: float, share: float) -> tuple[MotionBuilder, Stream | None]:
+            """The motions up to the tilt with the lip `ahead` of the mouth, and where the contents land."""
+            p_WT = mouth + clearance * UP + ahead * w + p_LT
+            builder = MotionBuilder(planner, state, allowed=poured)
+            carry(planner, builder, "carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
+            upright = builder.now
+            builder.turn("tilt", a, theta, speed=share * spec.velocity_scaling)
+            trajectory = builder.plan().motions[-1].trajectory
+            if pouring is None or trajectory is None:
+                return builder, None
+            return builder, pouring.landing(p_WT, R_WT0, w, tilting(planner, upright, trajectory, sense * a))
+
+        builder, stream = _aimed(spec, tilted)
         builder.dwell("dwell", spec.dwell)
-        over = spec.tilt > math.pi / 2
         if over:
             builder.spill(spec.into)
         try:
@@ -110,7 +140,7 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
                 raise
             raise refusal.but(hint="pour from higher, `clearance: ...`: what is poured out is in the way") from refusal
         planned = builder.plan()
-        return replace(planned, poured=contents, into=spec.into) if over else planned
+        return replace(planned, poured=contents, into=spec.into, stream=stream) if over else planned
 
     ways = itertools.product(spread(spec.clearance), YAWS_DEG, _senses(planner, state, mouth, R_WT))
     options = [
@@ -121,6 +151,64 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
         for clearance, yaw, sense in ways
     ]
     return Candidates(options, what=f"cannot pour from '{spec.object}' into '{spec.into}'")
+
+
+def _aimed(
+    spec: PourSpec, tilted: Callable[[float, float], tuple[MotionBuilder, Stream | None]]
+) -> tuple[MotionBuilder, Stream | None]:
+    """The motions up to the tilt, with the lip where the contents land within the opening.
+
+    Raises:
+        NotPlannable: wherever the lip is, and however slow the tilt, they may miss it.
+    """
+    ahead = -spec.offset
+    builder, stream = tilted(ahead, 1.0)
+    if stream is None or spec.offset:
+        return builder, stream
+    best = builder, stream
+    for share in SLOWER:
+        for _ in range(ROUNDS):
+            if _hits(spec, stream):
+                return builder, stream
+            ahead -= stream.beyond - (spec.aim or 0.0)
+            builder, landed = tilted(ahead, share)
+            if landed is None:
+                break
+            stream = replace(landed, moved=True)
+            best = max(best, (builder, stream), key=lambda one: _merit(spec, one[1]))
+    builder, stream = best
+    if stream.margin >= 0.0:
+        return builder, stream
+    what = f"what leaves the rim may land {readable(-stream.margin, 'm')} outside '{spec.into}'"
+    raise NotPlannable(
+        f"{what}: it leaves at {stream.speed:.2f} m/s and its landing is uncertain by {readable(stream.spread, 'm')}",
+        hint="pour from lower, `clearance: ...`, or into a wider container; `offset: ...` pours without an aim",
+    )
+
+
+def _hits(spec: PourSpec, stream: Stream) -> bool:
+    """Whether the contents land well within the opening, and where the step says."""
+    if spec.aim is None:
+        return stream.margin >= ENOUGH
+    return stream.margin >= 0.0 and abs(stream.beyond - spec.aim) <= EXACT
+
+
+def _merit(spec: PourSpec, stream: Stream) -> float:
+    """[m] Its margin, less how far it misses the aim of the step."""
+    return stream.margin - (0.0 if spec.aim is None else abs(stream.beyond - spec.aim))
+
+
+def _refuse_narrow(pouring: Pouring) -> None:
+    """Raises NotPlannable if the opening has no room for the contents however they are aimed."""
+    assert pouring.receiver.interior is not None  # see `Pouring.of`
+    half = room(pouring.receiver.interior.shape, np.zeros(3)) - PLACE_ERROR
+    for body, _ in pouring.heights:
+        wide = float(max(body.size)) / 2.0
+        if wide > half:
+            lack = f"'{body.name}' is {readable(2.0 * wide, 'm')} wide, the opening of '{pouring.receiver.name}'"
+            more = f"{readable(2.0 * (half + PLACE_ERROR), 'm')}; expected {readable(2.0 * PLACE_ERROR, 'm')} more"
+            hint = "pour into a wider container; `offset: ...` pours without an aim"
+            raise NotPlannable(f"cannot pour into '{pouring.receiver.name}': {lack} {more} than that", hint=hint)
 
 
 def _horizontal_axis(R_WT: Array) -> Array:
@@ -157,18 +245,22 @@ def _righted(R_WO: Array) -> Array:
 
 
 def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown bodies, a body poured into itself, or a lip that is not over the container."""
+    """Unknown bodies, a body poured into itself, a lip or an aim that is not over the container, or both of these."""
     if spec.object == spec.into:
         return (Problem(loc=("into",), message=f"'{spec.object}' cannot be poured into itself"),)
     found = unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
     if found:
         return found
+    if spec.aim is not None and spec.offset:
+        hint = "remove `offset`: the lip is placed by the aim"
+        return (Problem(loc=("offset",), message="`aim` and `offset` cannot both be given", hint=hint),)
     reach = float(max(scene.body(spec.into).size[:2]) / 2)
-    if abs(spec.offset) < reach:
-        return ()
-    message = f"the lip is {readable(abs(spec.offset), 'm')} from the centre of '{spec.into}', outside its rim"
     hint = f"'{spec.into}' reaches {readable(reach, 'm')} from its centre"
-    return (Problem(loc=("offset",), message=message, hint=hint),)
+    for key, what, away in (("offset", "the lip", spec.offset), ("aim", "the aim", spec.aim or 0.0)):
+        if abs(away) >= reach:
+            message = f"{what} is {readable(abs(away), 'm')} from the centre of '{spec.into}', outside its rim"
+            return (Problem(loc=(key,), message=message, hint=hint),)
+    return ()
 
 
 def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
@@ -177,13 +269,17 @@ def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
 
 
 def clause(spec: PourSpec, robot: RobotModel) -> str:
-    side = "before" if spec.offset > 0.0 else "beyond"
-    offset = f" and {amount(abs(spec.offset), 'm')} {side} its centre" if spec.offset else ""
+    offset = f" and {_beside(-spec.offset)}" if spec.offset else ""
+    aim = f", to land {_beside(spec.aim)}" if spec.aim else ""
     return (
         f"pour from {named(spec.object)} into {named(spec.into)}: hold the lip {between(spec.clearance, 'm')} above "
-        f"its rim{offset}, tilt it by {amount(spec.tilt, 'rad')}, wait {amount(spec.dwell, 's')}, and "
+        f"its rim{offset}{aim}, tilt it by {amount(spec.tilt, 'rad')}, wait {amount(spec.dwell, 's')}, and "
         f"tilt it back{at_share(spec.velocity_scaling, 0.5)}"
     )
+
+
+def _beside(beyond: float) -> str:
+    return f"{amount(abs(beyond), 'm')} {'before' if beyond < 0.0 else 'beyond'} its centre"
 
 
 MEMBER = StepMember(

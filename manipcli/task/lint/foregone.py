@@ -27,7 +27,7 @@ from manipcli.core.units import readable
 from manipcli.judge.expectation import END_WINDOW
 from manipcli.model.state import WorldState
 from manipcli.scene.drop_test import SETTLED_SHIFT
-from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec
+from manipcli.spec.condition import END, SELECTING, ConditionSpec, ExpectationSpec
 from manipcli.spec.step import StepSpec
 from manipcli.task.plan_task import start_position
 from manipcli.task.task import Task
@@ -83,6 +83,8 @@ def _constant(spec: ConditionSpec, leaf: Callable[[ConditionSpec], _Foregone | N
     """The result of a formula, None if it depends on the run."""
     if not spec.combines:
         return leaf(spec)
+    if spec.name in SELECTING:
+        return None  # bodies of a selection can move
     parts = [_constant(member, leaf) for member in spec.members]
     if spec.name == "not":
         return None if parts[0] is None else _Foregone(not parts[0].holds, parts[0].why)
