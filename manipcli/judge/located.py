@@ -12,6 +12,7 @@ from manipcli.record.recording import Recording, Span
 
 LOCATED = "located"
 """Kind of the event of a correction; its outcome is the name of the body."""
+NEVER = "never located"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +28,9 @@ class Correction:
     """What a `locate` corrected.
 
     Attributes:
-        step: its id.
+        step: its id; "" for a body that was never located.
         object: the body.
-        time: [s] of the correction.
+        time: [s] of the correction; 0 without one.
         before, after: errors of the belief at the recorded ticks around it; None where no tick was recorded.
         text: what the robot knows of it.
     """
@@ -51,11 +52,17 @@ class Corrections:
         self._between = recording.period / 2.0
         self._before: list[PoseError | None] = [None for _ in self._events]
         self._after = [*self._before]
+        looked = {event.outcome for event in self._events}
+        self._never = {belief.body: None for belief in recording.beliefs if belief.body not in looked}
+        self._start: dict[str, PoseError] = {}
 
     def add(self, span: Span) -> None:
         """The next ticks."""
-        if not self._events or not span.believed.size:
+        if not span.believed.size:
             return
+        for name in self._never:
+            if name not in self._start and name in self._names and name in self._bodies:
+                self._start[name] = self._error(span, name, 0)
         for k, event in enumerate(self._events):
             if event.outcome not in self._names or event.outcome not in self._bodies:
                 continue
@@ -66,11 +73,12 @@ class Corrections:
                 self._after[k] = self._error(span, event.outcome, first)
 
     def found(self) -> tuple[Correction, ...]:
-        """All corrections, in order of time."""
-        return tuple(
+        """All corrections, in order of time; then bodies that were never located, with the error at the start."""
+        located = [
             Correction(event.step, event.outcome, event.time, before, after, event.text)
             for event, before, after in zip(self._events, self._before, self._after, strict=True)
-        )
+        ]
+        return (*located, *(Correction("", name, 0.0, error, None, NEVER) for name, error in self._start.items()))
 
     def _error(self, span: Span, name: str, row: int) -> PoseError:
         believed: Array = span.believed[row, self._names.index(name)]

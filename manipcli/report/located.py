@@ -14,7 +14,7 @@ LOCATED: Final = ("located", "object", "belief was off by", "is off by", "measur
 
 def located_rows(corrections: Sequence[Correction]) -> list[tuple[str, ...]]:
     """A row for each correction, with these headers."""
-    return [(each.step, each.object, _error(each.before), _error(each.after), each.text) for each in corrections]
+    return [(each.step or "-", each.object, _error(each.before), _error(each.after), each.text) for each in corrections]
 
 
 def _error(error: PoseError | None) -> str:

@@ -246,8 +246,7 @@ def _looking(task: Located[TaskSpec], sensors: dict[str, SensorSpec]) -> Iterato
         else:
             message = f"sensor '{name}' is of type '{spec.type}', not 'camera'"
         near = did_you_mean(name, able, kind="cameras") if able else "add one under `sensors:`, with `type: camera`"
-        if isinstance(spec, CameraSpec) and not able:
-            near = f"write `depth: true` for '{name}' under `sensors:`"
+        near = "write `depth: true`" if isinstance(spec, CameraSpec) else near
         yield task.source.finding(ABSENT, ("steps", k, step.verb, "with"), message, hint=near)
 
 

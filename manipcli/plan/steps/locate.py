@@ -138,7 +138,7 @@ def _refuse_unseen(spec: LocateSpec, planner: Planner, state: PlanningState, sig
     sighting = sight.sighting(state, spec.object)
     if sighting.sufficient:
         return
-    hint = "move the camera, or the object; `manipcli run --picture` shows the scene"
+    hint = "move the camera, or the object; `manipcli view TASK` shows the scene"
     if sighting.hider:
         hint = f"move '{sighting.hider}' away, or mount the camera elsewhere"
     raise NotPlannable(sighting.why(spec.object, spec.with_), hint=hint)

@@ -1,4 +1,4 @@
-"""What a valid task says without effect: unused names, and expectations that cannot fail or cannot pass."""
+"""What is doubtful in a valid task: unused names, expectations that cannot fail or cannot pass, blind grasps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from manipcli.core.errors import Diagnostic
 from manipcli.task.lint.foregone import foregone
+from manipcli.task.lint.unlocated import unlocated
 from manipcli.task.lint.unused import unused
 from manipcli.task.task import Task
 
@@ -14,3 +15,4 @@ def lint(task: Task) -> Iterator[Diagnostic]:
     """The findings of `check` about a valid task; a run does not need them."""
     yield from unused(task)
     yield from foregone(task)
+    yield from unlocated(task)
