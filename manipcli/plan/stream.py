@@ -100,11 +100,16 @@ class Pouring:
             ways.append(fall(height, each.velocity, self.gravity)[1])
             ends.append(p_WT + (float(each.position[0]) + ways[-1]) * w)
         spread = PLACE_ERROR + SPEED_ERROR * max(map(abs, ways))
-        widest = max(max(body.size) / 2.0 for body, _ in self.heights)
+        widest = max(width(body) / 2.0 for body, _ in self.heights)
         margin = float(min(room(hollow.shape, X_WS.inverse().apply(end)) for end in ends)) - widest - spread
         beyond = [float((end - X_WS.p) @ w) for end in ends]
         fastest = max(each.speed for each in out)
         return Stream((max(beyond) + min(beyond)) / 2.0, spread, margin, fastest, max(each.tilt for each in out))
+
+
+def width(body: Body) -> float:
+    """[m] Of the least opening that a body passes end first: the middle one of its lengths."""
+    return float(np.sort(body.size)[1])
 
 
 def tilting(planner: Planner, state: PlanningState, trajectory: JointTrajectory, axis: Array) -> Tilting:

@@ -85,10 +85,7 @@ class Looking:
                 joints[session.ticks - 1] = session.sensors.positions(state).copy()
         (tick, depth), *_ = taken
         now = replace(situation(), position=frozen(joints[tick]))
-        found = self._correct(looks, sight, now, depth)
-        if not found.failure:
-            yield  # the last tick of the step has the corrected belief
-        return found
+        return self._correct(looks, sight, now, depth)
 
     def corrected(self, plan: StepPlan) -> PlanningState:
         """The state after a plan, with what it located at its new pose."""

@@ -275,6 +275,7 @@ class StepAttempt:
         self.located = True
         self._event("located", planned, looks.object, found.text)
         self._report(found.text, detail=False)
+        yield  # the last tick of the step has the corrected belief
         return MotionEnd("done", found.text)
 
     @contextmanager

@@ -212,7 +212,9 @@ def _conditions(members: Members) -> object:
     combined = [_combined(ConditionSpec, name, own) for name in COMBINATIONS]
     condition = _union("condition", [*leaves, *combined], common=())
     alias = TypeAliasType(_CONDITION, condition)  # type: ignore[misc]  # a named type, which can refer to itself
-    for model in combined:
+    own_fields = [field.annotation for model in combined for field in model.model_fields.values()]
+    counted = [each for each in own_fields if isinstance(each, type) and issubclass(each, AtLeastSpec)]
+    for model in [*counted, *combined]:
         model.model_rebuild(_types_namespace={_CONDITION: alias})
     return alias
 

@@ -308,7 +308,11 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
     margins = MotionMargins(Binding("j1", "velocity", 0.6), (Margin("j1", "velocity", 0.75, 0.5, 1.0),))
     plan = SimpleNamespace(
         motions=(_motion(),),
-        steps=(SimpleNamespace(id="move_1", verb="move", candidate="", dropped=(), beside=False),),
+        steps=(
+            SimpleNamespace(
+                id="move_1", verb="move", candidate="", dropped=(), beside=False, plan=SimpleNamespace(stream=None)
+            ),
+        ),
         every=(),
         branches={},
         combinations=(),

@@ -13,8 +13,9 @@ from manipcli.report.plan_text import render_text
 def test_refused_candidates_are_grouped_and_the_one_taken_is_named() -> None:
     dropped = [Dropped(f"yaw {k}", NotPlannable(f"approach: {k}.5 mm too near")) for k in range(90)]
     dropped.append(Dropped("far", NotPlannable("reach: out of reach")))
-    step = SimpleNamespace(id="pick_1", candidate="from the top", dropped=dropped)
-    only = SimpleNamespace(id="wait_1", candidate="", dropped=())
+    still = SimpleNamespace(stream=None)
+    step = SimpleNamespace(id="pick_1", candidate="from the top", dropped=dropped, plan=still)
+    only = SimpleNamespace(id="wait_1", candidate="", dropped=(), plan=still)
     plan: Any = SimpleNamespace(
         motions=(),
         steps=(step, only),

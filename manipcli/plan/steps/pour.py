@@ -44,7 +44,7 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
-from manipcli.plan.stream import Pouring, tilting
+from manipcli.plan.stream import Pouring, tilting, width
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.names import ContainerName, MovableName
@@ -203,7 +203,7 @@ def _refuse_narrow(pouring: Pouring) -> None:
     assert pouring.receiver.interior is not None  # see `Pouring.of`
     half = room(pouring.receiver.interior.shape, np.zeros(3)) - PLACE_ERROR
     for body, _ in pouring.heights:
-        wide = float(max(body.size)) / 2.0
+        wide = width(body) / 2.0
         if wide > half:
             lack = f"'{body.name}' is {readable(2.0 * wide, 'm')} wide, the opening of '{pouring.receiver.name}'"
             more = f"{readable(2.0 * (half + PLACE_ERROR), 'm')}; expected {readable(2.0 * PLACE_ERROR, 'm')} more"
