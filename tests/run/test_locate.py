@@ -56,6 +56,9 @@ def test_a_located_block_is_picked_and_the_report_has_both_errors(task: Write, t
     loaded = load_task(file)
     drawn = loaded.scene.body("block").X_WO.p - loaded.true.scene.body("block").X_WO.p
     assert np.abs(drawn).max() > 0.035  # half a block and half a cup: it would miss it without looking
+    x, y, z = loaded.true.scene.body("block").X_WO.p
+    asked = f"believed: {{near: {{object: block, to: [{x}, {y}, {z}], within: 3 mm}}}}, at: locate_1"
+    file.write_text(file.read_text() + f"expect: [{{{asked}}}]\n")
     run = run_task(file, log=tmp_path / "seen.mcap")
     assert run.verdict.verdict == "passed", run.verdict.text
     (found,) = run.verdict.located
