@@ -55,6 +55,12 @@ class ComplianceSwitch:
         own = self._pressing
         return "" if own is None else own.missed
 
+    @property
+    def felt(self) -> str:
+        """What was felt in the motion, in words."""
+        own = self._pressing
+        return "the arm has no goal" if own is None else own.text
+
     def result(self, motion: Motion) -> tuple[str, str]:
         """What was felt in a motion with a force that has ended, and why that is a failure; "" where it is none."""
         own = self._pressing
