@@ -47,6 +47,11 @@ class Compliant(Controller, Protocol):
         """The force with which it presses; None without one."""
         ...
 
+    @property
+    def felt(self) -> Array:
+        """(6,) what the tool exerts, in the axes of the compliant frame [N, N m]."""
+        ...
+
     def comply(self, compliance: Compliance) -> None:
         """Obey this compliance from the next update on, without a step in the force."""
         ...
@@ -85,6 +90,11 @@ class ImpedanceArm(CartesianImpedanceController):
     def pressing(self) -> PressingReference | None:
         """The force with which it presses; None without one."""
         return self._law.pressing
+
+    @property
+    def felt(self) -> Array:
+        """(6,) what the tool exerts, in the axes of the compliant frame [N, N m]."""
+        return self._law.wrench()
 
     def comply(self, compliance: Compliance) -> None:
         """Obey this compliance from the next update on; what is felt at the activation is felt as zero."""
@@ -127,6 +137,11 @@ class AdmittanceArm(JointTrajectoryController):
     def pressing(self) -> PressingReference | None:
         """The force with which it presses; None without one."""
         return self._law.pressing
+
+    @property
+    def felt(self) -> Array:
+        """(6,) what the tool exerts, in the axes of the compliant frame [N, N m]."""
+        return self._law.wrench()
 
     def comply(self, compliance: Compliance) -> None:
         """Obey this compliance from the next update on; what is felt at the activation is felt as zero."""

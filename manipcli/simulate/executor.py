@@ -188,11 +188,12 @@ class Executor:
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
+                hold = self._compliance.holding(motion)
                 yield from self._come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
-                return replace(DONE, text=f"stopped {when}: `until` held")
+                return replace(DONE, text=f"stopped {when}: `until` held{hold()}")
             if not busy and (awaited is None or holds):
                 far = self._far(motion, start, state)
                 felt, wrong = self._compliance.result(motion)
