@@ -15,6 +15,7 @@ from manipcli.plan.steps import (
     pour,
     press,
     release,
+    slide,
     switch_controllers,
     wait,
 )
@@ -34,5 +35,6 @@ STEPS: Seam[StepMember[Any]] = Seam(
         pour.MEMBER,
         place.MEMBER,
         press.MEMBER,
+        slide.MEMBER,
     ),
 )
