@@ -153,3 +153,9 @@ def carried_by(joints: Iterable[SceneJoint], body: str) -> tuple[str, ...]:
         if joint.parent in (body, *found):
             found.append(joint.child)
     return tuple(found)
+
+
+def things(scene: Scene) -> tuple[tuple[str, ...], ...]:
+    """The bodies of each jointed thing, its root first."""
+    roots = dict.fromkeys(root_of(scene, joint.child) for joint in scene.joints)
+    return tuple((root, *carried_by(scene, root)) for root in roots)
