@@ -106,7 +106,7 @@ class CollisionChecker:
         close = self._at_zero(CLOSE)
         self.spaced = spaced_by_one(model, [pair for pair, distance in close.items() if distance >= 0.0])
         self._ignored |= _of_links(self.spaced)
-        self._ignored |= {frozenset(pair) for thing in things(scene) for pair in combinations(thing, 2)}
+        self._ignored |= {frozenset(pair) for thing in things(scene.joints) for pair in combinations(thing, 2)}
 
     def at(
         self,

@@ -33,7 +33,7 @@ def aboard(
     """
     if not any(joint.child == body for joint in scene.joints):
         return contents(body)
-    moving = {body, *carried_by(scene, body)}
+    moving = {body, *carried_by(scene.joints, body)}
     moving |= {name for link in tuple(moving) for name in contents(link)}
     jointed = {joint.child for joint in scene.joints}
     poses = {each.name: X_WO for each, X_WO in zip(scene.movable, bodies, strict=True)}

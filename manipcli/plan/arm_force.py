@@ -17,9 +17,10 @@ def refuse_weak(planner: Planner, state: PlanningState, wrench: Array, label: st
     Raises:
         NotPlannable: it cannot; names the joint and what the arm can give along the same wrench.
     """
-    solver, q = planner.solver, state.position
+    solver, tool, q = planner.solver, planner.robot.tool, state.position
+    assert tool is not None  # the solver has one
     columns = planner.robot.indices(solver.joints)
-    load = planner.kinematics.jacobian(q, solver.link, solver.X_LT)[:, columns].T @ wrench
+    load = planner.kinematics.jacobian(q, tool.link, tool.X_LT)[:, columns].T @ wrench
     gravity = np.array(planner.kinematics.gravity(q))[columns]
     limits = EffortLimits.of(planner.robot).least[columns]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -80,7 +80,7 @@ def ways(handling: Handling, planner: Planner, state: PlanningState) -> Iterator
     tried = 0
 
     def attempt(frame: GraspFrame, distance: float) -> StepPlan:
-        builder = MotionBuilder(planner, state, allowed=planner.touching(state, joint.child))
+        builder = MotionBuilder(planner, state, verb=handling.label, allowed=planner.touching(state, joint.child))
         with planner.solver.trying(FEW):
             if frame not in refused:
                 refused[frame] = builder.unreachable("approach", frame.X_WT, hand=handling.open)

@@ -13,9 +13,11 @@ import numpy as np
 from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pressing
 from manipcli.model.state import Contact
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.jointed import position_of
+from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.run.replan import between, deg, mm
+from manipcli.scene.joints import SceneJoint
 from manipcli.spec.counted import selections
 
 PLACED: Final = 0.01
@@ -71,6 +73,44 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
     where = f"still in '{_held(plan)}'" if first in _kept(planner, plan, now) else f"at {_at(planner, now, first)}"
     counts = f"; {counted(planner, plan, now)}" if len(plan.poured) > 1 else ""
     return f"'{first}' is not in '{plan.into}', it is {where}{counts}"
+
+
+def not_moved(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
+    """Why the joint that a step moves is not where it should be; "" where it is, or where the step moves none.
+
+    Args:
+        planner: of the task.
+        plan: of the step.
+        now: the measured poses of all bodies.
+    """
+    if plan.joint is None or joint_margin(planner, plan.joint, now) >= 0.0:
+        return ""
+    unit = scene_joint(planner, plan.joint).unit
+    expected = f"expected {_at_least(plan.joint.side)}{_travel(plan.joint.position, unit)}"
+    return f"{moved_text(planner, plan.joint, now)}, {expected} within {_travel(plan.joint.within, unit)}"
+
+
+def moved_text(planner: Planner, goal: JointGoal, now: PlanningState) -> str:
+    """`joint 'drawer/slide' is at 150.2 mm`."""
+    joint = scene_joint(planner, goal)
+    return f"joint '{joint.name}' is at {_travel(position_of(planner, now, joint), joint.unit)}"
+
+
+def joint_margin(planner: Planner, goal: JointGoal, now: PlanningState) -> float:
+    """[rad or m] to the tolerance of a joint that a step moves; negative: it missed its goal."""
+    return goal.within - goal.short(position_of(planner, now, scene_joint(planner, goal)))
+
+
+def scene_joint(planner: Planner, goal: JointGoal) -> SceneJoint:
+    return next(joint for joint in planner.scene.joints if joint.name == goal.name)
+
+
+def _at_least(side: float) -> str:
+    return "at least " if side > 0.0 else "at most " if side < 0.0 else ""
+
+
+def _travel(value: float, unit: str) -> str:
+    return mm(value) if unit == "m" else deg(value)
 
 
 def poured_texts(

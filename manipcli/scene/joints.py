@@ -6,7 +6,7 @@ Every link of a jointed thing is a body of its own, so the position of a joint f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -155,7 +155,7 @@ def carried_by(joints: Iterable[SceneJoint], body: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-def things(scene: Scene) -> tuple[tuple[str, ...], ...]:
+def things(joints: Sequence[SceneJoint]) -> tuple[tuple[str, ...], ...]:
     """The bodies of each jointed thing, its root first."""
-    roots = dict.fromkeys(root_of(scene, joint.child) for joint in scene.joints)
-    return tuple((root, *carried_by(scene, root)) for root in roots)
+    roots = dict.fromkeys(root_of(joints, joint.child) for joint in joints)
+    return tuple((root, *carried_by(joints, root)) for root in roots)

@@ -8,11 +8,18 @@ from typing import Annotated, ClassVar, Final
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
-from manipcli.core.prose import amount
+from manipcli.core.prose import amount, between, named
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
+from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
+from manipcli.plan.clauses import at_share
+from manipcli.plan.jointed import position_of
+from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
+from manipcli.plan.operating import Handling, ways
+from manipcli.plan.planner import Planner
 from manipcli.plan.ranges import Range
+from manipcli.plan.steps.grasp import DEFAULT_FORCE
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.unknown_names import unknown_posture
 from manipcli.scene.joints import SceneJoint, joints_of
@@ -23,6 +30,8 @@ from manipcli.spec.quantity import Force
 
 WITHIN: Final = {"m": 0.005, "rad": math.radians(3.0)}
 """Tolerance of the position that a step moves a joint to."""
+LABELS: Final = {"open": "pull", "close": "push", "turn": "turn"}
+"""The phase of a step in which the joint moves."""
 ROUNDING: Final = 1e-9
 
 
@@ -30,6 +39,7 @@ class HandleSpec(Model):
     """The fields of a step that moves a jointed thing by its handle."""
 
     renamed: ClassVar = RENAMED
+    verb: ClassVar[str] = ""
 
     object: BodyName = Field(description="The body with one joint, or the link that a joint moves: `BODY/LINK`.")
     part: str = Field("handle", description="The part that the hand takes or pushes. Default: `handle`.")
@@ -38,7 +48,7 @@ class HandleSpec(Model):
     posture: PoseName = Field("closed", description="The named pose that the hand closes towards.")
     open: PoseName = Field("open", description="The named pose of the open hand.")
     force: Force = Field(
-        20.0,
+        DEFAULT_FORCE,
         gt=0,
         description="Contact force at which a finger stops [N]; a position-controlled finger presses with its effort "
         "limit regardless.",
@@ -56,6 +66,36 @@ def handle_of(scene: Scene, joint: SceneJoint, part: str) -> Frame | None:
     """The part of the link that a joint moves; None: the link has no such part."""
     frame = scene.frame(f"{joint.child}{SEPARATOR}{part}")
     return frame if frame is not None and frame.parent == joint.child else None
+
+
+def joint_and_handle(scene: Scene, spec: HandleSpec) -> tuple[SceneJoint, Frame]:
+    """What a checked spec names."""
+    joint = moved_joint(scene, spec.object)
+    assert joint is not None  # refused by `check_handle`
+    handle = handle_of(scene, joint, spec.part)
+    assert handle is not None
+    return joint, handle
+
+
+def by_hand(
+    spec: HandleSpec, planner: Planner, state: PlanningState, joint: SceneJoint, handle: Frame, goal: JointGoal
+) -> Candidates:
+    """The ways to take the handle and to move the joint to the goal; no motion where it is there already.
+
+    Raises:
+        NotPlannable: the hand holds something, or the robot is too near to something already.
+    """
+    handling = Handling(
+        joint, handle, goal, LABELS[spec.verb], spec.approach, spec.retreat, spec.posture, spec.open, spec.force,
+        spec.velocity_scaling,
+    )  # fmt: skip
+    if goal.short(position_of(planner, state, joint)) <= goal.within:
+        there = StepPlan((), state, joint=goal)
+        return Candidates([Candidate(lambda: there, name="it is there already")])
+    planner.free_hand(state, joint.child)
+    planner.free_start(state)
+    what = f"cannot {spec.verb} '{spec.object}'"
+    return Candidates(ways(handling, planner, state), what=what, decides="branch")
 
 
 def opening(joint: SceneJoint) -> float:
@@ -114,6 +154,22 @@ def beyond(joint: SceneJoint, wanted: float, limit: float, key: str, verb: str) 
         return ()
     message = f"'{joint.name}' {verb} by {amount(limit, joint.unit)} at most, not by {amount(wanted, joint.unit)}"
     return (Problem((key,), message, f"lower `{key}`, or change the limits of the joint", code="TASK373"),)
+
+
+def taking(spec: HandleSpec) -> str:
+    """How, for clauses: `take its part 'handle' ...`."""
+    return (
+        f"approach its part {named(spec.part)} straight over {between(spec.approach, 'm')}, close the hand (pose "
+        f"{named(spec.posture)}) until each finger presses with {amount(spec.force, 'N')}, follow the path of the "
+        f"joint, open the hand (pose {named(spec.open)}), and withdraw it by {between(spec.retreat, 'm')}"
+        f"{at_share(spec.velocity_scaling, 0.3)}"
+    )
+
+
+def travel(scene: Scene | None, name: str, value: float) -> str:
+    """A position of the joint of an object in its unit; without a scene, in the units that it may have."""
+    joint = None if scene is None else moved_joint(scene, name)
+    return f"{value:.4g} rad or m" if joint is None else amount(value, joint.unit)
 
 
 def uncommanded(spec: HandleSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:

@@ -6,15 +6,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
-from manipcli.core.prose import amount, named
+from manipcli.core.prose import named
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidates
-from manipcli.plan.clauses import at_share
 from manipcli.plan.motion import JointGoal, PlanningState
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember
@@ -28,6 +27,8 @@ from manipcli.plan.steps.jointed_goal import (
     most,
     moved_joint,
     opening,
+    taking,
+    travel,
     uncommanded,
 )
 from manipcli.scene.scene import Scene
@@ -41,6 +42,8 @@ class OpenSpec(HandleSpec):
     The step is done when the joint is open by `by`, less 5 mm or 3 deg; more is done as well.
     """
 
+    verb: ClassVar[str] = "open"
+
     by: Annotated[JointValue, Field(gt=0)] | None = Field(
         None, description="How far from closed [rad or m], above 0. Default: as far as the joint goes."
     )
@@ -52,7 +55,7 @@ def candidates(spec: OpenSpec, planner: Planner, state: PlanningState) -> Candid
     sign = opening(joint)
     target = joint.closed + sign * (most(joint) if spec.by is None else min(spec.by, most(joint)))
     goal = JointGoal(joint.name, target, sign, WITHIN[joint.unit])
-    return by_hand(spec, planner, state, joint, handle, goal, "open")
+    return by_hand(spec, planner, state, joint, handle, goal)
 
 
 def check(spec: OpenSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
@@ -68,12 +71,12 @@ def check(spec: OpenSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     return (*found, *beyond(joint, spec.by, most(joint), "by", "opens"))
 
 
-def clause(spec: OpenSpec, robot: RobotModel) -> str:
-    far = "as far as it goes" if spec.by is None else f"by {amount(spec.by, unit(spec.by))}"
-    return f"open {named(spec.object)} {far}: {taking(spec)}{at_share(spec.velocity_scaling, 0.3)}"
+def clause(spec: OpenSpec, robot: RobotModel, scene: Scene | None = None) -> str:
+    far = "as far as it goes" if spec.by is None else f"by {travel(scene, spec.object, spec.by)}"
+    return f"open {named(spec.object)} {far}: {taking(spec)}"
 
 
 MEMBER = StepMember(
     name="open", spec=OpenSpec, candidates=candidates, check=check, uncommanded=uncommanded, clause=clause,
-    compliant=lambda _: True,
+    scene_clause=clause, compliant=lambda _: True,
 )  # fmt: skip
