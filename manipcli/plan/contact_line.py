@@ -24,7 +24,7 @@ SEEN: Final = 0.2
 """[m] Greatest gap that is measured."""
 ADVANCES: Final = 8
 """Steps to the gap; each is as long as the gap is at least."""
-HARD: Final = 5e6
+HARD: Final = 3e6
 """[N/m] Stiffness of a hard contact."""
 FASTEST: Final = 0.05
 """[m/s]"""
