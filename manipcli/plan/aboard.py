@@ -1,4 +1,4 @@
-"""What moves with a body: what it contains, and with a link of a jointed thing also the links and loads that it moves."""
+"""What moves with a body: its contents; with a link of a jointed thing, the links and the loads on it as well."""
 
 from __future__ import annotations
 
@@ -44,9 +44,7 @@ def aboard(
     return tuple(each.name for each in scene.movable if each.name in moving and each.name != body)
 
 
-def _rests(
-    scene: Scene, body: Body, poses: dict[str, Transform], moving: Set[str], touching: Touching
-) -> bool:
+def _rests(scene: Scene, body: Body, poses: dict[str, Transform], moving: Set[str], touching: Touching) -> bool:
     """Whether a body touches some of the moving ones, and nothing else."""
     if not any(_near(body, poses[body.name], scene.body(name), poses[name]) for name in moving):
         return False

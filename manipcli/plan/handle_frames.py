@@ -33,7 +33,7 @@ def handle_frames(X_WP: Transform, size: Array, outward: Array, R_WT: Array) -> 
         X_WP: where the part is.
         size: (3,) [m] of the part; zero for a point.
         outward: (3,) unit vector in the world from the link to the handle.
-        R_WT: (3, 3) present orientation of the tool; of each two frames that differ by half a turn, the nearer is first.
+        R_WT: (3, 3) present orientation of the tool; of two frames half a turn apart, the nearer is first.
     """
     order = np.argsort(size, kind="stable")
     bar = size[order[2]] > LONG * size[order[1]]

@@ -1,4 +1,4 @@
-"""Jointed things in planning: positions of their joints, the state with a link moved, and the tool's path along a joint.
+"""Jointed things in planning: positions of joints, the state with a link moved, the tool's path along a joint.
 
 A hand that holds a link at X_CT keeps it: with the link C at the position q of its joint, the tool is at
 
@@ -7,7 +7,6 @@ A hand that holds a link at X_CT keeps it: with the link C at the position q of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -38,9 +37,7 @@ def moved_to(planner: Planner, state: PlanningState, joint: SceneJoint, position
     X_WC, there = planner.body_pose(state, joint.child), link_at(planner, state, joint, position)
     shift = there @ X_WC.inverse()
     loads = planner.aboard(state, joint.child)
-    return put(
-        planner, state, {joint.child: there, **{name: shift @ planner.body_pose(state, name) for name in loads}}
-    )
+    return put(planner, state, {joint.child: there, **{name: shift @ planner.body_pose(state, name) for name in loads}})
 
 
 def along(
@@ -65,28 +62,18 @@ def tool_twist(planner: Planner, state: PlanningState, joint: SceneJoint, X_WT: 
     return np.concatenate((cross(axis, X_WT.p - X_WJ.p), axis))
 
 
-@dataclass(frozen=True, slots=True)
-class Needed:
-    """The wrench (6) [N, N m] of the tool in the world that moves a joint, and the `effort` [N m or N] at the joint."""
-
-    wrench: Array
-    effort: float
+def needed(joint: SceneJoint, position: float, speed: float) -> float:
+    """[N m or N] The effort that moves a joint through a position at a constant `speed`: friction, spring, damper."""
+    return float(np.sign(speed)) * joint.friction - joint.passive_effort(position, speed)
 
 
-def needed(
-    planner: Planner, state: PlanningState, joint: SceneJoint, position: float, speed: float, X_WT: Transform
-) -> Needed:
-    """What a tool at X_WT must give to move a joint at a constant `speed` [rad/s or m/s] through a position.
+def wrench_of(twist: Array, effort: float) -> Array:
+    """(6) [N, N m] What a tool that moves with a `twist` (6) must give for an effort at the joint.
 
     It is a force along the path; near the axis of a hinge it is a torque about it. Power at the tool is power at the
-    joint: wrench . twist = effort * speed.
+    joint: wrench . twist = effort.
     """
-    effort = float(np.sign(speed)) * joint.friction - joint.passive_effort(position, speed)
-    twist = tool_twist(planner, state, joint, X_WT)
     lever = float(np.linalg.norm(twist[:3]))
-    wrench = np.zeros(6)
-    if lever > LEVER:
-        wrench[:3] = effort * twist[:3] / lever**2
-    else:
-        wrench[3:] = effort * twist[3:]
-    return Needed(wrench, effort)
+    if lever > LEVER * float(np.linalg.norm(twist[3:])):
+        return np.concatenate((effort * twist[:3] / lever**2, np.zeros(3)))
+    return np.concatenate((np.zeros(3), effort * twist[3:] / float(twist[3:] @ twist[3:])))

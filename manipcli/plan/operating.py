@@ -21,7 +21,7 @@ from manipcli.plan.candidates import Candidate
 from manipcli.plan.compliance import Compliance, compliant
 from manipcli.plan.grasp_frames import GraspFrame
 from manipcli.plan.handle_frames import handle_frames
-from manipcli.plan.jointed import along, link_at, moved_to, needed, position_of, tool_twist
+from manipcli.plan.jointed import LEVER, along, moved_to, needed, position_of, tool_twist, wrench_of
 from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -39,8 +39,12 @@ FEW: Final = 8
 """Restarts of the inverse kinematics for a grasp frame."""
 MOST: Final = 40
 """Maximum number of grasp frames that the arm reaches and that are tried."""
+TURNING: Final = 150.0
+"""[N m/rad] Stiffness about the axis of a hinge that the hand is on."""
 LEAD: Final = 0.02
-"""[m] The hand leads by this at most."""
+"""[rad or m] The hand leads by this at most."""
+CREEP: Final = 1e-3
+"""[rad/s or m/s] Speed at which friction is overcome."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,36 +125,41 @@ def _outward(planner: Planner, state: PlanningState, handling: Handling, X_WP: T
 
 
 def _follow(handling: Handling, planner: Planner, builder: MotionBuilder) -> None:
-    """Move the link with the hand to the goal, and a little further by the lead of the compliant hand."""
+    """Move the link with the hand to the goal, and further by the lead of the compliant hand."""
     joint, goal, state = handling.joint, handling.goal, builder.now
     X_WT = planner.tool_pose(state)
     here = position_of(planner, state, joint)
     sense = float(np.sign(goal.position - here))
     twist = tool_twist(planner, state, joint, X_WT)
-    poses = along(planner, state, joint, goal.position, X_WT)
-    for share in (0.0, 1.0):
-        q = here + share * (goal.position - here)
-        refuse_weak(planner, builder.now, needed(planner, state, joint, q, 1e-3 * sense, X_WT).wrench, handling.label)
-    with compliant(builder, compliance(twist, X_WT)):
+    efforts = [needed(joint, q, CREEP * sense) for q in (here, goal.position)]
+    refuse_weak(planner, state, wrench_of(twist, max(efforts, key=abs)), handling.label)
+    law, stiffness = compliance(twist, X_WT)
+    beyond = goal.position + max(-LEAD, min(LEAD, efforts[-1] / stiffness))
+    with compliant(builder, law):
         try:
-            builder.along(handling.label, poses, speed=handling.speed)
+            builder.along(handling.label, along(planner, state, joint, beyond, X_WT), speed=handling.speed)
         except NotPlannable as refusal:
             if refusal.reason == "line":
                 raise refusal.but(hint=f"move '{joint.parent}' nearer, or move its joint less far") from refusal
             raise
 
 
-def compliance(twist: Array, X_WT: Transform) -> Compliance:
-    """Stiff along the path of the tool, soft across it and about all axes; about the path's axis where it only turns."""
-    linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
-    turning = linear < 0.01 * angular
-    path = X_WT.R.T @ (twist[3:] / angular if turning else twist[:3] / linear)
+def compliance(twist: Array, X_WT: Transform) -> tuple[Compliance, float]:
+    """The compliance of a hand that moves with a `twist` (6), and its stiffness in the position of the joint.
+
+    It is stiff along the path of the tool, soft across it and about all axes. Where it only turns, near the axis of a
+    hinge, it is stiff about this axis.
+    """
+    linear, angular = float(np.linalg.norm(twist[:3])), float(np.linalg.norm(twist[3:]))
+    turns = linear < LEVER * angular
+    path = X_WT.R.T @ (twist[3:] / angular if turns else twist[:3] / linear)
     other = np.eye(3)[int(np.argmin(np.abs(path)))]
     x = np.cross(other, path)
     x /= np.linalg.norm(x)
     X_TC = Transform.of(R=np.column_stack([x, np.cross(path, x), path]))
-    stiffness = np.array([ACROSS, ACROSS, ACROSS if turning else ALONG, ABOUT, ABOUT, 5.0 * ABOUT if turning else ABOUT])
-    return Compliance(frozen(stiffness), X_TC=X_TC)
+    stiffness = np.array([ACROSS, ACROSS, ACROSS if turns else ALONG, ABOUT, ABOUT, TURNING if turns else ABOUT])
+    own = TURNING * angular**2 if turns else ALONG * linear**2
+    return Compliance(frozen(stiffness), X_TC=X_TC), own
 
 
 def _withdrawn(handling: Handling, planner: Planner, builder: MotionBuilder) -> StepPlan:

@@ -259,9 +259,7 @@ class Planner:
 
     def aboard(self, state: PlanningState, body: str) -> tuple[str, ...]:
         """The movable bodies that move with a body; see `aboard`."""
-        return aboard(
-            self.scene, body, state.bodies, partial(self.contents, state), partial(self.touching, state)
-        )
+        return aboard(self.scene, body, state.bodies, partial(self.contents, state), partial(self.touching, state))
 
     def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
         """Collision query in this state with the scene and the robot itself, with the clearances of the task.

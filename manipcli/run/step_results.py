@@ -83,34 +83,49 @@ def not_moved(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
         plan: of the step.
         now: the measured poses of all bodies.
     """
-    if plan.joint is None or joint_margin(planner, plan.joint, now) >= 0.0:
+    goal = plan.joint
+    if goal is None:
         return ""
-    unit = scene_joint(planner, plan.joint).unit
-    expected = f"expected {_at_least(plan.joint.side)}{_travel(plan.joint.position, unit)}"
-    return f"{moved_text(planner, plan.joint, now)}, {expected} within {_travel(plan.joint.within, unit)}"
+    joint, position = _joint(planner, goal, now)
+    if goal.short(position) <= goal.within:
+        return ""
+    bound = "at least " if goal.side > 0.0 else "at most " if goal.side < 0.0 else ""
+    expected = f"expected {bound}{_travel(goal.position, joint)} within {_travel(goal.within, joint)}"
+    return f"joint '{joint.name}' is at {_travel(position, joint)}, {expected}"
 
 
-def moved_text(planner: Planner, goal: JointGoal, now: PlanningState) -> str:
-    """`joint 'drawer/slide' is at 150.2 mm`."""
-    joint = scene_joint(planner, goal)
-    return f"joint '{joint.name}' is at {_travel(position_of(planner, now, joint), joint.unit)}"
+def _joint(planner: Planner, goal: JointGoal, now: PlanningState) -> tuple[SceneJoint, float]:
+    """The joint that a step moves, and its position."""
+    joint = next(joint for joint in planner.scene.joints if joint.name == goal.name)
+    return joint, position_of(planner, now, joint)
 
 
-def joint_margin(planner: Planner, goal: JointGoal, now: PlanningState) -> float:
-    """[rad or m] to the tolerance of a joint that a step moves; negative: it missed its goal."""
-    return goal.within - goal.short(position_of(planner, now, scene_joint(planner, goal)))
+def _travel(value: float, joint: SceneJoint) -> str:
+    return mm(value) if joint.slides else deg(value)
 
 
-def scene_joint(planner: Planner, goal: JointGoal) -> SceneJoint:
-    return next(joint for joint in planner.scene.joints if joint.name == goal.name)
+def missed(planner: Planner, plan: StepPlan, now: PlanningState, *, poured: bool) -> str:
+    """Why a step does not have its result in the state `now`; "" where it has. `poured`: what it pours counts."""
+    why = not_placed(planner, plan, now) or not_moved(planner, plan, now)
+    return why or (not_poured(planner, plan, now) if poured else "")
 
 
-def _at_least(side: float) -> str:
-    return "at least " if side > 0.0 else "at most " if side < 0.0 else ""
+def margin(planner: Planner, plan: StepPlan, now: PlanningState) -> tuple[float, str]:
+    """By how much a step has its result: to the limit of its place [m], or of its joint [m or rad], and the unit."""
+    if plan.joint is None:
+        return PLACED - from_place(planner, plan, now)[0], "m"
+    joint, position = _joint(planner, plan.joint, now)
+    return plan.joint.within - plan.joint.short(position), joint.unit
 
 
-def _travel(value: float, unit: str) -> str:
-    return mm(value) if unit == "m" else deg(value)
+def result_texts(
+    planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
+) -> list[str]:
+    """What a step that is done reports of its result. `situation`: measures the state; None without physics."""
+    if plan.joint is None or situation is None:
+        return poured_texts(planner, plan, situation)
+    joint, position = _joint(planner, plan.joint, situation(plan.end))
+    return [f"joint '{joint.name}' is at {_travel(position, joint)}"]
 
 
 def poured_texts(
