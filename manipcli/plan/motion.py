@@ -196,6 +196,27 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True)
+class JointGoal:
+    """Where a step moves a joint of the scene.
+
+    Attributes:
+        name: of the joint.
+        position: [rad or m] that it is planned to have at the end.
+        side: 1: this or more, -1: this or less, 0: neither.
+        within: [rad or m] tolerance.
+    """
+
+    name: str
+    position: float
+    side: float
+    within: float
+
+    def short(self, position: float) -> float:
+        """[rad or m] by which a position misses the goal; negative: by which it is beyond it on its `side`."""
+        return self.side * (self.position - position) if self.side else abs(position - self.position)
+
+
+@dataclass(frozen=True, slots=True)
 class StepPlan:
     """The motions of one step, and the state after them.
 
@@ -205,6 +226,7 @@ class StepPlan:
         placed: the body that it sets down at its pose in `end`; "" for none.
         poured: the bodies that it pours into the container `into`.
         stream: where they land; None if the plan does not predict it.
+        joint: the joint of the scene that it moves; None for none.
     """
 
     motions: tuple[Motion, ...]
@@ -213,6 +235,7 @@ class StepPlan:
     poured: tuple[str, ...] = ()
     into: str = ""
     stream: Stream | None = None
+    joint: JointGoal | None = None
 
     @property
     def duration(self) -> float:

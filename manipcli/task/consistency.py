@@ -152,7 +152,7 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
         unknown = member.check(step.body, robot, context.scene)
         if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):
             unknown = (no_hand(robot), *(p for p in unknown if not isinstance(p, UnknownPosture)))
-        yield from ((ABSENT, at, p) for p in unknown)
+        yield from ((int(p.code.removeprefix("TASK") or ABSENT), at, p) for p in unknown)
         if claims is not None and not unknown:
             without = member.uncommanded(step.body, robot, claims)
             yield from ((UNCOMMANDED, at, p) for p in without)
