@@ -8,6 +8,7 @@ from typing import Literal
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried, Pair
+from manipcli.plan.compliance import Compliance
 from manipcli.plan.trajectory import JointTrajectory
 
 Strictness = Literal["strict", "best_effort"]
@@ -134,6 +135,7 @@ class Motion:
         takes: the object that is attached to the tool at its end, for robots with a `holding`.
         lets_go: what is attached to the tool is freed at its beginning.
         looks: what it locates; it ends when the picture has arrived.
+        compliance: how the arm yields in it; None: it does not.
     """
 
     label: str
@@ -150,6 +152,7 @@ class Motion:
     takes: str | None = None
     lets_go: bool = False
     looks: Look | None = None
+    compliance: Compliance | None = None
 
     @property
     def closes(self) -> bool:

@@ -50,6 +50,7 @@ class StepMember(Generic[S]):
         request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
+        compliant: (spec) -> whether its motions have a `compliance`, so that the arm needs a compliant controller.
         moves: whether it moves the arm, so that `keep` means something.
         part: (spec, robot, joints of the hand) -> what it moves, for a `parallel`; `both` also for what needs the hand
             at a place.
@@ -63,6 +64,7 @@ class StepMember(Generic[S]):
     clause: Callable[[S, RobotModel], str]
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
+    compliant: Callable[[S], bool] = lambda _: False
     moves: bool = True
     part: Callable[[S, RobotModel, Sequence[str]], Part] = lambda *_: "both"
 

@@ -17,6 +17,7 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.from_motion import stopped
+from manipcli.plan.steps import STEPS
 from manipcli.record.channels import SENSORS
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.belief import Belief
@@ -52,7 +53,7 @@ def build_manager(task: Task, kinematics: Kinematics | None = None) -> Controlle
     kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
     return build_controllers(
         file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat,
-        stop_planner=stopped,
+        stop_planner=stopped, compliant=any(STEPS[step.verb].compliant(step.body) for step in task.spec.steps),
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from manipcli.control.controllers.cartesian_impedance import (
     check,
 )
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
-from manipcli.control.impedance_spec import PostureSpec, TaskSpaceSpec
+from manipcli.spec.impedance import PostureSpec, TaskSpaceSpec
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, matrix_from_axis_angle
 from manipcli.model.build_robot import build_robot
