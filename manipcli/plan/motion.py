@@ -8,6 +8,7 @@ from typing import Literal
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried, Pair
+from manipcli.plan.portion import Portion
 from manipcli.plan.trajectory import JointTrajectory
 
 Strictness = Literal["strict", "best_effort"]
@@ -134,6 +135,7 @@ class Motion:
         takes: the object that is attached to the tool at its end, for robots with a `holding`.
         lets_go: what is attached to the tool is freed at its beginning.
         looks: what it locates; it ends when the picture has arrived.
+        pours: it stops as soon as the `portion` of the step has left the container.
     """
 
     label: str
@@ -150,6 +152,7 @@ class Motion:
     takes: str | None = None
     lets_go: bool = False
     looks: Look | None = None
+    pours: bool = False
 
     @property
     def closes(self) -> bool:
@@ -202,6 +205,7 @@ class StepPlan:
         placed: the body that it sets down at its pose in `end`; "" for none.
         poured: the bodies that it pours into the container `into`.
         stream: where they land; None if the plan does not predict it.
+        portion: how much of them; None: all.
     """
 
     motions: tuple[Motion, ...]
@@ -210,6 +214,7 @@ class StepPlan:
     poured: tuple[str, ...] = ()
     into: str = ""
     stream: Stream | None = None
+    portion: Portion | None = None
 
     @property
     def duration(self) -> float:
