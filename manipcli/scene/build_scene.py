@@ -67,7 +67,6 @@ class _Builder:
         self.shapes: dict[str, BodyShape] = {}
         self.kinds: dict[str, str] = {}
         self.moved_by: dict[str, SceneJoint] = {}  # by the body that they move
-        self.jointed: set[str] = set()
         self.parts: dict[str, Frame] = {}
         self.files: dict[str, Parts] = {}
         links = {name: body for own, file in spec.scene.items() for name, body in self._read(own, file)}
@@ -91,7 +90,6 @@ class _Builder:
             X_WO = self._pose(name)
             if X_WO is not None and name in self.shapes:
                 bodies.append(self._body(name, self.spec.scene[name], X_WO))
-        bodies.sort(key=lambda body: body.name.partition(SEPARATOR)[0] in self.jointed)
         frames = (*named_frames(self.spec), *self.parts.values())
         if not self.findings:
             for a, b, depth in overlaps(bodies, self.moved_by.values()):
@@ -121,7 +119,6 @@ class _Builder:
             if len(parts.links) == 1 and spec.joints is None:
                 return
             made, faults = jointed(name, spec, parts)
-            self.jointed |= {name} if made.joints else set()
             self.moved_by |= {joint.child: joint for joint in made.joints}
             self.parts |= {frame.name: frame for frame in made.frames}
             for fault in faults:

@@ -6,7 +6,7 @@ Every link of a jointed thing is a body of its own, so the position of a joint f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -153,3 +153,9 @@ def carried_by(joints: Iterable[SceneJoint], body: str) -> tuple[str, ...]:
         if joint.parent in (body, *found):
             found.append(joint.child)
     return tuple(found)
+
+
+def things(joints: Sequence[SceneJoint]) -> tuple[tuple[str, ...], ...]:
+    """The bodies of each jointed thing, its root first."""
+    roots = dict.fromkeys(root_of(joints, joint.child) for joint in joints)
+    return tuple((root, *carried_by(joints, root)) for root in roots)

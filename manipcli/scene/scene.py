@@ -118,9 +118,10 @@ class Frame:
 
 @dataclass(frozen=True)
 class Scene:
-    """Bodies, named frames and gravity (3,) [m/s2] in the world; bodies of jointed things are last.
+    """Bodies, named frames and gravity (3,) [m/s2] in the world; the bodies that joints move are last.
 
-    `joints`: parents before children. What a joint moves is a movable body, also where its root is fixed.
+    `joints`: parents before children, in the order of the bodies that they move. These are movable also where the root
+    is fixed.
     """
 
     bodies: tuple[Body, ...]
@@ -143,6 +144,10 @@ class Scene:
 
     def body(self, name: str) -> Body:
         return self._bodies[name]
+
+    def mover(self, body: str) -> tuple[int, SceneJoint]:
+        """The number of the joint that moves a body, and the joint."""
+        return next((k, joint) for k, joint in enumerate(self.joints) if joint.child == body)
 
     def frame(self, name: str) -> Frame | None:
         """The frame of this name: a named frame, a part of a body, or a part that the body has by its shape."""
