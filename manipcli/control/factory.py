@@ -8,6 +8,7 @@ from functools import cache
 from manipcli.control.as_meant import as_meant
 from manipcli.control.chain import chain_finding, target_of
 from manipcli.control.command import may_go_together
+from manipcli.control.compliant_build import compliant_controllers
 from manipcli.control.controller import BuildContext
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.feed_forward import ModelFeedForward
@@ -39,6 +40,7 @@ def build_controllers(
     kinematics: Kinematics | None = None,
     compat: Compat | None = None,
     stop_planner: StopPlanner | None = None,
+    compliant: bool = False,
 ) -> ControllerManager:
     """The controllers of a file, for a robot: loaded, configured, and activated where the file has `active: true`.
 
@@ -50,6 +52,7 @@ def build_controllers(
         kinematics: of the robot, for those that need its dynamics; None: made when needed.
         compat: the rules where ROS 1 and 2 differ; None: the safer rule of each.
         stop_planner: plans stops without `compat`; None: they have a constant deceleration.
+        compliant: with the controllers of compliant steps, see `compliant_build.py`.
 
     Raises:
         InvalidInput: `controller_findings` has errors.
@@ -60,7 +63,8 @@ def build_controllers(
     context = BuildContext(robot, cache(lambda: kinematics or Kinematics(robot)), compat, stop_planner)
     every = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
     built = {name: controller for name, controller in every.items() if controller is not None}
-    wanted = any(controller.feed_forward != "none" for controller in built.values())
+    further = compliant_controllers(spec, context) if compliant else ()
+    wanted = any(controller.feed_forward != "none" for controller in (*built.values(), *further))
     manager = ControllerManager(
         joints=robot.joint_names,
         period=period,
@@ -70,7 +74,11 @@ def build_controllers(
     for name, controller in built.items():
         manager.load(controller, update_rate=spec.controllers[name].update_rate)
         manager.configure(name)
-    manager.switch(activate=[name for name in built if spec.controllers[name].active])
+    for controller in further:
+        manager.load(controller)
+        manager.configure(controller.name)
+    started = [name for name in built if spec.controllers[name].active]
+    manager.switch(activate=[*started, *(own.name for own in further if not own.interfaces)])
     return manager
 
 

@@ -151,6 +151,12 @@ class Kinematics:
         tau: Array = self._pin.rnea(self._model, self._data, q, v, a)
         return tau
 
+    def momentum(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """(p, b) each (n,): the generalised momentum M(q) v, and b = C(q, v)^T v - g(q); p' = b + tau."""
+        C = self._pin.computeCoriolisMatrix(self._model, self._data, q, v)
+        b = C.T @ v - self._pin.computeGeneralizedGravity(self._model, self._data, q)
+        return self.mass_matrix(q) @ v, b
+
     def mass_matrix(self, q: Array) -> Array:
         """M(q) (n, n), symmetric."""
         upper = np.triu(self._pin.crba(self._model, self._data, q))

@@ -18,6 +18,7 @@ from manipcli.plan import constrained_motion as timed
 from manipcli.plan.attachment import attached, freed
 from manipcli.plan.blind_grasp import blindly_closed
 from manipcli.plan.closed_around import closed_around
+from manipcli.plan.compliance import Compliance
 from manipcli.plan.free_motion import Goals, branches, free_trajectory, labelled, refusing, tried
 from manipcli.plan.hand import closed_hand, handless, no_gripper, posture_values
 from manipcli.plan.inverse_kinematics import InverseKinematics
@@ -54,6 +55,7 @@ class MotionBuilder:
         self._verb = verb
         self._allowed = allowed | planner.allowed
         self._motions: list[Motion] = []
+        self.compliance: Compliance | None = None  # of the next motions, see `compliant`
 
     @property
     def now(self) -> PlanningState:
@@ -67,7 +69,7 @@ class MotionBuilder:
     def copy(self) -> MotionBuilder:
         """A copy, to plan alternatives from here."""
         other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
-        other._motions = [*self._motions]
+        other._motions, other.compliance = [*self._motions], self.compliance
         return other
 
     def adopt(self, other: MotionBuilder) -> None:
@@ -288,7 +290,7 @@ class MotionBuilder:
 
     def dwell(self, label: str, duration: float) -> None:
         """Hold still for `duration` [s], and until the step's `until` holds."""
-        self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=True))
+        self._motions.append(Motion(label, None, None, duration, awaits=True, compliance=self.compliance))
 
     def look(self, looks: Look, duration: float) -> None:
         """Hold still until the picture in which a body is located has arrived, at most after `duration` [s]."""
@@ -369,7 +371,8 @@ class MotionBuilder:
         if trajectory is not None:
             self._now = self._now.moved(self._with(trajectory.names, trajectory.positions[-1]))
             self._now = carried_along(self._planner, before, self._now)
-        self._motions.append(Motion(label, trajectory, grip, duration, begins=before, allowed=allowed | self._allowed))
+        motion = Motion(label, trajectory, grip, duration, begins=before, allowed=allowed | self._allowed)
+        self._motions.append(replace(motion, compliance=self.compliance))
 
     def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
         """The present position with other values of some joints; joints that mimic them follow."""

@@ -36,7 +36,7 @@ def carried_along(planner: Planner, before: PlanningState, now: PlanningState) -
     X_WO = planner.kinematics.forward(now.position, carried.link) @ carried.X_LO
     X_WA = planner.body_pose(before, carried.body)
     moved = {carried.body: X_WO}
-    for name in planner.contents(before, carried.body):
+    for name in planner.aboard(before, carried.body):
         moved[name] = X_WO @ X_WA.inverse() @ planner.body_pose(before, name)
     return put(planner, now, moved)
 

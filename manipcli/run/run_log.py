@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from manipcli.control.controller import Controller
+from manipcli.control.felt_force import FeltForce
 from manipcli.control.manager import ControllerManager
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.errors import Diagnostic, InvalidInput
@@ -191,6 +192,8 @@ def recorded(controller: Controller) -> Recorded:
     """The log channel of a controller; None for a controller that is not recorded."""
     if controller.interfaces:
         return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
+    if isinstance(controller, FeltForce):
+        return SensorChannel(controller.name, "wrench", WRENCH, controller.frame, 6)
     if not controller.sensors:
         return None
     (request,) = controller.sensors

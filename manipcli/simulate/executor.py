@@ -20,6 +20,7 @@ from manipcli.core.geometry import Array, wrapped
 from manipcli.model.state import WorldState
 from manipcli.plan.motion import OPENING, GoalTolerances, Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.simulate.compliance_switch import ComplianceSwitch
 from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
@@ -91,12 +92,14 @@ class Executor:
         self._handles: tuple[GoalHandle, ...] = ()
         self._serving: tuple[Follower | Hand, ...] = ()
         self._beside: Executor | None = None
+        self._compliance = ComplianceSwitch(session)
 
     @property
     def beside(self) -> Executor:
         """Another executor for a motion at the same time; `stop` of this one stops it, too."""
         if self._beside is None:
             self._beside = Executor(self._session, touch=self._touch, on_goal=self._on_goal)
+            self._beside._compliance = self._compliance
         return self._beside
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
@@ -150,6 +153,7 @@ class Executor:
         session = self._session
         latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
         switch_text = ""
+        trajectory = self._compliance.before(motion)
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
             switch_text = _switch_text(switched)
@@ -157,12 +161,13 @@ class Executor:
                 return MotionEnd("failed", switch_text)
         start = session.state.position.copy()
         try:
-            handles = self._send(motion)
+            handles = self._send(motion, trajectory)
         except InvalidArgument:  # no active controller, after a switch
             self._cancel()
             raise
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
+        presses = motion.compliance is not None and motion.compliance.ends_held
         while True:
             state = yield
             for handle in handles:
@@ -173,6 +178,11 @@ class Executor:
                 self._cancel()
                 return _fault(session)
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
+            if presses:
+                if wrong := self._compliance.failure:
+                    self._cancel()
+                    return MotionEnd("failed", wrong)
+                busy = self._compliance.presses_yet
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
@@ -185,8 +195,11 @@ class Executor:
                 return replace(DONE, text=f"stopped {when}: `until` held")
             if not busy and (awaited is None or holds):
                 far = self._far(motion, start, state)
-                if far:
-                    return MotionEnd("failed", far)
+                felt, wrong = self._compliance.result(motion)
+                if far or wrong:
+                    return MotionEnd("failed", far or wrong)
+                if felt:
+                    return replace(DONE, text=felt)
                 return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
@@ -261,14 +274,14 @@ class Executor:
             raise Alarmed(wrong)
         return state
 
-    def _send(self, motion: Motion) -> tuple[GoalHandle, ...]:
+    def _send(self, motion: Motion, trajectory: JointTrajectory | None) -> tuple[GoalHandle, ...]:
         manager = self._session.manager
         self._handles, self._serving = (), ()
-        if motion.trajectory is not None:
-            follower = manager.serving(motion.trajectory.names)
+        if trajectory is not None:
+            follower = manager.serving(trajectory.names)
             if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
-            whole = self._completed(motion.trajectory, follower)
+            whole = self._completed(trajectory, follower)
             own = motion.tolerances
             self._accept(follower.name, follower.send_goal(whole if own is None else _goal(whole, own)))
             self._serving += (follower,)
@@ -312,7 +325,7 @@ class Executor:
         `start`: (n) measured when the motion began. A robot that may touch something in this motion may press on it.
         """
         trajectory, robot = motion.trajectory, self._session.robot
-        if trajectory is None or motion.guarded or motion.allowed:
+        if trajectory is None or motion.guarded or motion.allowed or motion.compliance is not None:
             return ""
         columns = robot.indices(trajectory.names)
         joints = [robot.joint(name) for name in trajectory.names]

@@ -52,7 +52,6 @@ from manipcli.control.controller import (
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.force_reference import AXES, ForceReference, ForceReferenceSpec
 from manipcli.control.gains import strangers
-from manipcli.control.impedance_spec import NotNegative, PostureSpec, TaskSpaceSpec, six
 from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
 from manipcli.control.trajectory_goal import TrajectoryGoal
@@ -66,6 +65,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.pose_error import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, Interface, Role
+from manipcli.spec.impedance import NotNegative, PostureSpec, TaskSpaceSpec, six
 
 SINGULAR: Final = 1e-3
 """s: tool directions in which the joints move less than this [m or rad per rad] belong to the null space."""
@@ -192,12 +192,13 @@ class CartesianImpedanceController:
         self._q = np.zeros(len(kinematics.robot.joint_names))
         self._singular = SINGULAR**2 * np.eye(6)
         self.output = ControllerOutput.of(len(self.joints), 1, speed=self._follower.output.speed)
-        self._error = np.zeros(6)
+        self._error = self._stretch = np.zeros(6)
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))
         self._updates = 0
         self._pose: Transform | None = None
         self._held: Array | None = None
+        self._shift: Array | None = None  # (3,) of the reference along its axes [m]
         self._time = 0.0
 
     def _six(self, what: str, values: npt.ArrayLike) -> Array:
@@ -285,6 +286,8 @@ class CartesianImpedanceController:
         error[:3] = p_WR - p_WT
         if self._force is not None:
             error[:3] += self._force.update(period) * (R_WR @ self._force.axis)
+        if self._shift is not None:
+            error[:3] += R_WR @ self._shift
         error[3:] = rotation_vector(R_WR @ R_WT.T)
         along = error
         if self._turns:
@@ -293,6 +296,7 @@ class CartesianImpedanceController:
         if self._updates % WEIGHED == 0:
             self._weigh(J, kinematics.mass_matrix(q)[self._block])
         self._updates += 1
+        self._stretch = along
         wrench = self._stiffness * along + self._task_damping * (J @ slip)
         free = self._posture * (output.position - measured.position) + self._posture_damping * slip
         wrench -= np.linalg.solve(J @ J.T + self._singular, J @ free)
@@ -308,8 +312,7 @@ class CartesianImpedanceController:
         if self._held is None:
             self._held = np.array(measured.position)
         output.position[:] = self._held
-        output.velocity[:] = 0.0
-        output.acceleration[:] = 0.0
+        output.rows[1:3] = 0.0
 
     def _weigh(self, J: Array, mass: Array) -> None:
         """The damping along the axes of `J`, and of the joints."""

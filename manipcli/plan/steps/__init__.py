@@ -4,7 +4,23 @@ from typing import Any
 
 from manipcli.core.registry import Seam
 from manipcli.plan.step import StepMember
-from manipcli.plan.steps import follow, grasp, lift, locate, move, pick, place, pour, release, switch_controllers, wait
+from manipcli.plan.steps import (
+    close,
+    follow,
+    grasp,
+    lift,
+    locate,
+    move,
+    pick,
+    place,
+    pour,
+    press,
+    release,
+    switch_controllers,
+    turn,
+    wait,
+)
+from manipcli.plan.steps import open as open_step
 
 STEPS: Seam[StepMember[Any]] = Seam(
     kind="step",
@@ -20,5 +36,9 @@ STEPS: Seam[StepMember[Any]] = Seam(
         lift.MEMBER,
         pour.MEMBER,
         place.MEMBER,
+        open_step.MEMBER,
+        close.MEMBER,
+        turn.MEMBER,
+        press.MEMBER,
     ),
 )

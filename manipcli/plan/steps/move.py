@@ -24,12 +24,13 @@ from pydantic import Field, field_validator, model_validator
 
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.conditions.frames import unknown_frame
-from manipcli.core.geometry import Array, Transform
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, listing, named, point
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.clauses import at_share, joint_values
+from manipcli.plan.compliance import Compliance
 from manipcli.plan.limit_check import verify_written
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
@@ -42,6 +43,7 @@ from manipcli.plan.tool_path import arc, blended
 from manipcli.plan.unknown_names import unknown_joint, unknown_pose
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
+from manipcli.spec.impedance import TaskSpaceSpec, six
 from manipcli.spec.names import BodyName, FrameName, JointName, PoseName
 from manipcli.spec.quantity import JointValue, Length, Share
 from manipcli.spec.robot import PoseSpec, Vector3
@@ -134,6 +136,11 @@ class MoveSpec(Model):
         "Default: none.",
     )
     guarded: bool = Field(False, description="Stop as soon as the step's `until` holds. Default false.")
+    stiffness: TaskSpaceSpec | None = Field(
+        None,
+        description="The arm yields like a spring along and about the axes of the tool [N/m, N m/rad]; no controllers "
+        "file is needed for it. A guarded move then stays at the force at which it stops. Default: it does not yield.",
+    )
 
     @field_validator("to", mode="before")
     @classmethod
@@ -233,7 +240,8 @@ def _plan(spec: MoveSpec, planner: Planner, state: PlanningState, *, avoid: Sequ
             end = met(planner, state, end, motion.trajectory, allowed)
         else:
             end = pushed(planner, state, end, motion.trajectory, spec.touch)
-    return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded),), end)
+    compliance = None if spec.stiffness is None else Compliance(frozen(six(spec.stiffness)))
+    return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded, compliance=compliance),), end)
 
 
 def _goal(spec: MoveSpec, planner: Planner, state: PlanningState) -> tuple[Transform, Leaving]:
@@ -337,5 +345,6 @@ MEMBER = StepMember(
     uncommanded=uncommanded,
     clause=clause,
     guarded=lambda spec: spec.guarded,
+    compliant=lambda spec: spec.stiffness is not None,
     part=part,
 )

@@ -1,0 +1,102 @@
+"""Compliance that a motion brings along: a spring around the reference, and a force with which the tool presses.
+
+    with compliant(builder, Compliance.of(along=400, across=1500, about=40)):
+        builder.straight("pull", X_WT, speed=0.2)
+
+The trajectory of a compliant motion is planned, timed and checked like any other; it is the reference of the law. The
+executor switches the arm to its compliant controller before such a motion, and back before the next one without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, frozen
+
+SOFT = 400.0
+"""[N/m] Stiffness along the axis of a force, and for motions that contact guides."""
+FIRM = 1500.0
+"""[N/m] Stiffness across the axis of a force."""
+WRIST = 40.0
+"""[N m/rad] Stiffness of the orientation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pressing:
+    """A force with which the tool presses along an axis.
+
+    Before contact the reference advances along the axis at `speed`. From the contact on, it is shifted until the felt
+    force is the target.
+
+    Attributes:
+        axis: (3,) unit vector in the compliant frame; the tool advances along it.
+        target: [N] above 0, on what it touches.
+        speed: [m/s] before contact.
+        reach: [m] within which it must meet something.
+        bandwidth: [Hz] of the force in stiff contact.
+        hold: [s] the motion ends when the force has been within `TOLERANCE` of the target for this long; None: it ends
+            with its trajectory.
+    """
+
+    axis: Array
+    target: float
+    speed: float
+    reach: float
+    bandwidth: float = 1.0
+    hold: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compliance:
+    """How the arm yields: a spring along and about the axes of a frame at the reference.
+
+    Attributes:
+        stiffness: (6,) along and about x, y, z of the compliant frame [N/m, N m/rad].
+        force: with which it presses besides; None: only the spring.
+        X_TC: the compliant frame in the tool frame; None: the tool frame itself.
+    """
+
+    stiffness: Array
+    force: Pressing | None = None
+    X_TC: Transform | None = None
+
+    @property
+    def ends_held(self) -> bool:
+        """Whether a motion with it ends when its force has been held."""
+        return self.force is not None and self.force.hold is not None
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        along: float = SOFT,
+        across: float = FIRM,
+        about: float | Sequence[float] = WRIST,
+        axis: str = "z",
+        force: Pressing | None = None,
+        X_TC: Transform | None = None,
+    ) -> Compliance:
+        """`along` the axis x, y or z of the frame, `across` it, and `about` all axes, or each."""
+        stiffness = np.full(6, across)
+        stiffness["xyz".index(axis)] = along
+        stiffness[3:] = about
+        return cls(frozen(stiffness), force, X_TC)
+
+
+class Complying(Protocol):
+    """Adds motions with this compliance, as `MotionBuilder` does."""
+
+    compliance: Compliance | None
+
+
+@contextmanager
+def compliant(builder: Complying, compliance: Compliance) -> Iterator[None]:
+    """Make the motions that are added inside compliant."""
+    before, builder.compliance = builder.compliance, compliance
+    yield
+    builder.compliance = before

@@ -1,0 +1,120 @@
+"""Switching of the arm to its compliant controller before a compliant motion, and back before the next one without."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipcli.control.compliant_arm import Compliant, complies
+from manipcli.control.manager import ControllerManager
+from manipcli.control.pressing import PressingReference
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+from manipcli.plan.motion import Motion, Switch
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.simulate.session import Session
+
+BLEND = 0.5
+"""[s] Time in which a trajectory that begins elsewhere than planned joins its plan."""
+TOGETHER = 1e-12
+"""[rad or m] Below this a trajectory begins where it was planned."""
+
+
+class ComplianceSwitch:
+    """The compliant controller of a session's arm; its controllers change without a step of the reference.
+
+    Args:
+        session: of the run.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._owners: tuple[str, ...] = ()
+
+    @property
+    def _manager(self) -> ControllerManager:
+        return self._session.manager
+
+    @property
+    def _arm(self) -> Compliant | None:
+        return next((own for own in self._manager.controllers if complies(own)), None)
+
+    @property
+    def _pressing(self) -> PressingReference | None:
+        arm = self._arm
+        return None if arm is None else arm.pressing
+
+    @property
+    def presses_yet(self) -> bool:
+        """Whether the force of the motion has not been held for its time."""
+        own = self._pressing
+        return own is not None and own.held < (own.pressing.hold or 0.0)
+
+    @property
+    def failure(self) -> str:
+        """Why the force cannot be reached; "" where it may be."""
+        own = self._pressing
+        return "" if own is None else own.missed
+
+    def result(self, motion: Motion) -> tuple[str, str]:
+        """What was felt in a motion with a force that has ended, and why that is a failure; "" where it is none."""
+        own = self._pressing
+        if motion.compliance is None or motion.compliance.force is None or own is None:
+            return "", ""
+        return own.text, "" if motion.compliance.ends_held else own.unsteady
+
+    def before(self, motion: Motion) -> JointTrajectory | None:
+        """Switch as a motion needs it; its trajectory, which begins at the present reference of the arm.
+
+        Raises:
+            InvalidArgument: no controller complies, or the switch was refused.
+        """
+        arm, trajectory = self._arm, motion.trajectory
+        if motion.compliance is None:
+            if arm is None or not self._owners or (trajectory is None and motion.switch is None):
+                return trajectory
+            if not self._manager.is_active(arm.name):  # a step has switched
+                self._owners = ()
+                return trajectory
+            if trajectory is not None and not set(trajectory.names) & set(arm.joints):
+                return trajectory
+            self._switch(self._owners)
+            self._owners = ()
+            return self._joined(trajectory, arm, self._session.state.position)
+        if arm is None:
+            raise InvalidArgument("CTRL152", f"no compliant controller moves the arm for the motion '{motion.label}'")
+        fresh = not self._manager.is_active(arm.name)
+        if fresh:
+            self._owners = self._switch((arm.name,))
+        arm.comply(motion.compliance)
+        if fresh:
+            return self._joined(trajectory, arm, self._session.state.position)
+        reference = np.array(self._session.state.position)
+        reference[self._session.robot.indices(arm.joints)] = arm.output.position
+        return self._joined(trajectory, arm, reference)
+
+    def _switch(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """The controllers that were deactivated."""
+        done = self._manager.carry_out(Switch(to=names), time=self._session.time)
+        if not done.ok:
+            raise InvalidArgument("CTRL152", "; ".join(done.messages))
+        return done.deactivated
+
+    def _joined(self, trajectory: JointTrajectory | None, arm: Compliant, position: Array) -> JointTrajectory | None:
+        """The trajectory from `position` (n), which it leaves with minimum jerk for its plan."""
+        if trajectory is None:
+            return None
+        off = position[self._session.robot.indices(trajectory.names)] - trajectory.positions[0]
+        off[[name not in arm.joints for name in trajectory.names]] = 0.0
+        if np.abs(off).max() < TOGETHER:
+            return trajectory
+        span = max(min(BLEND, trajectory.duration), self._session.period)
+        u = np.clip((trajectory.times - trajectory.times[0]) / span, 0.0, 1.0)
+        curves = (
+            1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2),
+            -30.0 * u**2 * (1.0 - u) ** 2 / span,
+            -60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / span**2,
+        )
+        given = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+        q, v, a = (None if row is None else row + np.outer(c, off) for row, c in zip(given, curves, strict=True))
+        assert q is not None
+        return JointTrajectory.of_arrays(trajectory.names, trajectory.times, q, v, a)
