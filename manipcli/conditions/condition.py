@@ -188,13 +188,10 @@ def unknown_body(
     """A problem if the scene has no (movable) body of this name; TASK365 if joints hold one that is to be `carried`."""
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
-        joint = (
-            next((joint for joint in scene.joints if name in (joint.parent, joint.child)), None) if carried else None
-        )
-        if joint is None:
+        if not carried or not any(name in (joint.parent, joint.child) for joint in scene.joints):
             return ()
         hint = "use `open`, `close` or `turn`"
-        return (Problem(loc, f"'{name}' has the joint '{joint.name}' and cannot be carried", hint, "TASK365"),)
+        return (Problem(loc, f"'{name}' is held by a joint and cannot be carried", hint, "TASK365"),)
     if (several := one_of_many(name, known)) is not None:
         return (Problem(loc, *several),)
     word = "a movable body of the scene" if movable else "in the scene"
