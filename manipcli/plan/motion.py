@@ -9,6 +9,7 @@ from typing import Literal
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried, Pair
 from manipcli.plan.compliance import Compliance
+from manipcli.plan.portion import Portion
 from manipcli.plan.trajectory import JointTrajectory
 
 Strictness = Literal["strict", "best_effort"]
@@ -136,6 +137,7 @@ class Motion:
         lets_go: what is attached to the tool is freed at its beginning.
         looks: what it locates; it ends when the picture has arrived.
         compliance: how the arm yields in it; None: it does not.
+        pours: it stops as soon as the `portion` of the step has left the container.
     """
 
     label: str
@@ -153,6 +155,7 @@ class Motion:
     lets_go: bool = False
     looks: Look | None = None
     compliance: Compliance | None = None
+    pours: bool = False
 
     @property
     def closes(self) -> bool:
@@ -227,6 +230,7 @@ class StepPlan:
         poured: the bodies that it pours into the container `into`.
         stream: where they land; None if the plan does not predict it.
         joint: the joint of the scene that it moves; None for none.
+        portion: how much of them; None: all.
     """
 
     motions: tuple[Motion, ...]
@@ -236,6 +240,7 @@ class StepPlan:
     into: str = ""
     stream: Stream | None = None
     joint: JointGoal | None = None
+    portion: Portion | None = None
 
     @property
     def duration(self) -> float:

@@ -16,6 +16,8 @@ from manipcli.model.state import Contact, WorldState, body_pose
 from manipcli.plan.flight import room
 from manipcli.scene.scene import Scene
 
+REACTION: Final = 0.3
+"""[s] Time in which a tilt is stopped and reversed."""
 SHOWN: Final = 3
 """Bodies that a text describes one by one."""
 
@@ -26,6 +28,7 @@ class _Poured:
 
     Attributes:
         below, velocity: [m] of its centre below the rim, and its velocity (3,) [m/s], when last seen in the cup.
+        out: [m/s] its velocity along the axis of the cup, towards the rim.
         left: its velocity (3,) [m/s] at the rim; None: it is in the cup.
         tilt: [rad] of the cup at that time.
         landed: where; "" while it flies.
@@ -33,6 +36,7 @@ class _Poured:
 
     below: float = math.inf
     velocity: Array | None = None
+    out: float = 0.0
     left: Array | None = None
     tilt: float = 0.0
     landed: str = ""
@@ -69,7 +73,7 @@ class PourWatch:
                 below = hollow.rim - float(p_S[2])
                 velocity = np.array(state.body_linear[names.index(name)])
                 if below >= 0.0:
-                    one.below, one.velocity = below, velocity
+                    one.below, one.velocity, one.out = below, velocity, float(velocity @ X_WS.R[:, 2])
                     continue
                 share = one.below / (one.below - below) if math.isfinite(one.below) else 1.0
                 before = velocity if one.velocity is None else one.velocity
@@ -79,6 +83,18 @@ class PourWatch:
                 ground = self._met(name, contacts)
                 if ground:
                     one.landed = self._place(state, centre, one.left, ground)
+
+    @property
+    def left(self) -> tuple[str, ...]:
+        """What has left the cup."""
+        return tuple(name for name, one in self._bodies.items() if one.left is not None)
+
+    @property
+    def leaving(self) -> tuple[str, ...]:
+        """What has left the cup, or is so near to its rim and so fast that it cannot be kept in it."""
+        return tuple(
+            name for name, one in self._bodies.items() if one.left is not None or one.below < REACTION * one.out
+        )
 
     def text(self) -> str:
         """What left the rim and did not land in the container; "" for nothing."""

@@ -18,6 +18,7 @@ from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
 from manipcli.run.awaited import missing, no_longer, sooner
 from manipcli.run.belief import Belief
+from manipcli.run.dosing import Dosing
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.looking import Looking
@@ -212,6 +213,9 @@ class StepAttempt:
         if before.carried is not None and self._physics:
             self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
+        dosing = None
+        if planned.plan.portion is not None and self._pour is not None and self._physics:
+            dosing = Dosing(self._plan.planner, planned.plan, self._pour, self._measured.situation)
         with self._awaited(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None
@@ -230,6 +234,8 @@ class StepAttempt:
                     over = sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
                 if motion.looks is not None:
                     end = yield from self._look_at(motion.looks, planned, over)
+                elif dosing is not None:
+                    end = yield from dosing.running(motion, executor, over)
                 else:
                     end = yield from executor.running(motion, until=until, deadline=over)
                 if end.outcome != "done":
@@ -247,7 +253,7 @@ class StepAttempt:
                         return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
-                awaited = awaited and not motion.awaits
+                awaited = awaited and (dosing is not None or not motion.awaits)
                 texts += [end.text + no_longer(motion, probe)] if end.text else []
             self._believed = self._looking.corrected(planned.plan)
             if awaited and until is not None:

@@ -67,8 +67,10 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
         return ""
     inside = planner.contents(replace(now, carried=None), plan.into)
     missing = [name for name in plan.poured if name not in inside]
-    if not missing:
+    if not missing or (plan.portion is not None and _reached(planner, plan, inside)):
         return ""
+    if plan.portion is not None:
+        return f"less than {plan.portion.text} was poured into '{plan.into}': {counted(planner, plan, now)}"
     first = missing[0]
     where = f"still in '{_held(plan)}'" if first in _kept(planner, plan, now) else f"at {_at(planner, now, first)}"
     counts = f"; {counted(planner, plan, now)}" if len(plan.poured) > 1 else ""
@@ -126,6 +128,12 @@ def result_texts(
         return poured_texts(planner, plan, situation)
     joint, position = _joint(planner, plan.joint, situation(plan.end))
     return [f"joint '{joint.name}' is at {_travel(position, joint)}"]
+
+
+def _reached(planner: Planner, plan: StepPlan, names: Sequence[str]) -> bool:
+    """Whether the bodies of these names that a step pours are its portion."""
+    contents = [planner.scene.body(name) for name in plan.poured]
+    return plan.portion is None or plan.portion.reached(contents, [body for body in contents if body.name in names])
 
 
 def poured_texts(

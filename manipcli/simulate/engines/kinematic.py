@@ -1,5 +1,5 @@
-"""Ideal engine: exact tracking without physics; objects do not move, joints of the scene keep their positions, and there are no
-contacts."""
+"""Ideal engine: exact tracking without physics; objects do not move, joints of the scene stay where they are, and there
+are no contacts."""
 
 from __future__ import annotations
 
