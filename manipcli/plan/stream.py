@@ -18,15 +18,13 @@ from manipcli.plan.flight import (
     Contents,
     Leaving,
     Tilting,
-    depth_of,
     fall,
     hollow_along,
     leaving,
     room,
 )
-from manipcli.plan.motion import PlanningState, Stream
+from manipcli.plan.motion import PlanningState, StepPlan, Stream
 from manipcli.plan.planner import Planner
-from manipcli.plan.trajectory import JointTrajectory
 from manipcli.scene.scene import Body
 
 _SAMPLES: Final = 250  # of the tilt; between them it is linear
@@ -59,7 +57,7 @@ class Pouring:
         if not names or body.interior is None or receiver.interior is None or gz >= 0.0 or math.hypot(gx, gy) > 1e-9:
             return None
         X_SW = (planner.body_pose(state, cup) @ body.interior.X_OS).inverse()
-        floor, heights = -depth_of(body.interior.shape) / 2.0, []
+        floor, heights = body.interior.floor, []
         for name in names:
             content = planner.scene.body(name)
             centre = X_SW.apply(planner.body_pose(state, name).apply(content.centre))
@@ -72,9 +70,9 @@ class Pouring:
         assert self.cup.interior is not None  # see `of`
         hollow = self.cup.interior
         R_WO = R_WT0 @ self.X_TO.R
-        depth = depth_of(hollow.shape)
+        depth = hollow.rim - hollow.floor
         centre = R_WT0 @ self.X_TO.p + R_WO @ hollow.X_OS.p
-        axis, rim = float(centre @ w), float(centre[2]) + depth / 2.0
+        axis, rim = float(centre @ w), float(centre[2]) + hollow.rim
         wall = axis + hollow_along(hollow, R_WO, w)
         found = []
         for body, height in self.heights:
@@ -90,7 +88,7 @@ class Pouring:
         assert self.receiver.interior is not None  # see `of`
         hollow = self.receiver.interior
         X_WS = self.X_WR @ hollow.X_OS
-        top = float(X_WS.apply([0.0, 0.0, depth_of(hollow.shape) / 2.0])[2])
+        top = float(X_WS.apply([0.0, 0.0, hollow.rim])[2])
         out = self.leavings(R_WT0, w, tilting)
         if not out:
             return None
@@ -101,7 +99,7 @@ class Pouring:
             ends.append(p_WT + (float(each.position[0]) + ways[-1]) * w)
         spread = PLACE_ERROR + SPEED_ERROR * max(map(abs, ways))
         widest = max(width(body) / 2.0 for body, _ in self.heights)
-        margin = float(min(room(hollow.shape, X_WS.inverse().apply(end)) for end in ends)) - widest - spread
+        margin = float(min(room(hollow, X_WS.inverse().apply(end)) for end in ends)) - widest - spread
         beyond = [float((end - X_WS.p) @ w) for end in ends]
         fastest = max(each.speed for each in out)
         return Stream((max(beyond) + min(beyond)) / 2.0, spread, margin, fastest, max(each.tilt for each in out))
@@ -112,8 +110,10 @@ def width(body: Body) -> float:
     return float(np.sort(body.size)[1])
 
 
-def tilting(planner: Planner, state: PlanningState, trajectory: JointTrajectory, axis: Array) -> Tilting:
-    """The tilt of the tool about a horizontal `axis` (3,) of the world along a trajectory that begins upright."""
+def tilting(planner: Planner, state: PlanningState, plan: StepPlan, axis: Array) -> Tilting:
+    """The tilt of the tool from `state` about a horizontal `axis` (3,) of the world, in the last motion of a plan."""
+    trajectory = plan.motions[-1].trajectory
+    assert trajectory is not None  # a rotation in place
     index = np.unique(np.linspace(0, len(trajectory.times) - 1, _SAMPLES).astype(int))
     path = with_joints(planner.robot, state.position, trajectory.names, trajectory.positions[index])
     R = [planner.solver.forward(q).R for q in path]
