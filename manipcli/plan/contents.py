@@ -8,8 +8,8 @@ import numpy as np
 
 from manipcli.core.geometry import Transform
 from manipcli.model.collision import Pair
+from manipcli.plan.flight import room
 from manipcli.scene.scene import Body, Interior, Scene
-from manipcli.shapes.primitives import Cylinder
 
 Touching = Callable[[str], Set[Pair]]
 """The pairs of a movable body with what it touches."""
@@ -45,10 +45,8 @@ def contents_of(
 
 def _heaped(interior: Interior, body: Body, X_SP: Transform) -> bool:
     """Whether a body is above the interior, by no more than its own size."""
-    depth = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
-    high = float(X_SP.p[2]) - depth / 2.0
-    flat = Transform.of(xyz=(X_SP.p[0], X_SP.p[1], 0.0))
-    return 0.0 <= high <= float(np.max(body.size)) and interior.contains(flat.p)
+    high = float(X_SP.p[2]) - interior.rim
+    return 0.0 <= high <= float(np.max(body.size)) and room(interior, X_SP.p) > 0.0
 
 
 def _touches(pairs: Set[Pair], name: str, others: Set[str]) -> bool:

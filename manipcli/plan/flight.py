@@ -20,7 +20,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.scene.scene import Interior
-from manipcli.shapes.primitives import Box, Cylinder
+from manipcli.shapes.primitives import Cylinder
 
 SPHERE: Final = 0.4
 """Inertia of a solid sphere by m r^2; other bodies slide."""
@@ -132,7 +132,9 @@ def fall(height: float, velocity: Array, gravity: float) -> tuple[float, float]:
 
 
 def hollow_along(interior: Interior, R_WO: Array, w: Array) -> float:
-    """[m] How far a hollow reaches from its middle in the horizontal direction `w` (3,) of the world."""
+    """[m] How far the rim of a hollow is from its middle in the horizontal direction `w` (3,) of the world."""
+    if interior.walls is not None:
+        return interior.walls.reach(((R_WO @ interior.X_OS.R).T @ w)[:2])
     if isinstance(interior.shape, Cylinder):
         return interior.shape.radius
     local = np.abs((R_WO @ interior.X_OS.R).T @ w)
@@ -140,13 +142,11 @@ def hollow_along(interior: Interior, R_WO: Array, w: Array) -> float:
     return float(min(flat))
 
 
-def depth_of(shape: Cylinder | Box) -> float:
-    """[m] From the rim of a hollow to its floor."""
-    return shape.length if isinstance(shape, Cylinder) else shape.size[2]
-
-
-def room(shape: Cylinder | Box, p_S: Array) -> float:
-    """[m] From a point (3,) in S to the wall of an opening, level; negative: outside."""
+def room(interior: Interior, p_S: Array) -> float:
+    """[m] From a point (3,) in S to the wall of the opening, level; negative: outside."""
+    shape = interior.shape
+    if interior.walls is not None:
+        return float(interior.walls.room(np.array([p_S[0], p_S[1], interior.rim])))
     if isinstance(shape, Cylinder):
         return shape.radius - math.hypot(p_S[0], p_S[1])
     d = np.abs(p_S[:2]) - np.array(shape.size[:2]) / 2.0

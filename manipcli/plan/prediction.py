@@ -16,7 +16,6 @@ from manipcli.model.configuration import with_joints
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Pairs, Planner
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.shapes.primitives import Cylinder
 
 PRESSED: Final = 1e-3
 """[m] A body is pushed where the hand is deeper in it than at the start by this; one that the hand leaves stays."""
@@ -47,14 +46,12 @@ def spilled(planner: Planner, state: PlanningState, into: str) -> PlanningState:
     carried, interior = state.carried, planner.scene.body(into).interior
     if carried is None or interior is None:
         return state
-    shape = interior.shape
-    depth = shape.length if isinstance(shape, Cylinder) else shape.size[2]
     X_WS = planner.body_pose(state, into) @ interior.X_OS
     landed = {}
     for name in planner.contents(state, carried.body):
         body = planner.scene.body(name)
         bottom = body.centre[2] - body.size[2] / 2
-        landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], -depth / 2 - bottom))
+        landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], interior.floor - bottom))
     return put(planner, state, landed)
 
 

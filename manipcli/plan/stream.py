@@ -18,7 +18,6 @@ from manipcli.plan.flight import (
     Contents,
     Leaving,
     Tilting,
-    depth_of,
     fall,
     hollow_along,
     leaving,
@@ -59,7 +58,7 @@ class Pouring:
         if not names or body.interior is None or receiver.interior is None or gz >= 0.0 or math.hypot(gx, gy) > 1e-9:
             return None
         X_SW = (planner.body_pose(state, cup) @ body.interior.X_OS).inverse()
-        floor, heights = -depth_of(body.interior.shape) / 2.0, []
+        floor, heights = body.interior.floor, []
         for name in names:
             content = planner.scene.body(name)
             centre = X_SW.apply(planner.body_pose(state, name).apply(content.centre))
@@ -72,9 +71,9 @@ class Pouring:
         assert self.cup.interior is not None  # see `of`
         hollow = self.cup.interior
         R_WO = R_WT0 @ self.X_TO.R
-        depth = depth_of(hollow.shape)
+        depth = hollow.rim - hollow.floor
         centre = R_WT0 @ self.X_TO.p + R_WO @ hollow.X_OS.p
-        axis, rim = float(centre @ w), float(centre[2]) + depth / 2.0
+        axis, rim = float(centre @ w), float(centre[2]) + hollow.rim
         wall = axis + hollow_along(hollow, R_WO, w)
         found = []
         for body, height in self.heights:
@@ -90,7 +89,7 @@ class Pouring:
         assert self.receiver.interior is not None  # see `of`
         hollow = self.receiver.interior
         X_WS = self.X_WR @ hollow.X_OS
-        top = float(X_WS.apply([0.0, 0.0, depth_of(hollow.shape) / 2.0])[2])
+        top = float(X_WS.apply([0.0, 0.0, hollow.rim])[2])
         out = self.leavings(R_WT0, w, tilting)
         if not out:
             return None
@@ -101,7 +100,7 @@ class Pouring:
             ends.append(p_WT + (float(each.position[0]) + ways[-1]) * w)
         spread = PLACE_ERROR + SPEED_ERROR * max(map(abs, ways))
         widest = max(width(body) / 2.0 for body, _ in self.heights)
-        margin = float(min(room(hollow.shape, X_WS.inverse().apply(end)) for end in ends)) - widest - spread
+        margin = float(min(room(hollow, X_WS.inverse().apply(end)) for end in ends)) - widest - spread
         beyond = [float((end - X_WS.p) @ w) for end in ends]
         fastest = max(each.speed for each in out)
         return Stream((max(beyond) + min(beyond)) / 2.0, spread, margin, fastest, max(each.tilt for each in out))

@@ -13,7 +13,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
 from manipcli.model.grasp import LINK
 from manipcli.model.state import Contact, WorldState, body_pose
-from manipcli.plan.flight import depth_of, room
+from manipcli.plan.flight import room
 from manipcli.scene.scene import Scene
 
 SHOWN: Final = 3
@@ -66,7 +66,7 @@ class PourWatch:
             centre = X_WO.apply(self._scene.body(name).centre)
             if one.left is None:
                 p_S = X_WS.inverse().apply(centre)
-                below = depth_of(hollow.shape) / 2.0 - float(p_S[2])
+                below = hollow.rim - float(p_S[2])
                 velocity = np.array(state.body_linear[names.index(name)])
                 if below >= 0.0:
                     one.below, one.velocity = below, velocity
@@ -107,9 +107,9 @@ class PourWatch:
             return f"on '{ground}' at [{centre[0]:.3f}, {centre[1]:.3f}, {centre[2]:.3f}] m"
         X_WS = _pose(self._scene, state, self._into) @ receiver.interior.X_OS
         p_S = X_WS.inverse().apply(centre)
-        inside = room(receiver.interior.shape, p_S)
+        inside = room(receiver.interior, p_S)
         if inside >= 0.0:
-            top = depth_of(receiver.interior.shape) / 2.0
+            top = receiver.interior.rim
             return f"in '{self._into}'" if p_S[2] <= top else f"above the rim of '{self._into}', on '{ground}'"
         side = "beyond" if float((centre - X_WS.p)[:2] @ left[:2]) >= 0.0 else "before"
         return f"{readable(-inside, 'm')} {side} the rim of '{self._into}', on '{ground}'"

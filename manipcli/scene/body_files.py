@@ -17,6 +17,7 @@ from manipcli.description.lint.rigid import box_about
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.scene.body_shapes import COLORS, BodyShape
+from manipcli.scene.hollow import hollow_of
 from manipcli.shapes.convex_parts import concave, convex_parts
 from manipcli.shapes.mesh import SUFFIXES
 from manipcli.shapes.primitives import Geometry, Mesh, Rgba
@@ -58,7 +59,7 @@ def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
         inertia += hull.computeMomentofInertiaRelatedToCOM() + mass * (d @ d * np.eye(3) - np.outer(d, d))
     return BodyShape(
         geometries=geometries,
-        interior=None,
+        interior=hollow_of(geometries),
         size=frozen(high - low),
         centre=frozen((high + low) / 2.0),
         inertial=principal(volume, centre, inertia),
@@ -119,7 +120,7 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
         inertial = principal(link.inertial.mass, X.p, X.R @ inertia @ X.R.T)
     return BodyShape(
         geometries=shapes,
-        interior=None,
+        interior=hollow_of(shapes),
         size=frozen(high - low),
         centre=frozen((high + low) / 2.0),
         inertial=inertial,

@@ -12,6 +12,9 @@ from manipcli.shapes.primitives import Cylinder
 def within(interior: Interior, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """(k,) whether points (k, 3) [m] in the frame O of a container are in its interior."""
     local = (points - interior.X_OS.p) @ interior.X_OS.R
+    if interior.walls is not None:
+        low = (local[:, 2] > interior.floor) & (local[:, 2] < interior.rim)
+        return np.asarray(low & (interior.walls.room(local) > 0.0))
     if isinstance(interior.shape, Cylinder):
         level = np.hypot(local[:, 0], local[:, 1]) < interior.shape.radius
         return np.asarray(level & (np.abs(local[:, 2]) < interior.shape.length / 2.0))

@@ -11,8 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
+import numpy as np
+
 from manipcli.core.geometry import Array, Transform
 from manipcli.scene.known import Known
+from manipcli.scene.walls import Walls
 from manipcli.shapes.primitives import Box, Cylinder, Geometry
 
 SEPARATOR: Final = "/"
@@ -25,13 +28,32 @@ RIM: Final = "rim"
 
 @dataclass(frozen=True, slots=True)
 class Interior:
-    """The hollow of a container: a box or an upright cylinder, open at its top (+z of O)."""
+    """The hollow of a container: a box or an upright cylinder, open at its top (+z of O).
+
+    Attributes:
+        X_OS: of its middle; its rim is half of its depth above.
+        shape: all of it, or with `walls` a part that reaches down from the rim.
+        walls: of a hollow of another shape.
+    """
 
     X_OS: Transform
     shape: Box | Cylinder
+    walls: Walls | None = None
+
+    @property
+    def rim(self) -> float:
+        """[m] Height of its rim in S."""
+        return (self.shape.length if isinstance(self.shape, Cylinder) else self.shape.size[2]) / 2.0
+
+    @property
+    def floor(self) -> float:
+        """[m] Height of its floor in S, on its axis."""
+        return -self.rim if self.walls is None else self.walls.levels[0]
 
     def contains(self, point: Array) -> bool:
         """Whether a point (3,) [m] in S is inside."""
+        if self.walls is not None:
+            return bool(self.floor < point[2] < self.rim and self.walls.room(point) > 0.0)
         x, y, z = (float(v) for v in point)
         if isinstance(self.shape, Cylinder):
             return math.hypot(x, y) < self.shape.radius and abs(z) < self.shape.length / 2
@@ -144,4 +166,8 @@ def ready_part(part: str, size: Array, centre: Array, interior: Interior | None)
     side = FACES.get(part, 1.0 if part == RIM and interior is not None else 0.0)
     if side == 0.0:
         return None
-    return Transform.of(xyz=(centre[0], centre[1], centre[2] + side * size[2] / 2.0))
+    p = np.array([centre[0], centre[1], centre[2] + side * size[2] / 2.0])
+    if part == RIM and interior is not None:
+        opening = interior.X_OS.apply([0.0, 0.0, interior.rim])
+        p = opening if np.linalg.norm(opening - p) > 1e-6 else p
+    return Transform.of(xyz=p)

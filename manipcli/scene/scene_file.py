@@ -11,6 +11,7 @@ from pydantic import Field, TypeAdapter, model_validator
 
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.scene.scene import Body, Frame, Interior, Scene
+from manipcli.scene.walls import Walls
 from manipcli.shapes.primitives import Box, ConvexPart, Cylinder, Geometry, Mesh, Shape, Sphere
 from manipcli.spec.base import Model
 
@@ -70,9 +71,15 @@ class _Geometry(Model):
     rgba: Numbers4 | None
 
 
+class _Walls(Model):
+    levels: tuple[float, ...]
+    radii: tuple[tuple[float, ...], ...]
+
+
 class _Interior(Model):
     pose: _Pose
     shape: Annotated[_Box | _Cylinder, Field(discriminator="type")]
+    walls: _Walls | None = None
 
 
 class _Body(Model):
@@ -242,7 +249,8 @@ def _hollow(interior: Interior | None) -> _Interior | None:
         written = _Box(type="box", size=shape.size)
     else:
         written = _Cylinder(type="cylinder", radius=shape.radius, length=shape.length)
-    return _Interior(pose=_pose(interior.X_OS), shape=written)
+    walls = None if interior.walls is None else _Walls(levels=interior.walls.levels, radii=interior.walls.radii)
+    return _Interior(pose=_pose(interior.X_OS), shape=written, walls=walls)
 
 
 def _read_hollow(interior: _Interior | None) -> Interior | None:
@@ -250,4 +258,5 @@ def _read_hollow(interior: _Interior | None) -> Interior | None:
         return None
     shape = interior.shape
     hollow = Box(shape.size) if isinstance(shape, _Box) else Cylinder(shape.radius, shape.length)
-    return Interior(X_OS=_transform(interior.pose), shape=hollow)
+    walls = None if interior.walls is None else Walls(interior.walls.levels, interior.walls.radii)
+    return Interior(X_OS=_transform(interior.pose), shape=hollow, walls=walls)

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.core.geometry import Transform
 from manipcli.plan.flight import Contents, Leaving, Tilting, fall, leaving, room
 from manipcli.plan.steps import STEPS
+from manipcli.scene.scene import Interior
 from manipcli.shapes.primitives import Box, Cylinder
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
@@ -80,15 +82,17 @@ def test_a_free_fall_is_that_of_a_thousand_small_steps(velocity: tuple[float, fl
 
 def test_room_in_an_opening_is_the_distance_to_its_wall() -> None:
     """Of a circle, and of a rectangle against its nearest of 4000 points on the wall."""
-    assert room(Cylinder(0.041, 0.1), np.array([0.03, 0.04, 0.0])) == pytest.approx(-0.009)
+    round_ = Interior(Transform.identity(), Cylinder(0.041, 0.1))
+    assert room(round_, np.array([0.03, 0.04, 0.0])) == pytest.approx(-0.009)
     x, y = 0.1, 0.06
+    square = Interior(Transform.identity(), Box((2 * x, 2 * y, 0.1)))
     t = np.linspace(-1.0, 1.0, 1001)
     wall = np.concatenate(
         [np.column_stack(p) for s in (-1, 1) for p in ((t * x, 0 * t + s * y), (0 * t + s * x, t * y))]
     )
     for p, sign in (((0.02, 0.05), 1.0), ((0.13, 0.09), -1.0), ((-0.05, -0.07), -1.0)):
         nearest = float(np.min(np.linalg.norm(wall - p, axis=1)))
-        assert room(Box((2 * x, 2 * y, 0.1)), np.array([*p, 0.0])) == pytest.approx(sign * nearest, abs=1e-4)
+        assert room(square, np.array([*p, 0.0])) == pytest.approx(sign * nearest, abs=1e-4)
 
 
 MUG = """

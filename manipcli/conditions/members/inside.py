@@ -18,23 +18,23 @@ from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState, body_pose
 from manipcli.scene.scene import Interior, Scene
-from manipcli.shapes.primitives import Box, Cylinder
+from manipcli.shapes.primitives import Cylinder
 from manipcli.spec.base import Model
 from manipcli.spec.names import BodyName, ContainerName
 
 
 class InsideSpec(Model):
-    """The object's centre is inside the hollow of the container `of` (a cup, a tray), below its rim."""
+    """The object's centre is inside the hollow of the container `of`, below its rim."""
 
     object: BodyName = Field(description="A body of the scene; its centre counts.")
-    of: ContainerName = Field(description="A body with a hollow: a cup or a tray.")
+    of: ContainerName = Field(description="A body with a hollow: a cup, a tray, a mesh or URDF that is open upwards.")
 
 
 class OutsideSpec(Model):
-    """The object's centre is not inside the hollow of the container `of` (a cup, a tray)."""
+    """The object's centre is not inside the hollow of the container `of`."""
 
     object: BodyName = Field(description="A body of the scene; its centre counts.")
-    of: ContainerName = Field(description="A body with a hollow: a cup or a tray.")
+    of: ContainerName = Field(description="A body with a hollow: a cup, a tray, a mesh or URDF that is open upwards.")
 
 
 Spec = InsideSpec | OutsideSpec
@@ -45,20 +45,22 @@ def monitor(spec: Spec, world: World, *, sign: float) -> Monitor:
 
     The faces are the walls and the floor of the hollow and the plane of its rim. Outside, the margin is minus the
     distance to the hollow. For every shape the centre is that of its bounding box: a ball on the floor of a deep tray
-    has its radius as margin. `outside` is the opposite. Where units differ, the margin is divided by the greatest
+    has its radius as margin; the distance to a wall that is neither upright nor round is a level one. `outside` is the
+    opposite. Where units differ, the margin is divided by the greatest
     depth in the hollow.
     """
-    shape = _interior(world.scene, spec.of).shape
+    interior = _interior(world.scene, spec.of)
+    shape = interior.shape
     deepest = min(shape.radius, shape.length / 2.0) if isinstance(shape, Cylinder) else min(shape.size) / 2.0
 
     def look(window: StateWindow) -> Robustness:
         p_S = _in_hollow(world.scene, window.states, spec)
-        depth = np.broadcast_to(_depth(shape, p_S), np.shape(window.states.time))
+        depth = np.broadcast_to(_depth(interior, p_S), np.shape(window.states.time))
 
         def describe(k: int) -> str:
             far = readable(abs(float(depth[k])), "m")
             where = f"{far} deep in '{spec.of}'" if depth[k] >= 0.0 else f"{far} outside '{spec.of}'"
-            if depth[k] < 0.0 and _over(shape, np.broadcast_to(p_S, (*depth.shape, 3))[k]):
+            if depth[k] < 0.0 and _over(interior, np.broadcast_to(p_S, (*depth.shape, 3))[k]):
                 where += ", above its rim"
             at = point_text(centres(world.scene, window.states, spec.object), k)
             return f"'{spec.object}' is {where}, its centre at {at}"
@@ -83,27 +85,31 @@ def _in_hollow(scene: Scene, states: WorldState, spec: Spec) -> Array:
     return np.asarray((p_O - interior.X_OS.p) @ interior.X_OS.R)
 
 
-def _depth(shape: Cylinder | Box, p_S: Array) -> Array:
-    """Minus the signed distance of points (..., 3) to a box or cylinder centred at S.
+def _depth(interior: Interior, p_S: Array) -> Array:
+    """Minus the signed distance of points (..., 3) to a hollow.
 
     With d the distances beyond each pair of faces: distance = |max(d, 0)| + min(max_i d_i, 0).
     """
-    d = _beyond(shape, p_S)
+    d = _beyond(interior, p_S)
     outside = np.linalg.norm(np.maximum(d, 0.0), axis=-1)
     return np.asarray(-(outside + np.minimum(np.max(d, axis=-1), 0.0)))
 
 
-def _beyond(shape: Cylinder | Box, p_S: Array) -> Array:
+def _beyond(interior: Interior, p_S: Array) -> Array:
     """Distance of points (..., 3) beyond each pair of faces [m]; the last pair is floor and rim."""
+    shape = interior.shape
+    if interior.walls is not None:
+        upright = np.maximum(interior.floor - p_S[..., 2], p_S[..., 2] - interior.rim)
+        return np.stack([-interior.walls.room(p_S), upright], axis=-1)
     if isinstance(shape, Cylinder):
         radial = np.hypot(p_S[..., 0], p_S[..., 1]) - shape.radius
         return np.stack([radial, np.abs(p_S[..., 2]) - shape.length / 2.0], axis=-1)
     return np.asarray(np.abs(p_S) - np.array(shape.size) / 2.0)
 
 
-def _over(shape: Cylinder | Box, p_S: Array) -> bool:
+def _over(interior: Interior, p_S: Array) -> bool:
     """Whether a point (3,) outside is above the rim and between the walls."""
-    return bool(p_S[2] > 0.0 and (_beyond(shape, p_S)[:-1] <= 0.0).all())
+    return bool(p_S[2] > 0.0 and (_beyond(interior, p_S)[:-1] <= 0.0).all())
 
 
 def check(spec: Spec, context: CheckContext) -> tuple[Problem, ...]:

@@ -201,7 +201,7 @@ def _merit(spec: PourSpec, stream: Stream) -> float:
 def _refuse_narrow(pouring: Pouring) -> None:
     """Raises NotPlannable if the opening has no room for the contents however they are aimed."""
     assert pouring.receiver.interior is not None  # see `Pouring.of`
-    half = room(pouring.receiver.interior.shape, np.zeros(3)) - PLACE_ERROR
+    half = room(pouring.receiver.interior, np.zeros(3)) - PLACE_ERROR
     for body, _ in pouring.heights:
         wide = width(body) / 2.0
         if wide > half:
