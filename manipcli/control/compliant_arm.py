@@ -78,10 +78,12 @@ class CompliantArm(CartesianImpedanceController):
             self._shift[:] = 0.0
             self._felt.tare()
         self._shift *= before.stiffness[:3] / np.maximum(self._stiffness[:3], 1e-9)
-        force, self.pressing, self._relaxing, self._fresh = compliance.force, None, None, False
+        force, last, self._relaxing, self._fresh = compliance.force, self.pressing, None, False
+        self.pressing = None
         if force is not None:
-            along = float(np.abs(force.axis) @ self._stiffness[:3])
-            self.pressing = PressingReference(force, along, shift=float(force.axis @ self._shift))
+            along, shift = float(np.abs(force.axis) @ self._stiffness[:3]), float(force.axis @ self._shift)
+            contact = shift if last is not None and last.touching else None
+            self.pressing = PressingReference(force, along, shift=shift, contact=contact)
         elif self._shift.any():
             self._relaxing = Relaxing(self._shift.copy())
 

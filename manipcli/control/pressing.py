@@ -2,7 +2,7 @@
 
 With the felt force p along the axis and the stiffness k of the spring, the shift s obeys
 
-    s' = speed                              before contact, from the speed that it has to there,
+    s' = speed                              before contact,
     s' = 2 pi bandwidth (target - p) / k    in contact.
 
 In contact with something stiff p' = k s', so that p tends to the target as exp(-2 pi bandwidth t) and never exceeds it.
@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.units import readable
 from manipcli.plan.compliance import Pressing
 
 TOUCH: Final = 0.1
@@ -26,9 +27,9 @@ TOUCH: Final = 0.1
 LEAST: Final = 0.3
 """[N] Least force that counts as contact."""
 TOLERANCE: Final = 0.1
-"""Share of the target by which the force may differ while it is held."""
+"""Share of the target by which the force may differ while it is held, and its mean over a motion."""
 DEPTH: Final = 3.0
-"""The shift in contact is at most this many times target / stiffness: more means that what is touched gives way."""
+"""The shift in contact is at most this many times target / stiffness, and the reach: else what is touched gives way."""
 
 
 class PressingReference:
@@ -38,6 +39,7 @@ class PressingReference:
         pressing: the force.
         stiffness: along its axis [N/m], above 0.
         shift: to begin with [m].
+        contact: the shift at the contact [m], if it is in contact already.
 
     Attributes:
         shift: s [m].
@@ -45,25 +47,49 @@ class PressingReference:
         touching: whether it is in contact.
         peak: [N] largest felt force.
         held: [s] for which the force has been within the tolerance.
-        mean: [N] of the felt force while held.
+        steady: [N] mean of the felt force while held.
+        mean: [N] mean of the felt force since the first contact.
     """
 
-    def __init__(self, pressing: Pressing, stiffness: float, *, shift: float = 0.0) -> None:
+    def __init__(
+        self, pressing: Pressing, stiffness: float, *, shift: float = 0.0, contact: float | None = None
+    ) -> None:
         self.pressing = pressing
         self.stiffness = stiffness
-        self.shift = shift
-        self.contact: float | None = None
-        self.touching = False
-        self.peak = self.held = self.mean = 0.0
+        self.shift, self.contact, self.touching = shift, contact, contact is not None
+        self.peak = self.held = self.steady = self.mean = 0.0
+        self._since = 0.0
         self._rate = math.tau * pressing.bandwidth / stiffness
         self._began = max(LEAST, TOUCH * pressing.target)
 
     @property
-    def missed(self) -> bool:
-        """Whether it met nothing within reach, or what it touches gives way."""
-        if self.contact is None or not self.touching:
-            return self.shift >= self.pressing.reach
-        return self.shift - self.contact > DEPTH * self.pressing.target / self.stiffness + self.pressing.reach
+    def missed(self) -> str:
+        """That it met nothing within reach, or that what it touches gives way; "" otherwise."""
+        pressing = self.pressing
+        if self.contact is None and self.shift >= pressing.reach:
+            return f"the tool met nothing within {readable(pressing.reach, 'm')}"
+        depth = 0.0 if self.contact is None else self.shift - self.contact
+        if depth >= DEPTH * pressing.target / self.stiffness + pressing.reach:
+            felt = f"it felt at most {self.peak:.3g} N of {pressing.target:g} N"
+            return f"what the tool touches gave way by {readable(round(depth, 3), 'm')}; {felt}"
+        return ""
+
+    @property
+    def text(self) -> str:
+        """`felt 9.98 N in the mean, 10.4 N at most (4 % over)`."""
+        mean, target = self.steady if self.held else self.mean, self.pressing.target
+        over = max(0.0, 100.0 * (self.peak / target - 1.0))
+        return f"felt {mean:.3g} N in the mean, {self.peak:.3g} N at most ({over:.0f} % over)"
+
+    @property
+    def unsteady(self) -> str:
+        """Why the mean is not the target; "" where it is."""
+        target = self.pressing.target
+        if self.contact is None:
+            return f"the tool touched nothing: it felt at most {self.peak:.3g} N of {target:g} N"
+        if abs(self.mean - target) <= TOLERANCE * target:
+            return ""
+        return f"the tool pressed with {self.mean:.3g} N in the mean; expected {target:g} N within 10 %"
 
     def update(self, period: float, felt: float, stretch: float) -> float:
         """The shift [m] after one update of the length `period` [s].
@@ -76,20 +102,23 @@ class PressingReference:
         pressing = self.pressing
         self.peak = max(self.peak, felt)
         touching = felt >= (0.5 * self._began if self.touching else self._began)
-        if touching and not self.touching:
+        if touching and self.contact is None:
             self.contact = self.shift
         if self.touching and not touching:
             self.shift -= max(0.0, stretch)
         self.touching = touching
         error = pressing.target - felt
         step = self._rate * error if touching else pressing.speed
-        if not self.missed or step < 0.0:
+        if step < 0.0 or not self.missed:
             self.shift += step * period
+        if self.contact is not None:
+            self._since += period
+            self.mean += (felt - self.mean) * period / self._since
         if abs(error) <= TOLERANCE * pressing.target:
-            self.mean += (felt - self.mean) * period / (self.held + period)
             self.held += period
+            self.steady += (felt - self.steady) * period / self.held
         else:
-            self.held = self.mean = 0.0
+            self.held = self.steady = 0.0
         return self.shift
 
 

@@ -65,6 +65,11 @@ class Compliance:
     force: Pressing | None = None
     X_TC: Transform | None = None
 
+    @property
+    def ends_held(self) -> bool:
+        """Whether a motion with it ends when its force has been held."""
+        return self.force is not None and self.force.hold is not None
+
     @classmethod
     def of(
         cls,

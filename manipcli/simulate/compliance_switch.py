@@ -39,10 +39,28 @@ class ComplianceSwitch:
         return next((own for own in self._manager.controllers if complies(own)), None)
 
     @property
-    def pressing(self) -> PressingReference | None:
-        """The force with which the arm presses now; None without one."""
+    def _pressing(self) -> PressingReference | None:
         arm = self._arm
         return None if arm is None else arm.pressing
+
+    @property
+    def presses_yet(self) -> bool:
+        """Whether the force of the motion has not been held for its time."""
+        own = self._pressing
+        return own is not None and own.held < (own.pressing.hold or 0.0)
+
+    @property
+    def failure(self) -> str:
+        """Why the force cannot be reached; "" where it may be."""
+        own = self._pressing
+        return "" if own is None else own.missed
+
+    def result(self, motion: Motion) -> tuple[str, str]:
+        """What was felt in a motion with a force that has ended, and why that is a failure; "" where it is none."""
+        own = self._pressing
+        if motion.compliance is None or motion.compliance.force is None or own is None:
+            return "", ""
+        return own.text, "" if motion.compliance.ends_held else own.unsteady
 
     def before(self, motion: Motion) -> JointTrajectory | None:
         """Switch as a motion needs it; its trajectory, which begins at the present reference of the arm.

@@ -167,6 +167,7 @@ class Executor:
             raise
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
+        presses = motion.compliance is not None and motion.compliance.ends_held
         while True:
             state = yield
             for handle in handles:
@@ -177,6 +178,11 @@ class Executor:
                 self._cancel()
                 return _fault(session)
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
+            if presses:
+                if wrong := self._compliance.failure:
+                    self._cancel()
+                    return MotionEnd("failed", wrong)
+                busy = self._compliance.presses_yet
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
@@ -189,8 +195,11 @@ class Executor:
                 return replace(DONE, text=f"stopped {when}: `until` held")
             if not busy and (awaited is None or holds):
                 far = self._far(motion, start, state)
-                if far:
-                    return MotionEnd("failed", far)
+                felt, wrong = self._compliance.result(motion)
+                if far or wrong:
+                    return MotionEnd("failed", far or wrong)
+                if felt:
+                    return replace(DONE, text=felt)
                 return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"

@@ -4,7 +4,20 @@ from typing import Any
 
 from manipcli.core.registry import Seam
 from manipcli.plan.step import StepMember
-from manipcli.plan.steps import follow, grasp, lift, locate, move, pick, place, pour, release, switch_controllers, wait
+from manipcli.plan.steps import (
+    follow,
+    grasp,
+    lift,
+    locate,
+    move,
+    pick,
+    place,
+    pour,
+    press,
+    release,
+    switch_controllers,
+    wait,
+)
 
 STEPS: Seam[StepMember[Any]] = Seam(
     kind="step",
@@ -20,5 +33,6 @@ STEPS: Seam[StepMember[Any]] = Seam(
         lift.MEMBER,
         pour.MEMBER,
         place.MEMBER,
+        press.MEMBER,
     ),
 )
