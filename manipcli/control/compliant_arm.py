@@ -24,6 +24,7 @@ class Compliant(Controller, Protocol):
     """A controller that takes the numbers of a compliant motion."""
 
     pressing: PressingReference | None
+    tool: Array
 
     def comply(self, compliance: Compliance) -> None:
         """Obey this compliance from the next update on; without a step in the force."""
@@ -47,6 +48,7 @@ class CompliantArm(CartesianImpedanceController):
 
     Attributes:
         pressing: the force; None without one.
+        tool: (3,) [m] the origin of the compliant frame in the world, at the last update.
     """
 
     def __init__(

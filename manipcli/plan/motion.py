@@ -196,6 +196,24 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True)
+class Insertion:
+    """A peg that a step puts into a hole.
+
+    Attributes:
+        peg, hole: names of the bodies.
+        depth: [m] of the end of the peg below the rim.
+        clearance: [m] to each side.
+        radius: [m] of the search.
+    """
+
+    peg: str
+    hole: str
+    depth: float
+    clearance: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
 class StepPlan:
     """The motions of one step, and the state after them.
 
@@ -205,6 +223,7 @@ class StepPlan:
         placed: the body that it sets down at its pose in `end`; "" for none.
         poured: the bodies that it pours into the container `into`.
         stream: where they land; None if the plan does not predict it.
+        inserted: what it puts into a hole.
     """
 
     motions: tuple[Motion, ...]
@@ -213,6 +232,7 @@ class StepPlan:
     poured: tuple[str, ...] = ()
     into: str = ""
     stream: Stream | None = None
+    inserted: Insertion | None = None
 
     @property
     def duration(self) -> float:

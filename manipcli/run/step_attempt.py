@@ -19,6 +19,7 @@ from manipcli.run.attaching import Attaching
 from manipcli.run.awaited import missing, no_longer, sooner
 from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
+from manipcli.run.inserted import insertion_text, not_inserted
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.looking import Looking
 from manipcli.run.monitors import Monitors
@@ -265,6 +266,8 @@ class StepAttempt:
         left = left or self._without_result(step, planned)
         situation = self._measured.situation if self._physics else None
         texts += poured_texts(self._plan.planner, planned.plan, situation)
+        if situation is not None and planned.plan.inserted is not None and left is None:
+            texts.append(insertion_text(self._plan.planner, planned.plan.inserted, situation(planned.plan.end)))
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
@@ -342,10 +345,11 @@ class StepAttempt:
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
         """A failure where an object is not where the step places or pours it; `until` may define another pour."""
         plan, planner = planned.plan, self._plan.planner
-        if not self._physics or not (plan.placed or plan.poured):
+        if not self._physics or not (plan.placed or plan.poured or plan.inserted):
             return None
         now = self._measured.situation(replace(plan.end, carried=None))
         why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
+        why = why or not_inserted(planner, plan.inserted, now)
         return MotionEnd("failed", why) if why else None
 
     def _still_held(self, before: PlanningState) -> str:

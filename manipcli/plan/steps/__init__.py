@@ -7,6 +7,7 @@ from manipcli.plan.step import StepMember
 from manipcli.plan.steps import (
     follow,
     grasp,
+    insert,
     lift,
     locate,
     move,
@@ -34,5 +35,6 @@ STEPS: Seam[StepMember[Any]] = Seam(
         pour.MEMBER,
         place.MEMBER,
         press.MEMBER,
+        insert.MEMBER,
     ),
 )
