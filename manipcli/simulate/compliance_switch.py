@@ -68,6 +68,8 @@ class ComplianceSwitch:
             return "", until.otherwise
         if motion.compliance is None or motion.compliance.force is None or own is None:
             return "", ""
+        if until is not None:
+            return f"{motion.label}: {own.text}", ""
         return own.text, "" if motion.compliance.ends_held else own.unsteady
 
     def before(self, motion: Motion) -> JointTrajectory | None:

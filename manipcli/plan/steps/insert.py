@@ -55,10 +55,12 @@ FIRM: Final = 3000.0
 """[N/m] Stiffness across the hole while it slides: friction holds it back by less than a millimetre."""
 SOFT: Final = 400.0
 """[N/m] Stiffness across the hole on the way down."""
-ALONG: Final = 400.0
+ALONG: Final = 1000.0
 """[N/m] Stiffness along the hole."""
-LOWERING: Final = 0.015
-"""[m/s] At most, on the way down."""
+LOWERING: Final = 0.01
+"""[m/s] Of the reference, on the way down."""
+IMPACT: Final = 1.3
+"""Force of the first contact, at most, per force with which it slides."""
 FELT: Final = 0.2
 """[s] For which a force is felt."""
 KNOWN: Final = 0.002
@@ -90,7 +92,7 @@ class InsertSpec(Model):
         None,
         description="Radius of the spiral [m]; 0: none. Default: how well the hole is `known`, and 2 mm more.",
     )
-    clearance: Annotated[Range, Field(description="Height above the rim from which it is lowered [m].")] = (0.005, 0.03)
+    clearance: Annotated[Range, Field(description="Height above the rim from which it is lowered [m].")] = (0.003, 0.02)
     velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying."
     )
@@ -110,7 +112,7 @@ def candidates(spec: InsertSpec, planner: Planner, state: PlanningState) -> Cand
         raise NotPlannable(f"'{spec.object}' is not held upright", hint="hold it with the end down that goes in")
     peg = section(planner.scene.body(spec.object), spec.depth or deep(hole.interior))
     now = (X_WS.inverse() @ X_WO).rpy[2]
-    ways = itertools.product(best_yaws(peg, hole.interior, now), spread(spec.clearance)[::-1])
+    ways = itertools.product(best_yaws(peg, hole.interior, now), sorted(spread(spec.clearance)))
 
     def options() -> Iterator[Candidate]:
         for yaw, clearance in ways:
@@ -132,29 +134,31 @@ def _attempt(
     carry(planner, builder, "carry", X_WT, speed=spec.velocity_scaling)
     q = builder.now.position
     refuse_too_strong(planner, q, down, spec.force)
-    speed = min(approach_speed(spec.force, effective_mass(planner, q, down)), LOWERING)
+    light = SEARCHING * spec.force
+    slow = min(approach_speed(IMPACT * light, effective_mass(planner, q, down)), LOWERING)
 
     tip = _tip(planner, X_WO, spec.object)
     turned = X_WS.R @ np.diag([1.0, -1.0, -1.0])  # z down, along the hole
     X_TC = X_WT.inverse() @ Transform.of(xyz=tip, R=turned)
     rim = float(down @ tip) + high
 
-    def law(force: float, across: float, deep: float, otherwise: str = "", hold: float | None = FELT) -> Compliance:
+    def law(
+        force: float, speed: float, across: float, deep: float, otherwise: str = "", hold: float | None = FELT
+    ) -> Compliance:
         pressing = Pressing(frozen([0.0, 0.0, 1.0]), force, speed, high + depth, hold=hold, yields=True)
         until = Beyond(frozen(down), rim + deep, otherwise)
         spring = Compliance.of(along=ALONG, across=across, force=pressing, X_TC=X_TC)
         return replace(spring, until=until, relative=True)
 
-    light, motions = SEARCHING * spec.force, []
-    with compliant(builder, law(light, FIRM, SUNK)):
-        builder.dwell("touch", high / speed + FELT)
+    with compliant(builder, law(light, slow, FIRM, SUNK)):
+        builder.dwell("touch", high / slow + FELT)
     radius = _radius(spec, planner)
     if radius > 0.0:
         none = f"no hole was found within {readable(radius, 'm')} of where '{spec.into}' is believed to be"
-        with compliant(builder, law(light, FIRM, SUNK, none, hold=None)):
+        with compliant(builder, law(light, LOWERING, FIRM, SUNK, none, hold=None)):
             search_motion(builder, planner, X_WT, X_WS.R, pitch_of(fitted.clearance), radius)
     X_WE = Transform.of(xyz=(high + depth) * down) @ X_WT
-    with compliant(builder, law(spec.force, SOFT, depth if spec.depth else depth + high)):
+    with compliant(builder, law(spec.force, LOWERING, SOFT, depth if spec.depth else depth + high)):
         builder.straight("insert", X_WE, speed=0.05 * spec.velocity_scaling)
     with compliant(builder, Compliance.of(along=ALONG, across=SOFT, X_TC=X_TC)):
         builder.compliance = replace(builder.compliance, here=True) if builder.compliance else None
