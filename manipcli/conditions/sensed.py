@@ -30,6 +30,7 @@ class Sensed:
         forces: of a sensor of touch: how many numbers at the start of a reading are normal forces [N].
         shear: whether as many forces along x follow, then along y.
         threshold: of a switch: the force [N] that closes it.
+        topic: its topic, if that is not /sensors/NAME.
         most: quantity -> largest reading of each of its numbers: `force` [N], `torque` [N m],
             `pixels` of a camera.
     """
@@ -42,6 +43,7 @@ class Sensed:
     forces: int = 0
     shear: bool = False
     threshold: float | None = None
+    topic: str = ""
     most: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -56,6 +58,10 @@ class Sensed:
 
 
 NO_SENSORS: Final[Mapping[str, Sensed]] = {}
+FELT: Final = "felt_force"
+"""Name of what the arm feels at its tool: it is read like a sensor, and published like a broadcaster."""
+WRENCH: Final = "geometry_msgs/msg/WrenchStamped"
+FELT_FORCE: Final = Sensed(FELT, fields=(("", "wrench", 6),), messages={"": WRENCH}, topic=f"/{FELT}/wrench")
 
 
 @dataclass(frozen=True, slots=True)

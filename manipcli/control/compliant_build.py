@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from manipcli.conditions.sensed import FELT
 from manipcli.control.compliant_arm import CompliantArm
 from manipcli.control.controller import BuildContext, Controller
 from manipcli.control.felt_force import FeltForce
@@ -15,9 +16,6 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import arm_joints
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
-
-FELT: str = "felt_force"
-"""Name of the controller that publishes the felt force, in the topic /felt_force/wrench."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +52,6 @@ def compliant_controllers(file: ControllersSpec, context: BuildContext) -> tuple
     if arm is None or robot.tool is None:
         return ()
     link, X_LT = robot.tool.link, robot.tool.X_LT
-    felt = FeltForce(
-        name=unused(FELT, file.controllers), kinematics=context.kinematics(), arm=arm.joints, link=link, offset=X_LT
-    )
+    felt = FeltForce(name=FELT, kinematics=context.kinematics(), arm=arm.joints, link=link, offset=X_LT)
     name = unused(f"{arm.follower}_compliant", file.controllers)
     return felt, CompliantArm(name, arm.joints, felt, link, X_LT, context)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -65,7 +66,10 @@ class FeltForce:
         self.name, self.frame = name, link
         self.joints = robot.joint_names
         self.sensors = (SensorRequest(sensor, sensor=sensor),) if sensor else ()
-        self.output = ControllerOutput.published(6)
+        self.arriving = np.ones(7)
+        """Whether it was updated at this tick, always 1, and the wrench."""
+        published = ControllerOutput.published(6)
+        self.output = replace(published, rows=self.arriving[None, 1:])
         self._kinematics, self._link, self._offset = kinematics, link, offset
         self._columns = robot.indices(tuple(arm))
         self._damping = np.array([joint.damping for joint in robot.moving_joints])[self._columns]

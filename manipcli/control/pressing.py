@@ -22,7 +22,7 @@ from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.plan.compliance import Pressing
 
-TOUCH: Final = 0.1
+TOUCH: Final = 0.05
 """Share of the target at which contact begins."""
 LEAST: Final = 0.3
 """[N] Least force that counts as contact."""

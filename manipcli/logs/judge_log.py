@@ -26,6 +26,7 @@ from manipcli.record.recording import Recording, Span
 from manipcli.scene.scene import Scene
 from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.spec.task import TaskSpec
+from manipcli.task.felt import felt
 
 
 def judge_log(path: Path, *, being_written: bool = False, activity: Callable[[str], None] = lambda _: None) -> Verdict:
@@ -73,4 +74,4 @@ def judge_recording(recording: Recording, path: Path, *, activity: Callable[[str
 def _sensors(recording: Recording, path: Path, task: TaskSpec, robot: RobotModel, scene: Scene) -> Mapping[str, Sensed]:
     """The sensors of the robot file and of the task."""
     of_robot = recorded_robot_file(recording, path).spec.sensors or {}
-    return sensed_by_name({**of_robot, **(task.sensors or {})}, robot, scene)
+    return {**felt(task), **sensed_by_name({**of_robot, **(task.sensors or {})}, robot, scene)}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,7 +15,7 @@ from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.pose_error import pointed
 
-HOVER: Final = 0.006
+HOVER: Final = 0.005
 """[m] Gap between the hand, or what it holds, and the body, from which on it approaches slowly: above the clearance."""
 FAR: Final = 0.08
 """[m] Distance of the tool's origin from the point, from which the hand comes straight on."""
@@ -24,11 +23,9 @@ SEEN: Final = 0.2
 """[m] Greatest gap that is measured."""
 ADVANCES: Final = 8
 """Steps to the gap; each is as long as the gap is at least."""
-HARD: Final = 5e6
-"""[N/m] Stiffness of a hard contact."""
 FASTEST: Final = 0.05
 """[m/s]"""
-SLOWEST: Final = 0.001
+SLOWEST: Final = 0.0005
 """[m/s]"""
 
 
@@ -47,9 +44,9 @@ def _leverage(planner: Planner, q: Array, axis: Array) -> Array:
     return np.asarray(J[:3, list(solver.columns)].T @ axis)
 
 
-def approach_speed(force: float, mass: float) -> float:
-    """[m/s] at which a `mass` [kg] that strikes a hard contact is met with at most `force` [N]: force / sqrt(k m)."""
-    return min(max(force / math.sqrt(HARD * mass), SLOWEST), FASTEST)
+def approach_speed(force: float, mass: float, period: float) -> float:
+    """[m/s] at which an impact of a `mass` [kg] that lasts one control `period` [s] has this `force` [N]: F t / m."""
+    return min(max(force * period / mass, SLOWEST), FASTEST)
 
 
 @dataclass(frozen=True, slots=True)

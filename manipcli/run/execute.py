@@ -17,7 +17,6 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.from_motion import stopped
-from manipcli.plan.steps import STEPS
 from manipcli.record.channels import SENSORS
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.belief import Belief
@@ -34,6 +33,7 @@ from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.sensor import Picture
 from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.session import Session
+from manipcli.task.felt import complies, felt
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
@@ -53,7 +53,7 @@ def build_manager(task: Task, kinematics: Kinematics | None = None) -> Controlle
     kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
     return build_controllers(
         file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat,
-        stop_planner=stopped, compliant=any(STEPS[step.verb].compliant(step.body) for step in task.spec.steps),
+        stop_planner=stopped, compliant=complies(task.spec) and ENGINES[task.spec.simulation.engine].physics == "full",
     )  # fmt: skip
 
 
@@ -193,5 +193,5 @@ def live_world(task: Task, session: Session, belief: Belief) -> World:
         referenced=frozenset(name for c in session.manager.controllers if c.interfaces for name in c.joints),
         steps=tuple(str(step.id) for step in task.spec.steps),
         period=task.spec.simulation.control_period,
-        sensors=sensed_by_name(task.sensors, task.true.robot, task.true.scene),
+        sensors={**felt(task.spec), **sensed_by_name(task.sensors, task.true.robot, task.true.scene)},
     )

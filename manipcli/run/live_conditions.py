@@ -17,6 +17,7 @@ from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.robustness import EDGE, Robustness
 from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
 from manipcli.control.controller import Controller, ControllerOutput
+from manipcli.control.felt_force import FeltForce
 from manipcli.core.units import readable
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
@@ -125,7 +126,8 @@ class Live:
             for k, controller in enumerate(controllers)
             if isinstance(recorded(controller), ControllerChannel)
         ]
-        self._sensors = SensorReadings(sensors, world.sensors)
+        felt = {own.name: own.arriving for own in controllers if isinstance(own, FeltForce)}
+        self._sensors = SensorReadings(sensors, world.sensors, felt)
         self._listens = False
         self._count = 0
         self._next = 0

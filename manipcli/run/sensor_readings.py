@@ -32,10 +32,12 @@ class SensorReadings:
     Args:
         bank: of the session.
         sensed: its sensors.
+        further: what is read like a sensor and is not in the bank: whether it arrived at this tick, and the numbers.
     """
 
-    def __init__(self, bank: SensorBank, sensed: Mapping[str, Sensed]) -> None:
+    def __init__(self, bank: SensorBank, sensed: Mapping[str, Sensed], further: Mapping[str, Array] = {}) -> None:
         self._bank = bank
+        self._further = further
         self._sensed = sensed
         self._followed: dict[str, _Followed] = {}
         self._numbers: list[tuple[Array, _Followed]] = []
@@ -54,9 +56,10 @@ class SensorReadings:
                 followed.add(now, _pixels(self._pictures[name], sensed))
             return
         self.follows = True
-        row = self._bank.arriving(name)
+        own = self._further.get(name)
+        row = self._bank.arriving(name) if own is None else own
         self._numbers.append((row, followed))
-        if now is not None and self._bank.heard(name):
+        if now is not None and (own is not None or self._bank.heard(name)):
             followed.add(now, row[1:].copy())
 
     def tick(self, time: float) -> None:

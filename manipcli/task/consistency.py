@@ -11,6 +11,7 @@ from manipcli.conditions.frames import fixed_frame
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
+from manipcli.conditions.members.force import FeltForceSpec
 from manipcli.conditions.members.touches import TouchesSpec
 from manipcli.conditions.members.wrench import WrenchSpec
 from manipcli.conditions.sensed import Sensed
@@ -245,7 +246,7 @@ def _is_for_a_force(until: ConditionSpec, *, opposite: bool = False) -> bool:
             return (below if opposite else above) is not None
         case CollisionSpec() | TouchesSpec():
             return not opposite
-        case WrenchSpec():
+        case WrenchSpec() | FeltForceSpec():
             return True
         case NoCollisionSpec():
             return opposite

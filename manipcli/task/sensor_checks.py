@@ -33,6 +33,7 @@ from manipcli.spec.mounted_sensor import MountedSpec
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.sensors import SensorSpec
 from manipcli.spec.task import TaskSpec
+from manipcli.task.felt import felt
 
 ABSENT: Final = 230
 """Number of the code of a finding about a name in a task that does not exist."""
@@ -110,7 +111,8 @@ def sensed(
     """The sensors of a task and its robot as conditions see them; None: a file is refused, or they have errors."""
     if robot_file is None or not task.source.untouched("sensors"):
         return None
-    return sensed_by_name({**(robot_file.spec.sensors or {}), **(task.spec.sensors or {})}, robot, scene)
+    sensors = {**(robot_file.spec.sensors or {}), **(task.spec.sensors or {})}
+    return {**felt(task.spec), **sensed_by_name(sensors, robot, scene)}
 
 
 def _of_robot(file: Located[RobotSpec]) -> list[_Named]:

@@ -12,6 +12,7 @@ from manipcli.conditions.members.collision import COLLISION, NO_COLLISION
 from manipcli.conditions.members.contact_force import CONTACT_FORCE
 from manipcli.conditions.members.duration import DURATION
 from manipcli.conditions.members.energy import ENERGY
+from manipcli.conditions.members.force import FORCE
 from manipcli.conditions.members.grasped import GRASPED
 from manipcli.conditions.members.inside import INSIDE, OUTSIDE
 from manipcli.conditions.members.limits import LIMITS
@@ -36,6 +37,6 @@ CONDITIONS: Seam[Condition[Any]] = Seam(
     members=(
         INSIDE, OUTSIDE, UPRIGHT, NEAR, ABOVE, RESTS_ON, AT_REST, MOVED, UNMOVED, GRASPED, SLIP, CONTACT_FORCE,
         COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, SATURATION, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
-        TOUCHES, WRENCH, SEES, SLIPS,
+        TOUCHES, WRENCH, FORCE, SEES, SLIPS,
     ),
 )  # fmt: skip

@@ -88,6 +88,9 @@ class PressSpec(ForceSpec):
     """
 
     hold: Annotated[Pause, Field(ge=0)] = Field(1.0, description="For how long it presses [s]. Default 1 s.")
+    stay: bool = Field(
+        False, description="Keep pressing after the step, until the next motion of the arm. Default: back off."
+    )
     at: Vector3 | None = Field(
         None, description="The point, in the frame of the body [m]. Default: the middle of its upper face, or the part."
     )
@@ -112,12 +115,12 @@ def comply(spec: ForceSpec, planner: Planner, q: Array, *, hold: float | None) -
     refuse_too_strong(planner, q, spec.axis, spec.force)
     speed = spec.speed
     if speed is None:
-        speed = approach_speed(spec.force, effective_mass(planner, q, spec.axis))
+        speed = approach_speed(spec.force, effective_mass(planner, q, spec.axis), planner.period)
     force = Pressing(frozen([0.0, 0.0, 1.0]), spec.force, speed, spec.reach, hold=hold)
     return Compliance.of(along=spec.stiffness, force=force)
 
 
-def press_and_relax(builder: MotionBuilder, label: str, compliance: Compliance) -> None:
+def press(builder: MotionBuilder, label: str, compliance: Compliance) -> None:
     """Press until the force has been held, from where the tool is."""
     force = compliance.force
     assert force is not None
@@ -136,7 +139,9 @@ def _plan(spec: PressSpec, planner: Planner, state: PlanningState) -> StepPlan:
     where, axis = pressed_point(spec, planner, state), spec.axis
     X_WH = hover(builder, planner, carrier(planner.scene, spec.object), where, axis, speed=spec.velocity_scaling)
     compliance = comply(spec, planner, builder.now.position, hold=spec.hold)
-    press_and_relax(builder, "press", compliance)
+    press(builder, "press", compliance)
+    if spec.stay:
+        return builder.plan()
     relax(builder, compliance)
     builder.straight("withdraw", Transform.of(xyz=-0.03 * axis) @ X_WH, speed=spec.velocity_scaling)
     return builder.plan()
@@ -158,6 +163,7 @@ def clause(spec: PressSpec, robot: RobotModel) -> str:
     at = "" if spec.at is None else f" at {point(spec.at)}"
     direction = "" if spec.direction == DOWN else f" in the direction {point(spec.direction, '')}"
     text = f"press on {named(spec.object)}{at}{direction} with {amount(spec.force, 'N')} for {amount(spec.hold, 's')}"
+    text += " and keep pressing" if spec.stay else ""
     return text + at_share(spec.velocity_scaling, 0.5)
 
 

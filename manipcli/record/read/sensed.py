@@ -22,7 +22,8 @@ ENCODINGS: Final[Mapping[str, int]] = {"8UC1": 1, "16UC1": 2}
 
 def reading_topics(name: str, sensed: Sensed) -> tuple[str, ...]:
     """The topics of the messages with the readings of a sensor."""
-    return tuple(f"{SENSORS}/{name}{suffix}" for suffix in sensed.suffixes)
+    root = sensed.topic or f"{SENSORS}/{name}"
+    return tuple(root + suffix for suffix in sensed.suffixes)
 
 
 class SensedTopics:
