@@ -51,7 +51,7 @@ def spiral(pitch: float, radius: float) -> tuple[Array, Array]:
     ticks = max(math.ceil(START / SAMPLE), math.ceil(2.0 * radius / SPEED / SAMPLE))
     back = (1.0 - _smooth(np.arange(1, ticks + 1) / ticks))[:, None] * points[-1]
     points = np.concatenate([points, back])
-    return SAMPLE * np.arange(len(points)), points
+    return SAMPLE * np.arange(len(points), dtype=np.float64), points
 
 
 def _smooth(u: Array) -> Array:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar, Final
@@ -102,26 +101,24 @@ def candidates(spec: InsertSpec, planner: Planner, state: PlanningState) -> Cand
     """Rotations of the peg about the hole, and heights from which it is lowered."""
     planner.held(state, spec.object)
     planner.free_start(state)
-    hole = planner.scene.body(spec.into)
-    assert hole.interior is not None  # refused by `check`
-    X_WS = planner.body_pose(state, spec.into) @ hole.interior.X_OS
+    interior = planner.scene.body(spec.into).interior
+    assert interior is not None  # refused by `check`
+    X_WS = planner.body_pose(state, spec.into) @ interior.X_OS
     if X_WS.R[2, 2] < UPRIGHT:
         raise NotPlannable(f"'{spec.into}' is tilted; expected a hole that is open upwards", loc=("into",))
     X_WO = planner.body_pose(state, spec.object)
-    if X_WO.R[2, 2] < math.cos(math.pi / 4.0):
-        raise NotPlannable(f"'{spec.object}' is not held upright", hint="hold it with the end down that goes in")
-    peg = section(planner.scene.body(spec.object), spec.depth or deep(hole.interior))
+    if X_WO.R[2, 2] < UPRIGHT:
+        raise NotPlannable(f"'{spec.object}' is not held upright", hint="grasp it as it stands, and keep it upright")
+    peg = section(planner.scene.body(spec.object), spec.depth or deep(interior))
     now = (X_WS.inverse() @ X_WO).rpy[2]
-    ways = itertools.product(best_yaws(peg, hole.interior, now), sorted(spread(spec.clearance)))
 
-    def options() -> Iterator[Candidate]:
-        for yaw, clearance in ways:
-            above = upright(peg, X_WS, hole.interior.rim + clearance, yaw) if hole.interior else X_WO
-            fitted = fit(peg, hole.interior, yaw) if hole.interior else None
-            name = f"from {readable(clearance, 'm')} above, at a yaw of {math.degrees(yaw):.0f} deg"
-            yield Candidate(partial(_attempt, spec, planner, state, X_WS, above, fitted, clearance), name=name)
+    def way(yaw: float, high: float) -> Candidate:
+        above, fitted = upright(peg, X_WS, interior.rim + high, yaw), fit(peg, interior, yaw)
+        name = f"from {readable(high, 'm')} above, at a yaw of {math.degrees(yaw):.0f} deg"
+        return Candidate(partial(_attempt, spec, planner, state, X_WS, above, fitted, high), name=name)
 
-    return Candidates(options(), what=f"cannot insert '{spec.object}' into '{spec.into}'")
+    ways = itertools.product(best_yaws(peg, interior, now), sorted(spread(spec.clearance)))
+    return Candidates([way(*one) for one in ways], what=f"cannot insert '{spec.object}' into '{spec.into}'")
 
 
 def _attempt(
@@ -135,7 +132,7 @@ def _attempt(
     q = builder.now.position
     refuse_too_strong(planner, q, down, spec.force)
     light = SEARCHING * spec.force
-    slow = min(approach_speed(IMPACT * light, effective_mass(planner, q, down)), LOWERING)
+    slow = min(approach_speed(IMPACT * light, effective_mass(planner, q, down), planner.period), LOWERING)
 
     tip = _tip(planner, X_WO, spec.object)
     turned = X_WS.R @ np.diag([1.0, -1.0, -1.0])  # z down, along the hole
@@ -160,12 +157,11 @@ def _attempt(
     X_WE = Transform.of(xyz=(high + depth) * down) @ X_WT
     with compliant(builder, law(spec.force, LOWERING, SOFT, depth if spec.depth else depth + high)):
         builder.straight("insert", X_WE, speed=0.05 * spec.velocity_scaling)
-    with compliant(builder, Compliance.of(along=ALONG, across=SOFT, X_TC=X_TC)):
-        builder.compliance = replace(builder.compliance, here=True) if builder.compliance else None
+    with compliant(builder, replace(Compliance.of(along=ALONG, across=SOFT, X_TC=X_TC), here=True)):
         builder.dwell("rest", FELT)
-    motions = [replace(motion, awaits=False) for motion in builder.plan().motions]
+    motions = tuple(replace(motion, awaits=False) for motion in builder.plan().motions)
     planned = Insertion(spec.object, spec.into, depth, fitted.clearance, radius)
-    return StepPlan(tuple(motions), builder.now, inserted=planned)
+    return StepPlan(motions, builder.now, inserted=planned)
 
 
 def _tip(planner: Planner, X_WO: Transform, name: str) -> Array:
