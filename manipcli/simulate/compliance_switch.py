@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from manipcli.control.compliant_arm import Compliant, complies
 from manipcli.control.manager import ControllerManager
-from manipcli.control.pressing import PressingReference
+from manipcli.control.pressing import LEAST, PressingReference
 from manipcli.core.errors import InvalidArgument
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, frozen
+from manipcli.plan.compliance import Pressing
 from manipcli.plan.motion import Motion, Switch
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import Session
 
 BLEND = 0.5
 """[s] Time in which a trajectory that begins elsewhere than planned joins its plan."""
+HOLDING_SPEED = 0.002
+"""[m/s] At which a force that a guarded motion stopped at follows what it presses on."""
+HOLDING_REACH = 0.05
+"""[m] As far as it follows."""
 TOGETHER = 1e-12
 """[rad or m] Below this a trajectory begins where it was planned."""
 
@@ -60,6 +68,12 @@ class ComplianceSwitch:
         until, arm = None if motion.compliance is None else motion.compliance.until, self._arm
         return until is not None and arm is not None and float(until.normal @ arm.tool) >= until.offset
 
+    @property
+    def felt(self) -> str:
+        """What was felt in the motion, in words."""
+        own = self._pressing
+        return "the arm has no goal" if own is None else own.text
+
     def result(self, motion: Motion) -> tuple[str, str]:
         """What was felt in a motion with a force that has ended, and why that is a failure; "" where it is none."""
         own = self._pressing
@@ -103,6 +117,24 @@ class ComplianceSwitch:
         reference = np.array(self._session.state.position)
         reference[self._session.robot.indices(arm.joints)] = arm.output.position
         return self._joined(trajectory, arm, reference, stays=motion.compliance.relative)
+
+    def holding(self, motion: Motion) -> Callable[[], str]:
+        """Holds the force that is felt now along one axis, once a guarded motion has stopped; says what it holds."""
+        arm, compliance = self._arm, motion.compliance
+        if arm is None or compliance is None or compliance.force is not None:
+            return str
+        felt = arm.felt[:3]
+        k = int(np.argmax(np.abs(felt)))
+        force = abs(float(felt[k]))
+        if force < LEAST:
+            return str
+        pressing = Pressing(frozen(np.sign(felt[k]) * np.eye(3)[k]), force, HOLDING_SPEED, HOLDING_REACH)
+
+        def hold() -> str:
+            arm.comply(replace(compliance, force=pressing))
+            return f"; it stays and presses with {force:.3g} N"
+
+        return hold
 
     def _switch(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The controllers that were deactivated."""
