@@ -19,7 +19,6 @@ from manipcli.run.attaching import Attaching
 from manipcli.run.awaited import missing, no_longer, sooner
 from manipcli.run.belief import Belief
 from manipcli.run.grasp_margin import GraspMargin
-from manipcli.run.inserted import insertion_text, not_inserted
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.looking import Looking
 from manipcli.run.monitors import Monitors
@@ -27,7 +26,7 @@ from manipcli.run.observer import Progress
 from manipcli.run.pour_watch import PourWatch
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import PLACED, from_place, not_placed, not_poured, not_squeezed, poured_texts
+from manipcli.run.step_results import PLACED, from_place, not_squeezed, result_texts, without_result
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -265,9 +264,7 @@ class StepAttempt:
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
         situation = self._measured.situation if self._physics else None
-        texts += poured_texts(self._plan.planner, planned.plan, situation)
-        if situation is not None and planned.plan.inserted is not None and left is None:
-            texts.append(insertion_text(self._plan.planner, planned.plan.inserted, situation(planned.plan.end)))
+        texts += [] if left else result_texts(self._plan.planner, planned.plan, situation)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
@@ -343,13 +340,12 @@ class StepAttempt:
         return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
 
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
-        """A failure where an object is not where the step places or pours it; `until` may define another pour."""
+        """A failure where an object is not where the step places, inserts or pours it; `until` may define another pour."""
         plan, planner = planned.plan, self._plan.planner
         if not self._physics or not (plan.placed or plan.poured or plan.inserted):
             return None
         now = self._measured.situation(replace(plan.end, carried=None))
-        why = not_placed(planner, plan, now) or ("" if step.until is not None else not_poured(planner, plan, now))
-        why = why or not_inserted(planner, plan.inserted, now)
+        why = without_result(planner, plan, now, poured=step.until is None)
         return MotionEnd("failed", why) if why else None
 
     def _still_held(self, before: PlanningState) -> str:

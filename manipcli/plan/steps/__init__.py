@@ -15,6 +15,7 @@ from manipcli.plan.steps import (
     place,
     pour,
     press,
+    push,
     release,
     switch_controllers,
     wait,
@@ -36,5 +37,6 @@ STEPS: Seam[StepMember[Any]] = Seam(
         place.MEMBER,
         press.MEMBER,
         insert.MEMBER,
+        push.MEMBER,
     ),
 )
