@@ -15,6 +15,7 @@ from manipcli.model.grasp import GRIP_FORCE, pressing
 from manipcli.model.state import Contact
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
+from manipcli.run.inserted import insertion_text, not_inserted
 from manipcli.run.replan import between, deg, mm
 from manipcli.spec.counted import selections
 
@@ -73,14 +74,22 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
     return f"'{first}' is not in '{plan.into}', it is {where}{counts}"
 
 
-def poured_texts(
+def without_result(planner: Planner, plan: StepPlan, now: PlanningState, *, poured: bool) -> str:
+    """Why an object is not where a step puts it; "" where it is. `poured`: whether that applies to what it pours."""
+    why = not_placed(planner, plan, now) or (not_poured(planner, plan, now) if poured else "")
+    return why or not_inserted(planner, plan.inserted, now)
+
+
+def result_texts(
     planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
 ) -> list[str]:
-    """What a pour that is done reports: how many bodies are where, and a stream that was moved.
+    """What a step that is done reports: how many poured bodies are where, a stream that was moved, a peg's depth.
 
     `situation`: measures the state; None without physics.
     """
     counts = [counted(planner, plan, situation(plan.end))] if situation is not None and selections(plan.poured) else []
+    if situation is not None and plan.inserted is not None:
+        counts.append(insertion_text(planner, plan.inserted, situation(plan.end)))
     moved = plan.stream is not None and plan.stream.moved
     return [*counts, *([f"what is poured {plan.stream.text}"] if plan.stream is not None and moved else [])]
 
