@@ -17,6 +17,7 @@ from manipcli.plan.steps import (
     press,
     push,
     release,
+    slide,
     switch_controllers,
     wait,
 )
@@ -38,5 +39,6 @@ STEPS: Seam[StepMember[Any]] = Seam(
         press.MEMBER,
         insert.MEMBER,
         push.MEMBER,
+        slide.MEMBER,
     ),
 )
