@@ -82,18 +82,22 @@ ANGULAR_VELOCITY, ANGULAR_ACCELERATION, ANGULAR_JERK = ANGLE / TIME, ANGLE / TIM
 FORCE = MASS * ACCELERATION
 TORQUE = ENERGY = FORCE * LENGTH
 """Torque and energy share one dimension: the angle of rotational work is a plain number here."""
+STIFFNESS, DAMPING = FORCE / LENGTH, FORCE / SPEED
+ANGULAR_STIFFNESS, ANGULAR_DAMPING = TORQUE / ANGLE, TORQUE / ANGULAR_VELOCITY
 
 _NAMES = {
     NUMBER: "a plain number", LENGTH: "a length", ANGLE: "an angle", MASS: "a mass", TIME: "a time",
     FREQUENCY: "a frequency", SPEED: "a speed", ACCELERATION: "an acceleration", JERK: "a jerk",
     ANGULAR_VELOCITY: "an angular velocity", ANGULAR_ACCELERATION: "an angular acceleration",
     ANGULAR_JERK: "an angular jerk", FORCE: "a force", TORQUE: "a torque or an energy",
-    PIXELS: "a number of pixels",
+    PIXELS: "a number of pixels", STIFFNESS: "a stiffness", ANGULAR_STIFFNESS: "an angular stiffness",
+    DAMPING: "a damping", ANGULAR_DAMPING: "an angular damping",
 }  # fmt: skip
 _SYMBOLS = {
     NUMBER: "", LENGTH: "m", ANGLE: "rad", MASS: "kg", TIME: "s", FREQUENCY: "Hz", SPEED: "m/s",
     ACCELERATION: "m/s^2", JERK: "m/s^3", ANGULAR_VELOCITY: "rad/s", ANGULAR_ACCELERATION: "rad/s^2",
-    ANGULAR_JERK: "rad/s^3", FORCE: "N", TORQUE: "N m",
+    ANGULAR_JERK: "rad/s^3", FORCE: "N", TORQUE: "N m", STIFFNESS: "N/m", ANGULAR_STIFFNESS: "N m/rad",
+    DAMPING: "N s/m", ANGULAR_DAMPING: "N m s/rad",
 }  # fmt: skip
 _EXAMPLES = {
     NUMBER: ("0.5", "50 %"), LENGTH: ("m", "cm", "mm", "um", "km", "in"), ANGLE: ("rad", "deg", "mrad", "rev"),
@@ -101,6 +105,8 @@ _EXAMPLES = {
     SPEED: ("m/s", "mm/s", "cm/s"), ACCELERATION: ("m/s^2", "mm/s^2"), JERK: ("m/s^3",),
     ANGULAR_VELOCITY: ("rad/s", "deg/s", "rpm"), ANGULAR_ACCELERATION: ("rad/s^2", "deg/s^2"),
     ANGULAR_JERK: ("rad/s^3", "deg/s^3"), FORCE: ("N", "mN", "kN"), TORQUE: ("N m", "mN m", "N mm", "J"),
+    STIFFNESS: ("N/m", "N/mm"), ANGULAR_STIFFNESS: ("N m/rad", "N m/deg"), DAMPING: ("N s/m",),
+    ANGULAR_DAMPING: ("N m s/rad",),
 }  # fmt: skip
 
 

@@ -10,13 +10,14 @@ body and the allowed contacts, and returns a `CollisionQuery` for any number of 
 Parts are named as in contacts: `robot/<link>`, or the body. A carried body is part of the robot: it moves with its
 link and is checked against the scene and the other links. Never checked: links with at most one moving joint between
 them; links that overlap with all joints at zero and in most configurations (`self_collision.lasting_overlaps`), or are
-within 4 mm there with one link between them; bodies of the scene against each other.
+within 4 mm there with one link between them; bodies of the scene against each other; the links of a jointed thing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ from manipcli.model.collision_pairs import Part, checked_pairs, margins_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.motion_bound import MotionBound, Mover
 from manipcli.model.self_collision import CLOSE, lasting_overlaps, spaced_by_one
+from manipcli.scene.joints import things
 from manipcli.scene.scene import Scene
 from manipcli.shapes.proximity import bounding_ball, coal_shape
 
@@ -104,6 +106,7 @@ class CollisionChecker:
         close = self._at_zero(CLOSE)
         self.spaced = spaced_by_one(model, [pair for pair, distance in close.items() if distance >= 0.0])
         self._ignored |= _of_links(self.spaced)
+        self._ignored |= {frozenset(pair) for thing in things(scene.joints) for pair in combinations(thing, 2)}
 
     def at(
         self,

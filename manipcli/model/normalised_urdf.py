@@ -73,10 +73,16 @@ def engine_urdf(robot: RobotModel, folder: Path) -> str:
     return _text(lines)
 
 
-def body_urdf(shapes: Sequence[Geometry], inertial: Inertial, folder: Path) -> str:
-    """The URDF of a rigid body for a physics engine: shapes and inertia; `folder` as in `engine_urdf`."""
-    link = Link(name="body", inertial=inertial, visuals=(), collisions=tuple(shapes))
-    return _text([*_head("body"), *_link(link, lambda mesh: str(clean_mesh(mesh, folder)))])
+def links_urdf(links: Sequence[Link], joints: Sequence[Joint], folder: Path) -> str:
+    """The URDF of a rigid or jointed body for a physics engine, without visuals; `folder` as in `engine_urdf`."""
+    lines = _head("body")
+    for link in links:
+        inertial = link.inertial or MASSLESS
+        inertial = dataclasses.replace(inertial, inertia=inside_triangle(inertial.inertia))
+        lines += _link(dataclasses.replace(link, inertial=inertial), lambda mesh: str(clean_mesh(mesh, folder)))
+    for joint in joints:
+        lines += _joint(joint)
+    return _text(lines)
 
 
 MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)))

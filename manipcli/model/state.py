@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.scene import Scene
 
 
@@ -110,3 +111,10 @@ def body_pose(scene: Scene, state: WorldState, name: str) -> BodyPose:
         return BodyPose(position=np.asarray(body.X_WO.p), quat_xyzw=np.asarray(body.X_WO.quat_xyzw))
     k = scene.movable.index(body)
     return BodyPose(position=state.body_position[..., k, :], quat_xyzw=state.body_quat_xyzw[..., k, :])
+
+
+def joint_positions(scene: Scene, state: WorldState, joint: SceneJoint) -> Array:
+    """(...) positions [rad or m] of a joint of the scene, from the poses of its two bodies."""
+    X_WP, X_WC = (body_pose(scene, state, name) for name in (joint.parent, joint.child))
+    found = joint.positions(X_WP.position, X_WP.quat_xyzw, X_WC.position, X_WC.quat_xyzw)
+    return np.asarray(np.broadcast_to(found, np.shape(state.time)))

@@ -41,6 +41,11 @@ class Tilting:
     times: Array
     angles: Array
 
+    def then(self, other: Tilting) -> Tilting:
+        """This, and the other one from its end on."""
+        times = np.concatenate([self.times, self.times[-1] + other.times[1:]])
+        return Tilting(times, np.concatenate([self.angles, self.angles[-1] + other.angles[1:]]))
+
 
 @dataclass(frozen=True, slots=True)
 class Contents:

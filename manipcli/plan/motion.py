@@ -9,6 +9,7 @@ from typing import Literal
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried, Pair
 from manipcli.plan.compliance import Compliance
+from manipcli.plan.portion import Portion
 from manipcli.plan.trajectory import JointTrajectory
 
 Strictness = Literal["strict", "best_effort"]
@@ -136,6 +137,7 @@ class Motion:
         lets_go: what is attached to the tool is freed at its beginning.
         looks: what it locates; it ends when the picture has arrived.
         compliance: how the arm yields in it; None: it does not.
+        pours: it stops as soon as the `portion` of the step has left the container.
     """
 
     label: str
@@ -153,6 +155,7 @@ class Motion:
     lets_go: bool = False
     looks: Look | None = None
     compliance: Compliance | None = None
+    pours: bool = False
 
     @property
     def closes(self) -> bool:
@@ -214,6 +217,27 @@ class Insertion:
 
 
 @dataclass(frozen=True, slots=True)
+class JointGoal:
+    """Where a step moves a joint of the scene.
+
+    Attributes:
+        name: of the joint.
+        position: [rad or m] that it is planned to have at the end.
+        side: 1: this or more, -1: this or less, 0: neither.
+        within: [rad or m] tolerance.
+    """
+
+    name: str
+    position: float
+    side: float
+    within: float
+
+    def short(self, position: float) -> float:
+        """[rad or m] by which a position misses the goal; negative: by which it is beyond it on its `side`."""
+        return self.side * (self.position - position) if self.side else abs(position - self.position)
+
+
+@dataclass(frozen=True, slots=True)
 class StepPlan:
     """The motions of one step, and the state after them.
 
@@ -224,6 +248,8 @@ class StepPlan:
         poured: the bodies that it pours into the container `into`.
         stream: where they land; None if the plan does not predict it.
         inserted: what it puts into a hole.
+        joint: the joint of the scene that it moves; None for none.
+        portion: how much of them; None: all.
     """
 
     motions: tuple[Motion, ...]
@@ -233,6 +259,8 @@ class StepPlan:
     into: str = ""
     stream: Stream | None = None
     inserted: Insertion | None = None
+    joint: JointGoal | None = None
+    portion: Portion | None = None
 
     @property
     def duration(self) -> float:

@@ -72,9 +72,9 @@ class MotionBuilder:
         other._motions, other.compliance = [*self._motions], self.compliance
         return other
 
-    def adopt(self, other: MotionBuilder) -> None:
-        """Continue where a copy has led."""
-        self._motions, self._now = other._motions, other._now
+    def adopt(self, other: MotionBuilder, state: PlanningState | None = None) -> None:
+        """Continue where a copy has led, or with a predicted `state` there."""
+        self._motions, self._now = other._motions, other._now if state is None else state
 
     def let_go(self, posture: str) -> PlanningState:
         """The present state with the hand at a pose and empty; collisions are not checked."""
@@ -296,9 +296,9 @@ class MotionBuilder:
         """Hold still until the picture in which a body is located has arrived, at most after `duration` [s]."""
         self._motions.append(Motion(LOOKING, trajectory=None, grip=None, duration=duration, looks=looks))
 
-    def spill(self, into: str) -> None:
-        """Predict the contents of the carried object on the floor of the container `into`."""
-        self._now = spilled(self._planner, self._now, into)
+    def spill(self, into: str, most: int | None = None) -> None:
+        """Predict the contents of the carried object, or `most` of them, on the floor of the container `into`."""
+        self._now = spilled(self._planner, self._now, into, most)
 
     def _labelled(self, label: str) -> AbstractContextManager[None]:
         return labelled(label, self._verb, self._motions)

@@ -23,10 +23,11 @@ STEP: Final = 5e-4
 def against_jaw(planner: Planner, state: PlanningState, body: str, grip: Grip) -> PlanningState:
     """The state with the object where a hand with one moving jaw pushes it, along the tool's y; else the same state.
 
-    The object is not rotated, and it slides on what it stands on: the real push also depends on friction.
+    A link of a jointed thing stays: its joint holds it. The object is not rotated, and it slides on what it stands on:
+    the real push also depends on friction.
     """
     robot = planner.robot
-    if len(finger_links(robot, grip.joints)) != 1:
+    if len(finger_links(robot, grip.joints)) != 1 or any(joint.child == body for joint in planner.scene.joints):
         return state
     jaw = {ROBOT + link for link in moved_links(robot, grip.joints)}
     X_WT = planner.tool_pose(state)

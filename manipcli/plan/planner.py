@@ -16,6 +16,7 @@ from manipcli.core.geometry import Transform, frozen
 from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, CollisionQuery, Pair, pairs
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
+from manipcli.plan.aboard import aboard
 from manipcli.plan.claimed_joints import arm_joints
 from manipcli.plan.contents import contents_of
 from manipcli.plan.hand import moved_links
@@ -256,6 +257,10 @@ class Planner:
         body, X_WC = self.scene.body(container), self.body_pose(state, container)
         return contents_of(self.scene, body, X_WC, state.bodies, partial(self.touching, state))
 
+    def aboard(self, state: PlanningState, body: str) -> tuple[str, ...]:
+        """The movable bodies that move with a body; see `aboard`."""
+        return aboard(self.scene, body, state.bodies, partial(self.contents, state), partial(self.touching, state))
+
     def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
         """Collision query in this state with the scene and the robot itself, with the clearances of the task.
 
@@ -272,7 +277,7 @@ class Planner:
             X_LW = carried.X_LO @ self.body_pose(state, carried.body).inverse()
             contents = tuple(
                 Carried(name, carried.link, _rounded(X_LW @ self.body_pose(state, name)))
-                for name in self.contents(state, carried.body)
+                for name in self.aboard(state, carried.body)
             )
             on_body = {name for pair in allowed if carried.body in pair for name in pair} - {carried.body}
             allowed |= {(each.body, name) for each in contents for name in on_body}

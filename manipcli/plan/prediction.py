@@ -36,19 +36,19 @@ def carried_along(planner: Planner, before: PlanningState, now: PlanningState) -
     X_WO = planner.kinematics.forward(now.position, carried.link) @ carried.X_LO
     X_WA = planner.body_pose(before, carried.body)
     moved = {carried.body: X_WO}
-    for name in planner.contents(before, carried.body):
+    for name in planner.aboard(before, carried.body):
         moved[name] = X_WO @ X_WA.inverse() @ planner.body_pose(before, name)
     return put(planner, now, moved)
 
 
-def spilled(planner: Planner, state: PlanningState, into: str) -> PlanningState:
-    """The state with the contents of the carried body on the floor of the container `into`."""
+def spilled(planner: Planner, state: PlanningState, into: str, most: int | None = None) -> PlanningState:
+    """The state with the contents of the carried body, or `most` of them, on the floor of the container `into`."""
     carried, interior = state.carried, planner.scene.body(into).interior
     if carried is None or interior is None:
         return state
     X_WS = planner.body_pose(state, into) @ interior.X_OS
     landed = {}
-    for name in planner.contents(state, carried.body):
+    for name in planner.contents(state, carried.body)[:most]:
         body = planner.scene.body(name)
         bottom = body.centre[2] - body.size[2] / 2
         landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], interior.floor - bottom))

@@ -47,6 +47,8 @@ class StepMember(Generic[S]):
             nothing.
         clause: (spec, robot) -> the step in English, as an order without a capital and a full stop: `lift 'cup' by 8 to
             20 cm`. `core/prose.py` has the parts.
+        scene_clause: (spec, robot, scene) -> the same with what only the scene says, such as the units of its joints;
+            None: `clause`.
         request: (spec) -> the switch of controllers that it requests, so that later steps are checked against the
             controllers that are then active.
         guarded: (spec) -> whether it stops as soon as the step's `until` holds.
@@ -62,11 +64,16 @@ class StepMember(Generic[S]):
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     clause: Callable[[S, RobotModel], str]
+    scene_clause: Callable[[S, RobotModel, Scene], str] | None = None
     request: Callable[[S], Switch | None] = lambda _: None
     guarded: Callable[[S], bool] = lambda _: False
     compliant: Callable[[S], bool] = lambda _: False
     moves: bool = True
     part: Callable[[S, RobotModel, Sequence[str]], Part] = lambda *_: "both"
+
+    def told(self, spec: S, robot: RobotModel, scene: Scene) -> str:
+        """The step in English; see `clause`."""
+        return self.clause(spec, robot) if self.scene_clause is None else self.scene_clause(spec, robot, scene)
 
     def plan(self, spec: S, planner: Planner, state: PlanningState) -> StepPlan:
         """The plan of the first candidate that has one, with straight paths only.

@@ -23,9 +23,8 @@ from manipcli.plan.flight import (
     leaving,
     room,
 )
-from manipcli.plan.motion import PlanningState, Stream
+from manipcli.plan.motion import PlanningState, StepPlan, Stream
 from manipcli.plan.planner import Planner
-from manipcli.plan.trajectory import JointTrajectory
 from manipcli.scene.scene import Body
 
 _SAMPLES: Final = 250  # of the tilt; between them it is linear
@@ -111,8 +110,10 @@ def width(body: Body) -> float:
     return float(np.sort(body.size)[1])
 
 
-def tilting(planner: Planner, state: PlanningState, trajectory: JointTrajectory, axis: Array) -> Tilting:
-    """The tilt of the tool about a horizontal `axis` (3,) of the world along a trajectory that begins upright."""
+def tilting(planner: Planner, state: PlanningState, plan: StepPlan, axis: Array) -> Tilting:
+    """The tilt of the tool from `state` about a horizontal `axis` (3,) of the world, in the last motion of a plan."""
+    trajectory = plan.motions[-1].trajectory
+    assert trajectory is not None  # a rotation in place
     index = np.unique(np.linspace(0, len(trajectory.times) - 1, _SAMPLES).astype(int))
     path = with_joints(planner.robot, state.position, trajectory.names, trajectory.positions[index])
     R = [planner.solver.forward(q).R for q in path]

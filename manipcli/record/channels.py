@@ -24,6 +24,8 @@ SENSORS = "/sensors"
 """Above the topics of sensors."""
 BELIEF = "/belief"
 """Above the topics of believed poses: those of `uncertain` bodies, each with its covariance, and `BELIEF_TF`."""
+SCENE_JOINTS = "/scene/joints"
+"""Positions of the joints of the scene, from the poses of `/tf` and at its ticks."""
 BELIEF_TF = f"{BELIEF}/tf"
 """The poses that the robot believes, in frames of their own; at the ticks of `/tf`."""
 
@@ -179,8 +181,10 @@ def channel_table(
     live: bool = False,
     sensors: Sequence[MeasuredChannel] = (),
     belief: BeliefChannels = NO_BELIEF,
+    scene_joints: bool = False,
 ) -> tuple[Channel, ...]:
-    """All channels of a recording, in the order of their ids; `live`: also that of the commands of a live session."""
+    """All channels of a recording, in the order of their ids; `live`: also that of the commands of a live session;
+    `scene_joints`: that of the joints of a scene that has some."""
     rows: list[tuple[str, str, bool]] = [
         (ROBOT_DESCRIPTION, schemas.STRING, True),
         (TF_STATIC, schemas.TF_MESSAGE, True),
@@ -213,6 +217,8 @@ def channel_table(
     if belief.bodies:
         rows.append((BELIEF_TF, schemas.TF_MESSAGE, False))
         rows += [(f"{BELIEF}/{name}", schemas.POSE_WITH_COVARIANCE, True) for name in belief.uncertain]
+    if scene_joints:
+        rows.append((SCENE_JOINTS, schemas.JOINT_STATE, False))
     if live:
         rows.append((LIVE_COMMANDS, schemas.LIVE_COMMAND, False))
     own = {sensor.topic: sensor.definition for sensor in controllers if isinstance(sensor, SensorChannel)}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from manipcli.record.channels import BELIEF, SENSORS, Channel
+from manipcli.record.channels import BELIEF, SCENE_JOINTS, SENSORS, Channel
 
 PLOTTED = ("reference", "error", "actuator_states")
 """Topics that are only for viewers."""
@@ -43,7 +43,7 @@ def word(topic: str) -> str:
     """The word that selects a topic: `controller_state` for `/arm/controller_state`."""
     if topic.startswith(f"{SENSORS}/"):
         return "sensors"
-    if topic.startswith(f"{BELIEF}/"):
+    if topic == SCENE_JOINTS or topic.startswith(f"{BELIEF}/"):
         return "tf"
     last = topic.rpartition("/")[2]
     return "goals" if last in GOALS and topic.count("/") > 2 else last

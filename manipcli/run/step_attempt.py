@@ -18,6 +18,7 @@ from manipcli.record.write.recorder import Recorder
 from manipcli.run.attaching import Attaching
 from manipcli.run.awaited import missing, no_longer, sooner
 from manipcli.run.belief import Belief
+from manipcli.run.dosing import Dosing
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.looking import Looking
@@ -26,7 +27,7 @@ from manipcli.run.observer import Progress
 from manipcli.run.pour_watch import PourWatch
 from manipcli.run.replan import Measured, after
 from manipcli.run.saturation_counts import saturated_since, saturations_of
-from manipcli.run.step_results import PLACED, from_place, not_squeezed, result_texts, without_result
+from manipcli.run.step_results import margin, missed, not_squeezed, result_texts
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, Lane, MotionEnd, Until
 from manipcli.simulate.session import SLOW, Session
@@ -212,6 +213,9 @@ class StepAttempt:
         if before.carried is not None and self._physics:
             self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
+        dosing = None
+        if planned.plan.portion is not None and self._pour is not None and self._physics:
+            dosing = Dosing(self._plan.planner, planned.plan, self._pour, self._measured.situation)
         with self._awaited(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None
@@ -230,6 +234,8 @@ class StepAttempt:
                     over = sooner(over, self._session.time + motion.duration + DEFAULT_UNTIL_TIME)
                 if motion.looks is not None:
                     end = yield from self._look_at(motion.looks, planned, over)
+                elif dosing is not None:
+                    end = yield from dosing.running(motion, executor, over)
                 else:
                     end = yield from executor.running(motion, until=until, deadline=over)
                 if end.outcome != "done":
@@ -247,7 +253,7 @@ class StepAttempt:
                         return MotionEnd("failed", f"{motion.label}: {loose}: {end.text}")
                 if end.weak:
                     self._report(f"{motion.label}: {end.text}", detail=False)
-                awaited = awaited and not motion.awaits
+                awaited = awaited and (dosing is not None or not motion.awaits)
                 texts += [end.text + no_longer(motion, probe)] if end.text else []
             self._believed = self._looking.corrected(planned.plan)
             if awaited and until is not None:
@@ -264,7 +270,7 @@ class StepAttempt:
         left = self._left_behind(planned.plan.end.carried) or self._short_of_plan(planned, before)
         left = left or self._without_result(step, planned)
         situation = self._measured.situation if self._physics else None
-        texts += [] if left else result_texts(self._plan.planner, planned.plan, situation)
+        texts = [*result_texts(self._plan.planner, planned.plan, situation), *texts]
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     def _look_at(self, looks: Look, planned: PlannedStep, deadline: float | None) -> Lane[MotionEnd]:
@@ -342,10 +348,10 @@ class StepAttempt:
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
         """A failure where an object is not where the step puts or pours it; `until` may define another pour."""
         plan, planner = planned.plan, self._plan.planner
-        if not self._physics or not (plan.placed or plan.poured or plan.inserted):
+        if not self._physics or not (plan.placed or plan.poured or plan.joint or plan.inserted):
             return None
         now = self._measured.situation(replace(plan.end, carried=None))
-        why = without_result(planner, plan, now, poured=step.until is None)
+        why = missed(planner, plan, now, poured=step.until is None)
         return MotionEnd("failed", why) if why else None
 
     def _still_held(self, before: PlanningState) -> str:
@@ -373,9 +379,8 @@ class StepAttempt:
         plan = planned.plan
         if not self._physics:
             return None
-        if plan.placed:
-            now = self._measured.situation(replace(plan.end, carried=None))
-            return PLACED - from_place(self._plan.planner, plan, now)[0], "m"
+        if plan.placed or plan.joint is not None:
+            return margin(self._plan.planner, plan, self._measured.situation(replace(plan.end, carried=None)))
         if plan.end.carried is None or planned.start.carried is not None:
             return None
         spare = self._grasp_margin.spare(plan.end.carried.body)

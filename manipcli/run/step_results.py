@@ -13,10 +13,12 @@ import numpy as np
 from manipcli.core.units import readable
 from manipcli.model.grasp import GRIP_FORCE, pressing
 from manipcli.model.state import Contact
-from manipcli.plan.motion import PlanningState, StepPlan
+from manipcli.plan.jointed import position_of
+from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
 from manipcli.run.inserted import insertion_text, not_inserted
 from manipcli.run.replan import between, deg, mm
+from manipcli.scene.joints import SceneJoint
 from manipcli.spec.counted import selections
 
 PLACED: Final = 0.01
@@ -66,30 +68,85 @@ def not_poured(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
         return ""
     inside = planner.contents(replace(now, carried=None), plan.into)
     missing = [name for name in plan.poured if name not in inside]
-    if not missing:
+    if not missing or (plan.portion is not None and _reached(planner, plan, inside)):
         return ""
+    if plan.portion is not None:
+        return f"less than {plan.portion.text} was poured into '{plan.into}': {counted(planner, plan, now)}"
     first = missing[0]
     where = f"still in '{_held(plan)}'" if first in _kept(planner, plan, now) else f"at {_at(planner, now, first)}"
     counts = f"; {counted(planner, plan, now)}" if len(plan.poured) > 1 else ""
     return f"'{first}' is not in '{plan.into}', it is {where}{counts}"
 
 
-def without_result(planner: Planner, plan: StepPlan, now: PlanningState, *, poured: bool) -> str:
-    """Why an object is not where a step puts it; "" where it is. `poured`: whether that applies to what it pours."""
-    why = not_placed(planner, plan, now) or (not_poured(planner, plan, now) if poured else "")
-    return why or not_inserted(planner, plan.inserted, now)
+def not_moved(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
+    """Why the joint that a step moves is not where it should be; "" where it is, or where the step moves none.
+
+    Args:
+        planner: of the task.
+        plan: of the step.
+        now: the measured poses of all bodies.
+    """
+    goal = plan.joint
+    if goal is None:
+        return ""
+    joint, position = _joint(planner, goal, now)
+    if goal.short(position) <= goal.within:
+        return ""
+    bound = "at least " if goal.side > 0.0 else "at most " if goal.side < 0.0 else ""
+    expected = f"expected {bound}{_travel(goal.position, joint)} within {_travel(goal.within, joint)}"
+    return f"joint '{joint.name}' is at {_travel(position, joint)}, {expected}"
+
+
+def _joint(planner: Planner, goal: JointGoal, now: PlanningState) -> tuple[SceneJoint, float]:
+    """The joint that a step moves, and its position."""
+    joint = next(joint for joint in planner.scene.joints if joint.name == goal.name)
+    return joint, position_of(planner, now, joint)
+
+
+def _travel(value: float, joint: SceneJoint) -> str:
+    return mm(value) if joint.slides else deg(value)
+
+
+def missed(planner: Planner, plan: StepPlan, now: PlanningState, *, poured: bool) -> str:
+    """Why a step does not have its result in the state `now`; "" where it has. `poured`: what it pours counts."""
+    why = not_placed(planner, plan, now) or not_moved(planner, plan, now) or not_inserted(planner, plan.inserted, now)
+    return why or (not_poured(planner, plan, now) if poured else "")
+
+
+def margin(planner: Planner, plan: StepPlan, now: PlanningState) -> tuple[float, str]:
+    """By how much a step has its result: to the limit of its place [m], or of its joint [m or rad], and the unit."""
+    if plan.joint is None:
+        return PLACED - from_place(planner, plan, now)[0], "m"
+    joint, position = _joint(planner, plan.joint, now)
+    return plan.joint.within - plan.joint.short(position), joint.unit
 
 
 def result_texts(
     planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
 ) -> list[str]:
-    """What a step that is done reports: how many poured bodies are where, a stream that was moved, a peg's depth.
+    """What a step that is done reports of its result. `situation`: measures the state; None without physics."""
+    if plan.inserted is not None and situation is not None:
+        return [insertion_text(planner, plan.inserted, situation(plan.end))]
+    if plan.joint is None or situation is None:
+        return poured_texts(planner, plan, situation)
+    joint, position = _joint(planner, plan.joint, situation(plan.end))
+    return [f"joint '{joint.name}' is at {_travel(position, joint)}"]
+
+
+def _reached(planner: Planner, plan: StepPlan, names: Sequence[str]) -> bool:
+    """Whether the bodies of these names that a step pours are its portion."""
+    contents = [planner.scene.body(name) for name in plan.poured]
+    return plan.portion is None or plan.portion.reached(contents, [body for body in contents if body.name in names])
+
+
+def poured_texts(
+    planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
+) -> list[str]:
+    """What a pour that is done reports: how many bodies are where, and a stream that was moved.
 
     `situation`: measures the state; None without physics.
     """
     counts = [counted(planner, plan, situation(plan.end))] if situation is not None and selections(plan.poured) else []
-    if situation is not None and plan.inserted is not None:
-        counts.append(insertion_text(planner, plan.inserted, situation(plan.end)))
     moved = plan.stream is not None and plan.stream.moved
     return [*counts, *([f"what is poured {plan.stream.text}"] if plan.stream is not None and moved else [])]
 

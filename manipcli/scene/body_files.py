@@ -1,4 +1,4 @@
-"""Bodies from files: a mesh, or a URDF with one link; meshes count as their convex hulls or convex parts."""
+"""Bodies from files: a mesh, or the only link of a URDF; meshes count as their convex hulls or convex parts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manipcli.description.elements import Inertial
 from manipcli.description.expanded import read_description
 from manipcli.description.lint.rigid import box_about
 from manipcli.description.packages import Packages
-from manipcli.description.urdf.urdf import read_parts
+from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.scene.body_shapes import COLORS, BodyShape
 from manipcli.scene.hollow import hollow_of
 from manipcli.shapes.convex_parts import concave, convex_parts
@@ -82,29 +82,32 @@ def in_parts(geometries: Sequence[Geometry], collision: MeshCollision | None) ->
     return tuple(made)
 
 
-def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
-    """The only link of a URDF, in the link's frame: its collision shapes and its inertia.
-
-    Args:
-        spec: names the file.
-        packages: of the file that names it.
-        rgba: overrides the file's colours.
+def read_urdf(spec: UrdfSpec, packages: Packages) -> Parts:
+    """Links and joints of the URDF or xacro file of a body.
 
     Raises:
         NotFound: the file does not exist.
         InvalidInput: the file has errors, each with its place.
-        UnusableMesh: convex parts of a mesh cannot be made.
-        ValueError: it has more than one link, no collision shape, or (for a link with mass) no moments of inertia.
     """
     path = packages.resolve(spec.file, anywhere=True)
-    parts = read_parts(read_description(path, packages=packages.below(path)))
+    parts = read_parts(read_description(path, packages=packages.below(path), arguments=spec.args))
     if parts.errors:
         raise InvalidInput(parts.errors)
-    if len(parts.links) != 1:
-        raise ValueError(
-            f"'{spec.file}' has {len(parts.links)} links; expected 1, because joints of scene bodies are not "
-            "supported: use one file per moving part"
-        )
+    return parts
+
+
+def urdf(spec: UrdfSpec, parts: Parts, rgba: Rgba | None) -> BodyShape:
+    """The only link of a URDF, in the link's frame: its collision shapes and its inertia.
+
+    Args:
+        spec: names the file.
+        parts: what is in it.
+        rgba: overrides the file's colours.
+
+    Raises:
+        UnusableMesh: convex parts of a mesh cannot be made.
+        ValueError: it has no collision shape, or (for a link with mass) no moments of inertia.
+    """
     (link,) = parts.links
     if not link.collisions:
         raise ValueError(f"link '{link.name}' of '{spec.file}' has no collision shape")

@@ -12,9 +12,10 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial
+from manipcli.scene.mass_properties import union
 from manipcli.scene.scene import Interior
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba, Shape, Sphere
-from manipcli.spec.scene import BoxSpec, CupSpec, CylinderSpec, HandleSpec, SphereSpec, TraySpec
+from manipcli.spec.scene import BodySpec, BoxSpec, CupSpec, CylinderSpec, HandleSpec, SphereSpec, TraySpec
 
 COLORS: dict[str, Rgba] = {
     "floor": (0.80, 0.81, 0.82, 1.0),
@@ -26,8 +27,10 @@ COLORS: dict[str, Rgba] = {
     "tray": (0.44, 0.52, 0.61, 1.0),
     "mesh": (0.70, 0.66, 0.58, 1.0),
     "urdf": (0.70, 0.66, 0.58, 1.0),
+    "moved": (0.55, 0.63, 0.70, 1.0),
+    "part": (0.30, 0.32, 0.35, 1.0),
 }
-"""By kind of body; `desk` is a fixed box."""
+"""By kind of body; `desk` is a fixed box, `moved` a link that a joint moves, `part` what is fixed to one."""
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 
 
@@ -51,6 +54,34 @@ class BodyShape:
     radius: float | None = None
     flat_top: bool = False
     inertial: Inertial | None = None
+
+
+def inertial_of(spec: BodySpec, shape: BodyShape) -> Inertial:
+    """Mass properties in O: those of a file scaled to the written mass, else those of the union of the shapes."""
+    if spec.fixed:
+        return Inertial(mass=0.0, X_LI=Transform.identity(), inertia=frozen(np.zeros((3, 3))))
+    if shape.inertial is None:
+        return union(shape.geometries, spec.mass or 1.0)  # a missing mass is already reported
+    mass = spec.mass or shape.inertial.mass
+    inertia = frozen(shape.inertial.inertia * (mass / shape.inertial.mass))
+    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=inertia)
+
+
+def primitive(spec: BodySpec, rgba: Rgba) -> BodyShape | None:
+    """The shape of a body that is in the task itself; None: it is in a file.
+
+    Raises:
+        ValueError: its numbers contradict each other.
+    """
+    if spec.box is not None:
+        return box(spec.box, rgba)
+    if spec.sphere is not None:
+        return sphere(spec.sphere, rgba)
+    if spec.cylinder is not None:
+        return cylinder(spec.cylinder, rgba)
+    if spec.cup is not None:
+        return cup(spec.cup, rgba)
+    return None if spec.tray is None else tray(spec.tray, rgba)
 
 
 def floor() -> BodyShape:

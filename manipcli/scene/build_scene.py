@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import digits
-from manipcli.description.elements import Inertial
 from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.urdf import Parts
 from manipcli.scene import body_files, body_shapes
-from manipcli.scene.body_shapes import COLORS, BodyShape, too_big
+from manipcli.scene.body_shapes import COLORS, BodyShape, inertial_of, too_big
 from manipcli.scene.drop_test import FORMED, bottom, drop_height
+from manipcli.scene.jointed import jointed
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.layers import Layers
-from manipcli.scene.mass_properties import union
 from manipcli.scene.named_frames import in_owner, named_frames, owner
-from manipcli.scene.scene import Body, Scene
+from manipcli.scene.overlap_hints import SHAPES, apart, blamed
+from manipcli.scene.scene import SEPARATOR, Body, Frame, Scene
 from manipcli.scene.scene_names import Locate, miscounted, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Cylinder, Rgba
-from manipcli.spec.base import Model
-from manipcli.spec.counted import flat_scene, group, written
+from manipcli.spec.counted import flat_scene, group, members, written
 from manipcli.spec.explain import distinct
 from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
 
-SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
-PLACING = ("pose", "rests_on", "inside", "frame", "at", "yaw")
 LONGEST = 10.0
 """[m] Longest movable body: a longer one was probably meant in millimetres."""
 _SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
@@ -63,9 +63,16 @@ class _Builder:
         self.place: Locate = (lambda loc: place(written(loc, spec.scene))) if self.counted else place
         self.layers = Layers(self.counted, spec.simulation.seed if self.counted else 0)
         self.packages = packages
-        self.findings = list(distinct((*misnamed(self.spec, self.place), *miscounted(spec, place))))
+        self.findings: list[Diagnostic] = []
         self.shapes: dict[str, BodyShape] = {}
         self.kinds: dict[str, str] = {}
+        self.moved_by: dict[str, SceneJoint] = {}  # by the body that they move
+        self.parts: dict[str, Frame] = {}
+        self.files: dict[str, Parts] = {}
+        links = {name: body for own, file in spec.scene.items() for name, body in self._read(own, file)}
+        self.findings += distinct((*misnamed(self.spec, self.place, links, self.parts), *miscounted(spec, place)))
+        if links:
+            self.spec = self.spec.model_copy(update={"scene": {**self.spec.scene, **links}})
         self.poses: dict[str, Transform] = {}
         self.unplaced: set[str] = set()
         self.waiting: list[str] = []
@@ -77,45 +84,55 @@ class _Builder:
             self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -body_shapes.FLOOR_SIZE[2] / 2.0))
             bodies.append(self._body("floor", BodySpec(fixed=True), self.poses["floor"]))
         for name, body in self.spec.scene.items():
-            self._shape(name, body)
+            if name not in self.moved_by:
+                self._shape(name, body)
         for name in self.spec.scene:
             X_WO = self._pose(name)
             if X_WO is not None and name in self.shapes:
                 bodies.append(self._body(name, self.spec.scene[name], X_WO))
-        frames = tuple(named_frames(self.spec))
+        frames = (*named_frames(self.spec), *self.parts.values())
         if not self.findings:
-            for a, b, depth in overlaps(bodies):
+            for a, b, depth in overlaps(bodies, self.moved_by.values()):
                 self._error(
                     "TASK226",
                     f"'{a}' and '{b}' overlap by {depth * 1e3:.1f} mm at the start",
-                    self._blamed([name for name in reversed(self.spec.scene) if name in (a, b)]),
-                    self._apart(a, b),
+                    blamed(self.spec, self.place, [name for name in reversed(self.spec.scene) if name in (a, b)]),
+                    apart(self.spec, a, b),
                 )
         if self.findings:
             raise InvalidInput(self.findings)
-        return Scene(bodies=tuple(bodies), frames=frames, gravity=frozen(self.spec.simulation.gravity))
-
-    def _apart(self, a: str, b: str) -> str:
-        """The hint for two bodies that overlap at the start."""
-        specs = {name: self.spec.scene[name] for name in (a, b) if name in self.spec.scene}
-        inside = {spec.inside for spec in specs.values()}
-        middle = [f"'{name}'" for name, spec in specs.items() if spec.at is None]
-        if len(specs) == 2 and len(inside) == 1 and None not in inside and middle:
-            where = f"{' and '.join(middle)} {'are' if len(middle) > 1 else 'is'} at the centre of '{inside.pop()}'"
-            return f"{where}; move {'one' if len(middle) > 1 else 'it'} with `at: [X, Y]`"
-        return "move one of them; contact without overlap is allowed"
-
-    def _blamed(self, bodies: Sequence[str]) -> Loc:
-        """The value from `--set` that places or shapes one of these bodies; else the first body."""
-        for name in bodies:
-            for word in (*PLACING, *SHAPES):
-                for loc in _written(getattr(self.spec.scene[name], word), ("scene", name, word)):
-                    place = self.place(loc)
-                    if place is not None and place.line == 0:
-                        return loc
-        return ("scene", bodies[0])
+        gravity = frozen(self.spec.simulation.gravity)
+        return Scene(tuple(bodies), frames, gravity, tuple(self.moved_by.values()))
 
     # -- shapes and mass
+
+    def _read(self, name: str, spec: BodySpec) -> Iterator[tuple[str, BodySpec]]:
+        """Read the description file of a body; yields what its links have in common with it, if joints move them."""
+        loc: Loc = ("scene", name)
+        if spec.urdf is None:
+            if spec.joints is not None:
+                hint = "joints come with `urdf: {file: ...}`"
+                self._error("TASK360", f"body '{name}' has `joints` without `urdf`", (*loc, "joints"), hint)
+            return
+        with self._reported(name, loc, "urdf"):
+            self.files[name] = parts = body_files.read_urdf(spec.urdf, self.packages)
+            if len(parts.links) == 1 and spec.joints is None:
+                return
+            made, faults = jointed(name, spec, parts)
+            for fault in faults:
+                self._error(fault.code, fault.message, (*loc, *fault.loc), fault.hint)
+            if spec.count is not None:
+                for one in members(name, spec.count):
+                    self._add_shape(one, "urdf", None if made.joints else made.shapes[name])
+                return
+            self.moved_by |= {joint.child: joint for joint in made.joints}
+            self.parts |= {frame.name: frame for frame in made.frames}
+            if not faults:
+                for body, shape in made.shapes.items():
+                    self._add_shape(body, "urdf", shape)
+            contact = ("friction", "rolling_friction", "spinning_friction", "restitution")
+            common = BodySpec(color=spec.color, **{word: getattr(spec, word) for word in contact})
+            yield from ((joint.child, common) for joint in made.joints)
 
     def _shape(self, name: str, spec: BodySpec) -> None:
         loc: Loc = ("scene", name)
@@ -126,21 +143,12 @@ class _Builder:
             return
         (kind,) = words
         rgba = spec.color or COLORS["desk" if kind == "box" and spec.fixed else kind]
-        try:
-            shape = self._made(spec, rgba)
-        except NotFound as error:
-            self._error("TASK222", f"body '{name}': {error.message}", (*loc, kind, "file"), error.hint)
+        if name not in self.shapes:
+            with self._reported(name, loc, kind):
+                self._add_shape(name, kind, self._made(name, spec, rgba))
+        shape = self.shapes.get(name)
+        if shape is None:
             return
-        except UnusableMesh as error:
-            self._error("TASK222", f"body '{name}': its mesh {error.reason}", (*loc, kind, "file"), error.hint)
-            return
-        except InvalidInput as error:
-            self.findings.extend(error.findings)
-            return
-        except ValueError as error:
-            self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
-            return
-        self._add_shape(name, kind, shape)
         if spec.fixed:
             if spec.known is not None:
                 hint = "remove `known`, or write `fixed: false`"
@@ -162,30 +170,37 @@ class _Builder:
             hint = "write `mass: 150 g`, or `fixed: true`"
             self._error("TASK223", f"body '{name}' is movable but has no mass", loc, hint)
 
-    def _made(self, spec: BodySpec, rgba: Rgba) -> BodyShape:
+    @contextmanager
+    def _reported(self, name: str, loc: Loc, kind: str) -> Iterator[None]:
+        """Report what is wrong with the shape of a body."""
+        try:
+            yield
+        except NotFound as error:
+            self._error("TASK222", f"body '{name}': {error.message}", (*loc, kind, "file"), error.hint)
+        except UnusableMesh as error:
+            self._error("TASK222", f"body '{name}': its mesh {error.reason}", (*loc, kind, "file"), error.hint)
+        except InvalidInput as error:
+            self.findings.extend(error.findings)
+        except ValueError as error:
+            self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
+
+    def _made(self, name: str, spec: BodySpec, rgba: Rgba) -> BodyShape | None:
         """Raises ValueError if the numbers contradict each other or a file cannot be used."""
-        if spec.box is not None:
-            return body_shapes.box(spec.box, rgba)
-        if spec.sphere is not None:
-            return body_shapes.sphere(spec.sphere, rgba)
-        if spec.cylinder is not None:
-            return body_shapes.cylinder(spec.cylinder, rgba)
-        if spec.cup is not None:
-            return body_shapes.cup(spec.cup, rgba)
-        if spec.tray is not None:
-            return body_shapes.tray(spec.tray, rgba)
         if spec.mesh is not None:
             return body_files.mesh(spec.mesh, self.packages, rgba)
-        assert spec.urdf is not None  # SHAPES lists the fields of BodySpec
-        return body_files.urdf(spec.urdf, self.packages, spec.color)
+        if spec.urdf is None:
+            return body_shapes.primitive(spec, rgba)
+        parts = self.files.get(group(name, self.counted) or name)
+        return None if parts is None or len(parts.links) > 1 else body_files.urdf(spec.urdf, parts, spec.color)
 
-    def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:
-        self.shapes[name] = shape
-        self.kinds[name] = kind
+    def _add_shape(self, name: str, kind: str, shape: BodyShape | None) -> None:
+        if shape is not None:
+            self.shapes[name] = shape
+            self.kinds[name] = kind
 
     def _body(self, name: str, spec: BodySpec, X_WO: Transform) -> Body:
         shape = self.shapes[name]
-        inertial = _inertial(spec, shape)
+        inertial = inertial_of(spec, shape)
         return Body(
             name=name,
             kind=self.kinds[name],
@@ -215,7 +230,9 @@ class _Builder:
             last = self.waiting[-1]
             follower = self.spec.scene[last]
             word = next(
-                word for word in ("inside", "rests_on", "frame") if owner(self.spec, getattr(follower, word)) == name
+                word
+                for word in ("inside", "rests_on", "frame")
+                if owner(self.spec, getattr(follower, word), self.parts) == name
             )
             self._error("TASK225", f"circular placement of bodies: {circle}", ("scene", last, word))
             return None
@@ -229,6 +246,9 @@ class _Builder:
         return X_WO
 
     def _placed(self, name: str, spec: BodySpec) -> Transform | None:
+        if (joint := self.moved_by.get(name)) is not None:
+            X_WP = self._pose(joint.parent)
+            return None if X_WP is None else joint.child_pose(X_WP, joint.start)
         loc: Loc = ("scene", name)
         words = [word for word in ("pose", "rests_on", "inside") if getattr(spec, word) is not None]
         if len(words) != 1:
@@ -285,10 +305,10 @@ class _Builder:
 
     def _frame_pose(self, name: str) -> Transform | None:
         """X_WF of the `frame` of a body at the start; None with a finding, here or elsewhere."""
-        body = owner(self.spec, name)
+        body = owner(self.spec, name, self.parts)
         known = body in self.spec.scene or body in self.poses  # unknown names are already reported
         X_WP = Transform.identity() if body == "world" else self._pose(body) if known else None
-        X_PF = in_owner(self.spec, name, self.shapes.get(body))
+        X_PF = in_owner(self.spec, name, self.shapes.get(body), self.parts)
         return None if X_WP is None or X_PF is None else X_WP @ X_PF
 
     def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
@@ -374,27 +394,6 @@ class _Builder:
     # -- findings
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
-        place = self.place(loc)
+        place = self.place(("scene", loc[1].partition(SEPARATOR)[0]) if loc[1] in self.moved_by else loc)
         if not self.counted or all((found.code, found.place) != (code, place) for found in self.findings):
             self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint))
-
-
-def _written(value: object, loc: Loc) -> Iterator[Loc]:
-    """The path of a value and of everything below it."""
-    yield loc
-    if isinstance(value, Model):
-        for key in value.model_fields_set:
-            yield from _written(getattr(value, key), (*loc, key))
-    elif isinstance(value, tuple):
-        yield from ((*loc, k) for k in range(len(value)))
-
-
-def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
-    """Mass properties in O: those of a file scaled to the written mass, else those of the union of the shapes."""
-    if spec.fixed:
-        return Inertial(mass=0.0, X_LI=Transform.identity(), inertia=frozen(np.zeros((3, 3))))
-    if shape.inertial is None:
-        return union(shape.geometries, spec.mass or 1.0)  # a missing mass is already reported
-    mass = spec.mass or shape.inertial.mass
-    inertia = frozen(shape.inertial.inertia * (mass / shape.inertial.mass))
-    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=inertia)

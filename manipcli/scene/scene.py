@@ -7,13 +7,14 @@ tray or cylinder, z up.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.known import Known
 from manipcli.scene.walls import Walls
 from manipcli.shapes.primitives import Box, Cylinder, Geometry
@@ -117,11 +118,16 @@ class Frame:
 
 @dataclass(frozen=True)
 class Scene:
-    """Bodies, named frames and gravity (3,) [m/s2] in the world."""
+    """Bodies, named frames and gravity (3,) [m/s2] in the world; the bodies that joints move are last.
+
+    `joints`: parents before children, in the order of the bodies that they move. These are movable also where the root
+    is fixed.
+    """
 
     bodies: tuple[Body, ...]
     frames: tuple[Frame, ...]
     gravity: Array
+    joints: tuple[SceneJoint, ...] = ()
 
     @cached_property
     def movable(self) -> tuple[Body, ...]:
@@ -139,18 +145,29 @@ class Scene:
     def body(self, name: str) -> Body:
         return self._bodies[name]
 
+    def mover(self, body: str) -> tuple[int, SceneJoint]:
+        """The number of the joint that moves a body, and the joint."""
+        return next((k, joint) for k, joint in enumerate(self.joints) if joint.child == body)
+
     def frame(self, name: str) -> Frame | None:
         """The frame of this name: a named frame, a part of a body, or a part that the body has by its shape."""
         if name in self._frames:
             return self._frames[name]
         owner, _, part = name.rpartition(SEPARATOR)
+        root, link, _ = owner.partition(SEPARATOR)
+        if link and (own := self._frames.get(f"{root}{SEPARATOR}{part}")) is not None and own.parent == owner:
+            return replace(own, name=name)
         body = self._bodies.get(owner)
         X_OP = None if body is None else ready_part(part, body.size, body.centre, body.interior)
         return None if X_OP is None else Frame(name, owner, X_OP)
 
     def parts(self, body: str) -> tuple[str, ...]:
-        """The names of a body's parts, without that of the body: those of the task first."""
-        own = [part for owner, _, part in (each.name.rpartition(SEPARATOR) for each in self.frames) if owner == body]
+        """The names of a body's parts, without that of the body: those of the task first.
+
+        A part on a link of a jointed thing is one of the link and of the whole.
+        """
+        names = ((each.parent, *each.name.rpartition(SEPARATOR)) for each in self.frames)
+        own = [part for parent, owner, _, part in names if owner and body in (owner, parent)]
         rim = () if self.body(body).interior is None else (RIM,)
         return tuple(dict.fromkeys((*own, *FACES, *rim)))
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field, TypeAdapter, model_validator
 
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.scene import Body, Frame, Interior, Scene
 from manipcli.scene.walls import Walls
 from manipcli.shapes.primitives import Box, ConvexPart, Cylinder, Geometry, Mesh, Shape, Sphere
@@ -107,10 +109,28 @@ class _Frame(Model):
     size: Numbers3 | None = None
 
 
+class _Joint(Model):
+    name: str
+    type: Literal["revolute", "continuous", "prismatic"]
+    parent: str
+    child: str
+    pose: _Pose
+    axis: Numbers3
+    lower: float | None = None
+    upper: float | None = None
+    start: float
+    damping: float
+    friction: float
+    stiffness: float
+    rest: float
+    closed: float
+
+
 class _Scene(Model):
     bodies: tuple[_Body, ...]
     frames: tuple[_Frame, ...]
     gravity: Numbers3
+    joints: tuple[_Joint, ...] = ()
 
 
 def scene_to_json(scene: Scene) -> bytes:
@@ -147,7 +167,8 @@ def scene_to_json(scene: Scene) -> bytes:
         )
         for frame in scene.frames
     )
-    made = _Scene(bodies=bodies, frames=frames, gravity=_three(scene.gravity))
+    joints = tuple(_joint(joint) for joint in scene.joints)
+    made = _Scene(bodies=bodies, frames=frames, gravity=_three(scene.gravity), joints=joints)
     return (json.dumps(made.model_dump(mode="json", exclude_defaults=True), indent=1) + "\n").encode()
 
 
@@ -192,7 +213,27 @@ def scene_from_json(text: bytes) -> Scene:
             for frame in made.frames
         ),
         gravity=frozen(made.gravity),
+        joints=tuple(_read_joint(joint) for joint in made.joints),
     )
+
+
+def _joint(joint: SceneJoint) -> _Joint:
+    values = {word: getattr(joint, word) for word in _PLAIN}
+    lower, upper = (limit if math.isfinite(limit) else None for limit in (joint.lower, joint.upper))
+    return _Joint(pose=_pose(joint.X_PJ), axis=_three(joint.axis), lower=lower, upper=upper, **values)
+
+
+def _read_joint(joint: _Joint) -> SceneJoint:
+    values = {word: getattr(joint, word) for word in _PLAIN}
+    lower = -math.inf if joint.lower is None else joint.lower
+    upper = math.inf if joint.upper is None else joint.upper
+    return SceneJoint(X_PJ=_transform(joint.pose), axis=frozen(joint.axis), lower=lower, upper=upper, **values)
+
+
+_PLAIN: Final = (
+    "name", "type", "parent", "child", "start", "damping", "friction", "stiffness", "rest", "closed",
+)  # fmt: skip
+"""Values of a joint that are written as they are."""
 
 
 def _pose(X: Transform) -> _Pose:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 
 from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.text import did_you_mean
@@ -16,10 +16,15 @@ Locate = Callable[[Loc], Place | None]
 RESERVED = ("world", "base", "tool", "robot", "start", "floor")
 
 
-def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
+def misnamed(
+    spec: TaskSpec, place: Locate, links: Mapping[str, BodySpec] | None = None, parts: Collection[str] = ()
+) -> Iterator[Diagnostic]:
     """TASK220: reserved name of a body. TASK225: unknown body in `rests_on` or `inside`. TASK227: reserved or duplicate
-    name of a frame, or unknown parent. TASK290: invalid name of a part. TASK291: unknown `frame` of a body."""
-    bodies = (*spec.scene, *(("floor",) if spec.floor else ()))
+    name of a frame, or unknown parent. TASK290: invalid name of a part. TASK291: unknown `frame` of a body.
+
+    `links`: the bodies that joints move; None: unknown. `parts`: those from the files of bodies.
+    """
+    bodies = (*spec.scene, *(("floor",) if spec.floor else ()), *(_links(spec) if links is None else links))
     for name, body in spec.scene.items():
         if name in RESERVED or "/" in name:
             why = "'/' is not allowed" if "/" in name else "the name is reserved"
@@ -35,7 +40,8 @@ def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
                 yield Diagnostic(
                     "TASK290", message, place(("scene", name, "parts", part)), hint="use a name without '/'"
                 )
-        yield from _unknown_frame(spec, name, body.frame, place)
+        if body.frame not in parts:
+            yield from _unknown_frame(spec, name, body.frame, place, bodies)
     for name, frame in spec.frames.items():
         if name in RESERVED or "/" in name or name in spec.scene:
             message = f"invalid name of a frame: '{name}' is already in use"
@@ -84,15 +90,25 @@ def parts_of(body: BodySpec) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*(body.parts or ()), *FACES, *rim)))
 
 
-def _unknown_frame(spec: TaskSpec, name: str, frame: str | None, place: Locate) -> Iterator[Diagnostic]:
+def _links(spec: TaskSpec) -> Iterator[str]:
+    """The names in the task that may be those of links, if the files of its bodies cannot be read."""
+    named = [name for body in spec.scene.values() for name in (body.frame, body.inside, body.rests_on)]
+    for name in (*named, *(frame.parent for frame in spec.frames.values())):
+        own = spec.scene.get((name or "").partition(SEPARATOR)[0])
+        if name is not None and own is not None and own.urdf is not None:
+            yield name
+
+
+def _unknown_frame(
+    spec: TaskSpec, name: str, frame: str | None, place: Locate, bodies: tuple[str, ...]
+) -> Iterator[Diagnostic]:
     """A finding if the `frame` of a body is not the world, another body, a part of one, or a named frame."""
-    bodies = (*spec.scene, *(("floor",) if spec.floor else ()))
     if frame is None or frame in ("world", *bodies, *spec.frames):
         return
     at = place(("scene", name, "frame"))
     owner, _, part = frame.rpartition(SEPARATOR)
-    if owner in spec.scene:
-        parts = parts_of(spec.scene[owner])
+    if owner in bodies and owner != "floor":
+        parts = parts_of(spec.scene[owner]) if owner in spec.scene else (*FACES, RIM)
         if part not in parts:
             message = f"'{owner}' has no part '{part}'"
             yield Diagnostic("TASK291", message, at, hint=did_you_mean(part, parts, kind=f"parts of '{owner}'"))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.scene import Body
 from manipcli.shapes.proximity import coal_shape, distance
 
@@ -19,16 +20,17 @@ TOLERANCE = 1e-3
 """Overlap [m] up to which two bodies only touch: rounding, and what settling separates harmlessly."""
 
 
-def overlaps(bodies: Sequence[Body]) -> Iterator[tuple[str, str, float]]:
-    """Pairs of bodies, not both fixed, that overlap by more than `TOLERANCE`, with the depth [m].
+def overlaps(bodies: Sequence[Body], joints: Iterable[SceneJoint] = ()) -> Iterator[tuple[str, str, float]]:
+    """Pairs of bodies, not both fixed nor joined, that overlap by more than `TOLERANCE`, with the depth [m].
 
     Bounding boxes rule out most pairs; the rest are compared shape by shape.
     """
     boxes = [_world_box(body) for body in bodies]
+    joined = {frozenset((joint.parent, joint.child)) for joint in joints}
     made: dict[int, list[tuple[Transform, CollisionGeometry]]] = {}  # a mesh can have many convex parts
     for i, j in combinations(range(len(bodies)), 2):
         a, b = bodies[i], bodies[j]
-        if a.fixed and b.fixed:
+        if (a.fixed and b.fixed) or (joined and frozenset((a.name, b.name)) in joined):
             continue
         (low_a, high_a), (low_b, high_b) = boxes[i], boxes[j]
         if bool(np.any(np.minimum(high_a, high_b) - np.maximum(low_a, low_b) < TOLERANCE)):

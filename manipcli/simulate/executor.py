@@ -231,6 +231,11 @@ class Executor:
                 return DONE
         return MotionEnd("timeout", f"`until` did not hold by t = {self._session.time:.3f} s", awaited=True)
 
+    def resting(self) -> Lane[MotionEnd]:
+        """Stop the motion, within the limits of its joints."""
+        yield from self._come_to_rest()
+        return _fault(self._session) if self._session.manager.faults else DONE
+
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
         for _ in range(self._ticks(duration)):

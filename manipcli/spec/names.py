@@ -10,10 +10,11 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 NameKind = Literal[
-    "body", "movable", "container", "part", "frame", "joint", "group", "pose", "link", "step", "controller", "sensor"
-]
+    "body", "movable", "container", "part", "frame", "joint", "scene_joint", "group", "pose", "link", "step",
+    "controller", "sensor",
+]  # fmt: skip
 """What a name is of. `movable` and `container` are bodies; `part`: a body, `robot` or `robot/LINK`; `frame`: `world`,
-`base`, `tool`, a body, a part of one, a named frame; `step`: a step or a block of steps."""
+`base`, `tool`, a body, a part of one, a named frame; `joint`: of the robot; `step`: a step or a block of steps."""
 MARK: Final = "x-names"
 """Keyword of a schema that holds the kind, before names are listed or left out."""
 
@@ -34,6 +35,7 @@ ContainerName = Annotated[str, Names("container")]
 PartName = Annotated[str, Names("part")]
 FrameName = Annotated[str, Names("frame")]
 JointName = Annotated[str, Names("joint")]
+SceneJointName = Annotated[str, Names("scene_joint")]
 GroupName = Annotated[str, Names("group")]
 PoseName = Annotated[str, Names("pose")]
 LinkName = Annotated[str, Names("link")]

@@ -9,8 +9,8 @@ from pydantic import Field
 from manipcli.spec.base import Model
 from manipcli.spec.known import KnownSpec
 from manipcli.spec.names import BodyName, FrameName
-from manipcli.spec.quantity import Length, Mass, Turn
-from manipcli.spec.robot import PoseSpec
+from manipcli.spec.quantity import JointDamping, JointEffort, JointStiffness, JointValue, Length, Mass, Turn
+from manipcli.spec.robot import Arguments, PoseSpec
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 MOST: Final = 200
@@ -85,10 +85,36 @@ class MeshSpec(Model):
 
 
 class UrdfSpec(Model):
-    """A single-link URDF file as an object."""
+    """A URDF or xacro file as an object; with joints that move, each link that they move is the body `BODY/LINK`."""
 
-    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
+    file: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
+    args: Arguments = Field({}, description="Arguments of the xacro file.")
     collision: MeshCollision | None = Field(None, description=_COLLISION)
+
+
+class SpringSpec(Model):
+    """A spring in a joint: its effort is -`stiffness` (position - `rest`)."""
+
+    stiffness: Annotated[JointStiffness, Field(ge=0)] = Field(description="[N m/rad or N/m], 0 or more.")
+    rest: JointValue = Field(0.0, description="Position at which it is relaxed [rad or m]. Default 0.")
+
+
+class SceneJointSpec(Model):
+    """A joint of a body from a URDF file."""
+
+    start: JointValue | None = Field(
+        None, description="Position at the start [rad or m]. Default: 0, or the limit nearest to it."
+    )
+    damping: Annotated[JointDamping, Field(ge=0)] | None = Field(
+        None, description="Viscous damping [N m s/rad or N s/m], 0 or more. Default: that of the file."
+    )
+    friction: Annotated[JointEffort, Field(ge=0)] | None = Field(
+        None, description="Dry friction [N m or N], 0 or more. Default: that of the file."
+    )
+    spring: SpringSpec | None = Field(None, description="A spring. Default: none.")
+    closed: JointValue | None = Field(
+        None, description="The position that counts as closed [rad or m]. Default: 0, or the limit nearest to it."
+    )
 
 
 class PartSpec(Model):
@@ -115,7 +141,11 @@ class BodySpec(Model):
     cup: CupSpec | None = Field(None, description="Shape: an open cup.")
     tray: TraySpec | None = Field(None, description="Shape: an open tray.")
     mesh: MeshSpec | None = Field(None, description="Shape: a mesh file.")
-    urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
+    urdf: UrdfSpec | None = Field(None, description="Shapes, masses and joints from a URDF or xacro file.")
+    joints: dict[str, SceneJointSpec] | None = Field(
+        None,
+        description="Start, friction, damping and springs of the joints of `urdf`, by name. Default: as in the file.",
+    )
     pose: PoseSpec | None = Field(None, description="Start pose of its frame, in `frame`.")
     frame: FrameName | None = Field(
         None,

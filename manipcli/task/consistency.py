@@ -93,7 +93,7 @@ def disagreements(
     judged = () if found or sensors is None else unjudged(task, robot, scene, sensors)
     warned = () if found else (*judged, *_unfelt(task), *planned_in_the_run(task))
     impossible = () if found or task.source.kept else tuple(_impossible(task, scene))
-    misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
+    misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups, scene.joints)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
     return distinct((*found, *_refused(task, robot, scene), *claimed, *misread, *impossible, *warned))
@@ -152,7 +152,7 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
         unknown = member.check(step.body, robot, context.scene)
         if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):
             unknown = (no_hand(robot), *(p for p in unknown if not isinstance(p, UnknownPosture)))
-        yield from ((ABSENT, at, p) for p in unknown)
+        yield from ((int(p.code.removeprefix("TASK") or ABSENT), at, p) for p in unknown)
         if claims is not None and not unknown:
             without = member.uncommanded(step.body, robot, claims)
             yield from ((UNCOMMANDED, at, p) for p in without)

@@ -130,7 +130,7 @@ def _step(task: Task, k: int, step: StepSpec) -> Part:
         given = child(node, key)
         if given is not None:
             values += origins.value(getattr(step, key), given, key, given=True)
-    said = [sentence(member.clause(step.body, task.robot))]
+    said = [sentence(member.told(step.body, task.robot, task.scene))]
     said += _waits(step.until, step.timeout, task.robot, guarded=member.guarded(step.body))
     kept = [member.clause(keep) for keep in step.keep for member in KEEPS if getattr(keep, member.name) is not None]
     said += [sentence(f"meanwhile, {listing(kept)}")] if kept else []

@@ -80,9 +80,9 @@ def test_bad_options_are_refused(words: list[str], code: str, call_cli: RunCli, 
 
 
 @pytest.mark.slow
-def test_the_pour_passes_while_three_clients_watch(tmp_path: Path) -> None:
-    task = ROOT / "tasks/pour.yaml"
-    options = ["--run", "--port=0", "--no-page", "--no-foxglove", "--speed=max", "--log=pour.mcap"]
+def test_a_pick_passes_while_three_clients_watch(tmp_path: Path) -> None:
+    task = ROOT / "examples/02_pick_a_block/task.yaml"
+    options = ["--run", "--port=0", "--no-page", "--no-foxglove", "--speed=max", "--log=pick.mcap"]
     got: list[set[str]] = [set(), set(), set()]
 
     def watch(url: str, topics: set[str]) -> None:
@@ -112,7 +112,7 @@ def test_the_pour_passes_while_three_clients_watch(tmp_path: Path) -> None:
         for watcher in watchers:
             watcher.join(10)
     assert ended
-    assert (process.returncode, "pour passed" in out) == (0, True), out
+    assert (process.returncode, "pick_a_block passed" in out) == (0, True), out
     assert got == [set(WATCHED)] * 3
 
 

@@ -288,6 +288,7 @@ def test_collect_only_lists_what_would_run(folder: Path, capsys: pytest.CaptureF
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_good_and_bad_tasks_with_everything_written(folder: Path, call_cli: Any) -> None:
     write(folder, "good")
     write(folder, "late", below="0.1 s")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 from mcap.records import Message
@@ -20,11 +20,6 @@ from manipcli.simulate.engines import ENGINES
 
 ROOT = Path(__file__).parents[2]
 Rewrite = Callable[..., Path]
-
-
-class PourRun(Protocol):
-    @property
-    def log(self) -> Path: ...
 
 
 CHANGED_NS = 700_000_000
@@ -238,8 +233,3 @@ def test_a_failed_run_with_physics_verifies(tmp_path: Path) -> None:
     made = verify_log(path)
     assert made.identical
     assert made.messages.end > 1.0
-
-
-@pytest.mark.slow
-def test_the_pour_of_another_process_verifies(pour_run: PourRun) -> None:
-    assert verify_log(pour_run.log).identical

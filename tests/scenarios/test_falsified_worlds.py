@@ -26,7 +26,7 @@ HEAD = f"""\
 task: falsified
 robot: {ROOT}/robots/panda/robot.yaml
 controllers: {ROOT}/controllers/panda.yaml
-simulation: {{engine: mujoco}}
+simulation: {{engine: mujoco, control_period: 2 ms}}
 replan: false
 scene:
   table: {{box: {{size: [0.6, 0.8, 0.2]}}, pose: {{xyz: [0.55, 0, 0.1]}}, fixed: true}}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -75,15 +74,6 @@ def test_progress_goes_to_stderr_and_no_banner_anywhere(pour_run: Any) -> None:
     ]  # fmt: skip
 
 
-def test_two_runs_give_the_same_bytes(pour_run: Any, call_cli: Any, tmp_path: Path) -> None:
-    """Also from another working directory, and to a log of another name."""
-    again = tmp_path / "again.mcap"
-    ran = call_cli("run", TASKS / "pour.yaml", "-q", "--log", again, cwd=tmp_path)
-    assert ran.code == 0
-    assert ran.err == ""
-    assert hashlib.sha256(again.read_bytes()).hexdigest() == hashlib.sha256(pour_run.log.read_bytes()).hexdigest()
-
-
 def test_no_name_of_this_machine_is_in_the_log(pour_run: Any) -> None:
     from mcap.reader import make_reader
 
@@ -132,13 +122,13 @@ def test_without_physics_the_steps_are_done_and_objects_not_judged(call_cli: Any
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "overrides",
-    [("scene.cup.mass='60 g'", "scene.cup.at=[0.76, -0.015]"), ("scene.cup.friction=0.6", "params.tilt=120 deg")],
-)
-def test_the_pour_can_be_varied_from_the_command_line(
-    call_cli: Any, tmp_path: Path, overrides: tuple[str, ...]
-) -> None:
+def test_the_pour_can_be_varied_from_the_command_line(call_cli: Any, tmp_path: Path) -> None:
+    overrides = (
+        "scene.cup.mass='60 g'",
+        "scene.cup.at=[0.76, -0.015]",
+        "scene.cup.friction=0.6",
+        "params.tilt=120 deg",
+    )
     words = [word for override in overrides for word in ("--set", override)]
     ran = call_cli("run", TASKS / "pour.yaml", "-q", *words, cwd=tmp_path)
     assert ran.code == 0, ran

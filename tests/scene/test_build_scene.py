@@ -481,14 +481,32 @@ def test_what_would_fall_through_a_urdf_is_told_where_to_stand(tmp_path: Path) -
     assert told.hint == "choose `at` above a part of 'rails'"
 
 
-def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
-    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
-    (tmp_path / "two.urdf").write_text(URDF.format(links=LINK.format(name="a") + LINK.format(name="b") + joint))
+def test_a_urdf_with_errors_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.urdf").write_text(URDF.format(links="<link/>"))
-    for name, code in (("two.urdf", "TASK222"), ("bad.urdf", "URDF")):
-        with pytest.raises(InvalidInput) as caught:
-            build_scene(task({"x": {"urdf": {"file": name}, "pose": {}}}), packages=Packages(tmp_path / "task.yaml"))
-        assert caught.value.findings[0].code.startswith(code)
+    with pytest.raises(InvalidInput) as caught:
+        build_scene(task({"x": {"urdf": {"file": "bad.urdf"}, "pose": {}}}), packages=Packages(tmp_path / "task.yaml"))
+    assert caught.value.findings[0].code.startswith("URDF")
+
+
+def test_links_that_are_fixed_to_each_other_are_one_body(tmp_path: Path) -> None:
+    """Two equal links 1 m apart along x: the mass of both, its centre between them, I + m d^2 about it."""
+    joint = '<joint name="j" type="fixed"><origin xyz="1 0 0"/><parent link="a"/><child link="b"/></joint>'
+    (tmp_path / "two.urdf").write_text(URDF.format(links=LINK.format(name="a") + LINK.format(name="b") + joint))
+    (tmp_path / "one.urdf").write_text(URDF.format(links=LINK.format(name="a")))
+    at = {"pose": {"xyz": [0, 0, 1]}}
+    one, two = (
+        build_scene(task({"x": {"urdf": {"file": name}, **at}}), packages=Packages(tmp_path / "task.yaml"))
+        for name in ("one.urdf", "two.urdf")
+    )
+    single, double = one.body("x"), two.body("x")
+    assert double.mass == 2 * single.mass and not two.joints
+    np.testing.assert_allclose(double.X_OI.p, np.add(single.X_OI.p, [0.5, 0, 0]), atol=1e-12)
+    alone, both = (body.X_OI.R @ body.inertia @ body.X_OI.R.T for body in (single, double))
+    np.testing.assert_allclose(both, 2 * alone + double.mass * 0.25 * np.diag([0, 1, 1]), atol=1e-12)
+    np.testing.assert_allclose(double.size, np.add(single.size, [1, 0, 0]), atol=1e-12)
+    part = two.frame("x/b")
+    assert part is not None and part.parent == "x" and part.size is not None
+    np.testing.assert_allclose(part.size, single.size, atol=1e-12)
 
 
 def test_a_body_beside_its_support_is_told_where_that_is() -> None:

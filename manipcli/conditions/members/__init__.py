@@ -15,6 +15,7 @@ from manipcli.conditions.members.energy import ENERGY
 from manipcli.conditions.members.force import FORCE
 from manipcli.conditions.members.grasped import GRASPED
 from manipcli.conditions.members.inside import INSIDE, OUTSIDE
+from manipcli.conditions.members.joint_at import CLOSED, JOINT_AT, OPENED
 from manipcli.conditions.members.limits import LIMITS
 from manipcli.conditions.members.moved import MOVED, UNMOVED
 from manipcli.conditions.members.near import NEAR
@@ -37,6 +38,6 @@ CONDITIONS: Seam[Condition[Any]] = Seam(
     members=(
         INSIDE, OUTSIDE, UPRIGHT, NEAR, ABOVE, RESTS_ON, AT_REST, MOVED, UNMOVED, GRASPED, SLIP, CONTACT_FORCE,
         COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, SATURATION, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
-        TOUCHES, WRENCH, FORCE, SEES, SLIPS,
+        TOUCHES, WRENCH, FORCE, SEES, SLIPS, JOINT_AT, OPENED, CLOSED,
     ),
 )  # fmt: skip

@@ -5,6 +5,7 @@ from typing import Any
 from manipcli.core.registry import Seam
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps import (
+    close,
     follow,
     grasp,
     insert,
@@ -19,8 +20,10 @@ from manipcli.plan.steps import (
     release,
     slide,
     switch_controllers,
+    turn,
     wait,
 )
+from manipcli.plan.steps import open as open_step
 
 STEPS: Seam[StepMember[Any]] = Seam(
     kind="step",
@@ -36,6 +39,9 @@ STEPS: Seam[StepMember[Any]] = Seam(
         lift.MEMBER,
         pour.MEMBER,
         place.MEMBER,
+        open_step.MEMBER,
+        close.MEMBER,
+        turn.MEMBER,
         press.MEMBER,
         insert.MEMBER,
         push.MEMBER,

@@ -41,6 +41,7 @@ from manipcli.plan.flight import PLACE_ERROR, room
 from manipcli.plan.motion import PlanningState, StepPlan, Stream
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
+from manipcli.plan.portion import Amount, portion_of
 from manipcli.plan.ranges import Range, spread
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
@@ -59,6 +60,12 @@ EXACT: Final = 0.002
 """[m] An `aim` is met within this."""
 SLOWER: Final = (1.0, 0.5, 0.2)
 """Shares of the speed of the tilt, tried in this order."""
+STEEP: Final = math.radians(80.0)
+"""For an `amount`, the cup tilts slowly from here on: what rolls begins to leave at 90 deg."""
+DOSING: Final = math.radians(5.0)
+"""[rad/s] That slowly: one after the other of many bodies leaves."""
+POURING: Final = frozenset({"tilt", "dose", "dwell"})
+"""Motions that an `amount` ends."""
 ROUNDS: Final = 2
 """How often the lip is moved per speed: another place of the lip changes the tilt a little."""
 
@@ -87,6 +94,11 @@ class PourSpec(Model):
         description="How far the lip is before the centre of the receiving rim, against the direction of the pour [m]; "
         "negative: beyond it. The lip is then not aimed; at 0 it is.",
     )
+    amount: Amount | None = Field(
+        None,
+        description="How much is poured: a number of bodies (`10`), a share (`50 %`) or a mass (`20 g`). The cup tilts "
+        "slowly from 80 deg on, and back as soon as it has left. Default: all.",
+    )
     velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits while carrying and tilting."
     )
@@ -104,6 +116,8 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
     contents = planner.contents(state, spec.object)
+    portion = None if spec.amount is None else portion_of(spec.amount)
+    most = None if portion is None else portion.number([planner.scene.body(name) for name in contents])
     poured = frozenset((name, spec.into) for name in contents)
     over = spec.tilt > math.pi / 2
     pouring = Pouring.of(planner, state, spec.object, spec.into) if over else None
@@ -122,25 +136,36 @@ def candidates(spec: PourSpec, planner: Planner, state: PlanningState) -> Candid
             p_WT = mouth + clearance * UP + ahead * w + p_LT
             builder = MotionBuilder(planner, state, allowed=poured)
             carry(planner, builder, "carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
-            upright = builder.now
-            builder.turn("tilt", a, theta, speed=share * spec.velocity_scaling)
-            trajectory = builder.plan().motions[-1].trajectory
-            if pouring is None or trajectory is None:
-                return builder, None
-            return builder, pouring.landing(p_WT, R_WT0, w, tilting(planner, upright, trajectory, sense * a))
+            upright, speed = builder.now, share * spec.velocity_scaling
+            builder.turn("tilt", a, theta if portion is None else sense * STEEP, speed=speed)
+            tilt = tilting(planner, upright, builder.plan(), sense * a)
+            if portion is not None:
+                steep = builder.now
+                rate = float(np.max(np.gradient(tilt.angles, tilt.times)))
+                builder.turn("dose", a, theta - sense * STEEP, speed=speed * min(1.0, DOSING / rate))
+                tilt = tilt.then(tilting(planner, steep, builder.plan(), sense * a))
+            return builder, None if pouring is None else pouring.landing(p_WT, R_WT0, w, tilt)
 
         builder, stream = _aimed(spec, tilted)
         builder.dwell("dwell", spec.dwell)
         if over:
-            builder.spill(spec.into)
+            builder.spill(spec.into, most)
         try:
-            builder.back("tilt back", emptied=over and bool(poured))
+            if portion is None:
+                builder.back("tilt back", emptied=over and bool(poured))
+            else:
+                builder.turn("tilt back", a, -theta, speed=spec.velocity_scaling)
         except NotPlannable as refusal:
             if not refusal.parts & frozenset(contents):
                 raise
             raise refusal.but(hint="pour from higher, `clearance: ...`: what is poured out is in the way") from refusal
         planned = builder.plan()
-        return replace(planned, poured=contents, into=spec.into, stream=stream) if over else planned
+        if not over:
+            return planned
+        if portion is not None:
+            tilts = [replace(motion, pours=motion.label in POURING) for motion in planned.motions]
+            planned = replace(planned, motions=tuple(tilts), portion=portion)
+        return replace(planned, poured=contents, into=spec.into, stream=stream)
 
     ways = itertools.product(spread(spec.clearance), YAWS_DEG, _senses(planner, state, mouth, R_WT))
     options = [
@@ -162,11 +187,12 @@ def _aimed(
         NotPlannable: wherever the lip is, and however slow the tilt, they may miss it.
     """
     ahead = -spec.offset
+    slower = SLOWER if spec.amount is None else SLOWER[:1]
     builder, stream = tilted(ahead, 1.0)
     if stream is None or spec.offset:
         return builder, stream
     best = builder, stream
-    for share in SLOWER:
+    for share in slower:
         for _ in range(ROUNDS):
             if _hits(spec, stream):
                 return builder, stream
@@ -248,12 +274,17 @@ def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     """Unknown bodies, a body poured into itself, a lip or an aim that is not over the container, or both of these."""
     if spec.object == spec.into:
         return (Problem(loc=("into",), message=f"'{spec.object}' cannot be poured into itself"),)
-    found = unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
+    found = unknown_body(scene, spec.object, ("object",), movable=True, carried=True) + unknown_body(
+        scene, spec.into, ("into",)
+    )
     if found:
         return found
     if spec.aim is not None and spec.offset:
         hint = "remove `offset`: the lip is placed by the aim"
         return (Problem(loc=("offset",), message="`aim` and `offset` cannot both be given", hint=hint),)
+    if spec.amount is not None and spec.tilt <= math.pi / 2:
+        message = f"`amount` needs a tilt of more than 90 deg, not {readable(spec.tilt, 'rad')}"
+        return (Problem(loc=("amount",), message=message, hint="write `tilt: 120 deg`: it stops earlier"),)
     reach = float(max(scene.body(spec.into).size[:2]) / 2)
     hint = f"'{spec.into}' reaches {readable(reach, 'm')} from its centre"
     for key, what, away in (("offset", "the lip", spec.offset), ("aim", "the aim", spec.aim or 0.0)):
@@ -271,9 +302,12 @@ def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
 def clause(spec: PourSpec, robot: RobotModel) -> str:
     offset = f" and {_beside(-spec.offset)}" if spec.offset else ""
     aim = f", to land {_beside(spec.aim)}" if spec.aim else ""
+    much = "" if spec.amount is None else f"{portion_of(spec.amount).text} "
+    until = "" if spec.amount is None else ", or until as much has left"
+    tilt = f"tilt it by {amount(spec.tilt, 'rad')}{until}"
     return (
-        f"pour from {named(spec.object)} into {named(spec.into)}: hold the lip {between(spec.clearance, 'm')} above "
-        f"its rim{offset}{aim}, tilt it by {amount(spec.tilt, 'rad')}, wait {amount(spec.dwell, 's')}, and "
+        f"pour {much}from {named(spec.object)} into {named(spec.into)}: hold the lip {between(spec.clearance, 'm')} "
+        f"above its rim{offset}{aim}, {tilt}, wait {amount(spec.dwell, 's')}, and "
         f"tilt it back{at_share(spec.velocity_scaling, 0.5)}"
     )
 

@@ -17,7 +17,7 @@ from manipcli.core.geometry import Array, wrapped
 from manipcli.model.batch_kinematics import relative_batch
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
-from manipcli.model.state import WorldState
+from manipcli.model.state import WorldState, joint_positions
 from manipcli.record import channels as topics
 from manipcli.record.channels import (
     Channel,
@@ -258,6 +258,10 @@ class Block:
             found.append(_Source(topics.JOINT_STATES, template, self._joints))
         if topics.TF in ids:
             found.append(_Source(topics.TF, tf_template(ids[topics.TF], frames), self._frames))
+        if topics.SCENE_JOINTS in ids:
+            names = [joint.name for joint in scene.joints]
+            template = joint_state_template(ids[topics.SCENE_JOINTS], names, effort=False, velocity=False)
+            found.append(_Source(topics.SCENE_JOINTS, template, partial(self._scene_joints, scene)))
         found += [*states, *readings, *plots]
         if self._actuators.names and topics.ACTUATOR_STATES in ids:
             template = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
@@ -331,6 +335,11 @@ class Block:
         links = np.concatenate((X_position, X_quat), axis=2)
         bodies = np.concatenate((self._states.body_position[at], self._states.body_quat_xyzw[at]), axis=2)
         return [*links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
+
+    def _scene_joints(self, scene: Scene, at: Ticks) -> list[Array]:
+        """(T, k) positions of the joints of the scene."""
+        states = self._states.map(lambda a: a[at])
+        return [np.stack([joint_positions(scene, states, joint) for joint in scene.joints], axis=-1)]
 
     def _beliefs(self, at: Ticks) -> list[Array]:
         poses = self._believed[at]

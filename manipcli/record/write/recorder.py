@@ -100,7 +100,9 @@ class Recorder:
         self.listener: Callable[[str, int, bytes], None] = _nobody
         further = [*(child for _, child, _ in sensor_frames), *map(believed_frame, belief.bodies)]
         _check_names(path, robot, scene, further, [name for name, _, _ in attachments])
-        everything = channel_table(controllers, live=live, sensors=sensors, belief=belief)
+        everything = channel_table(
+            controllers, live=live, sensors=sensors, belief=belief, scene_joints=bool(scene.joints)
+        )
         table = [channel for channel in everything if selection.holds(channel)]
         self._period = period
         self._ids = {channel.topic: channel.id for channel in table}
@@ -120,7 +122,11 @@ class Recorder:
             joints=robot.joint_names,
             bodies=tuple(body.name for body in scene.movable),
             controllers={c.name: c.joints for c in controllers if isinstance(c, ControllerChannel)},
-            strides={c.topic: selection.stride(c.topic, period) for c in table if word(c.topic) in JUDGED},
+            strides={
+                c.topic: selection.stride(c.topic, period)
+                for c in table
+                if word(c.topic) in JUDGED and c.topic != topics.SCENE_JOINTS
+            },
             absent=tuple(channel.topic for channel in everything if channel not in table),
             believed=belief.bodies,
         )

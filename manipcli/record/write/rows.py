@@ -51,16 +51,17 @@ class Template:
     codes: tuple[str, ...] = ()
 
 
-def joint_state_template(channel: int, joints: Sequence[str], *, effort: bool) -> Template:
-    """sensor_msgs/JointState; runs: position, velocity and, with `effort`, effort."""
+def joint_state_template(channel: int, joints: Sequence[str], *, effort: bool, velocity: bool = True) -> Template:
+    """sensor_msgs/JointState; runs: position and, if wanted, velocity and effort."""
     writer = CdrWriter()
     stamp = writer.header(0, "")
     writer.texts(joints)
     n = len(joints)
-    runs = [(writer.doubles(n), n), (writer.doubles(n), n)]
-    offset = writer.doubles(n if effort else 0)
-    if effort:
-        runs.append((offset, n))
+    runs = [(writer.doubles(n), n)]
+    for wanted in (velocity, effort):
+        offset = writer.doubles(n if wanted else 0)
+        if wanted:
+            runs.append((offset, n))
     return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=tuple(runs))
 
 

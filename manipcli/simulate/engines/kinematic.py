@@ -1,4 +1,5 @@
-"""Ideal engine: exact tracking without physics; objects do not move, and there are no contacts."""
+"""Ideal engine: exact tracking without physics; objects do not move, joints of the scene stay where they are, and there
+are no contacts."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
+from manipcli.simulate.engines.link_states import LinkStates, joint_state, start_positions
 from manipcli.spec.base import Model
 
 
@@ -44,8 +46,11 @@ class KinematicEngine:
         state = self._state = WorldState.room(n, m)
         state.position[:] = settings.start
         self._rows = {body.name: k for k, body in enumerate(scene.movable)}
-        for body in scene.movable:
+        self._scene, self._passive = scene, start_positions(scene)
+        self._links = LinkStates(scene, state)
+        for body in scene.movable[: m - len(scene.joints)]:
             self.place(body.name, body.X_WO, np.zeros(6))
+        self._links.fill(self._passive, None)
 
     def read(self, *, velocities: bool = True) -> WorldState:
         if self._advanced:
@@ -85,8 +90,13 @@ class KinematicEngine:
         return Transform.of(xyz=state.body_position[k], quat_xyzw=state.body_quat_xyzw[k]), np.zeros(6)
 
     def place(self, body: str, X_WO: Transform, twist: Array) -> None:
-        state, k = self._state, self._rows[body]
-        state.body_position[k], state.body_quat_xyzw[k] = X_WO.p, X_WO.quat_xyzw
+        if any(joint.child == body for joint in self._scene.joints):
+            k, joint = self._scene.mover(body)
+            self._passive[k], _ = joint_state(self._scene, joint, self.body_state, X_WO, twist)
+        else:
+            state, k = self._state, self._rows[body]
+            state.body_position[k], state.body_quat_xyzw[k] = X_WO.p, X_WO.quat_xyzw
+        self._links.fill(self._passive, None)
 
     def advance(self) -> None:
         self._advanced = True

@@ -17,8 +17,9 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
 from manipcli.simulate.engines.mujoco_attachment import Attachments
-from manipcli.simulate.engines.mujoco_bodies import BodyStates
+from manipcli.simulate.engines.mujoco_bodies import free_bodies
 from manipcli.simulate.engines.mujoco_contacts import Contacts
+from manipcli.simulate.engines.mujoco_joints import MovedStates
 from manipcli.simulate.engines.mujoco_library import INSTALL, installed, library, version
 from manipcli.simulate.engines.mujoco_mimics import Mimics
 from manipcli.simulate.engines.mujoco_motors import Motors
@@ -68,8 +69,8 @@ class MujocoEngine:
             except (ValueError, mujoco.FatalError) as error:
                 raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
         model = built.model
-        n, m = len(robot.joint_names), len(scene.movable)
-        if (model.nq, model.nv) != (n + 7 * m, n + 6 * m) or built.joints != tuple(range(n)):
+        n, m, j = len(robot.joint_names), len(scene.movable), len(scene.joints)
+        if (model.nq, model.nv) != (n + j + 7 * (m - j), n + j + 6 * (m - j)) or built.joints != tuple(range(n)):
             raise ManipcliError(f"MuJoCo loaded a different robot than '{robot.name}'")
         self._robot, self._model, self._data = robot, model, data
         self._step, self._step1, self._step2 = mujoco.mj_step, mujoco.mj_step1, mujoco.mj_step2
@@ -78,7 +79,9 @@ class MujocoEngine:
         data.qpos[:n] = settings.start
         self._position, self._velocity = data.qpos[:n], data.qvel[:n]
         self._state = WorldState.room(n, m)
-        self._bodies = BodyStates(data, scene, self._state)
+        free = free_bodies(model, data, scene, built.bodies, self._state)
+        at = [(int(model.jnt_qposadr[k]), int(model.jnt_dofadr[k])) for k in built.passive]
+        self._bodies = MovedStates(data, scene, self._state, at, free) if at or len(free) > 1 else free[0]
         if settings.velocity is not None:
             self._velocity[:] = settings.velocity
         if settings.twists is not None:

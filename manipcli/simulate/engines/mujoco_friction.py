@@ -29,8 +29,9 @@ def friction_pairs(scene: Scene) -> Iterator[tuple[str, str, list[float], int]]:
     Two sliding, one spinning and two rolling coefficients. As in Bullet, the sliding friction of a body multiplies the
     rolling and spinning friction [m] of the other one, and both are summed.
     """
+    joined = {frozenset((joint.parent, joint.child)) for joint in scene.joints}
     for a, b in combinations(scene.bodies, 2):
-        if a.fixed and b.fixed:
+        if (a.fixed and b.fixed) or (joined and frozenset((a.name, b.name)) in joined):
             continue
         sliding = a.friction * b.friction
         rolling = a.rolling_friction * b.friction + b.rolling_friction * a.friction

@@ -22,12 +22,11 @@ from manipcli.scene.scene import Body, Scene
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.mujoco_attachment import add_welds
 from manipcli.simulate.engines.mujoco_friction import friction_pairs, towards_robot
+from manipcli.simulate.engines.mujoco_joints import HARD, add_joint, in_trees, name_of, place_in_parent
 from manipcli.simulate.engines.mujoco_shapes import Shapes, wxyz
 
 PIN_TIME: Final = (0.002, 1.0)
 """[s], damping ratio: how quickly a pin of a closed loop is pulled together; MuJoCo takes two steps at least."""
-HARD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""Impedance of motors, mimic joints and joint limits: the largest that MuJoCo supports."""
 ROBOT, SCENE = 1, 2
 """Bits of collision masks: bodies collide with bodies and the robot; links with other links only by `_collide_only`."""
 UNBOUNDED: Final = 1e9
@@ -58,17 +57,21 @@ class Built:
     """A compiled model.
 
     Attributes:
-        model: `MjModel`. Its first n joints are the robot's moving joints, followed by a free joint for each movable
-            body, at its centre of mass and with the axes of its frame O.
+        model: `MjModel`. Its first n joints are the robot's moving joints, followed by those of things with joints and
+            a free joint for each other movable body, at its centre of mass and with the axes of its frame O.
         parts: name of the part of each MuJoCo body: of a body of the scene, or `robot/<link>`.
         links: MuJoCo's number of the body of each link.
         joints: (n) MuJoCo's number of each moving joint of the robot.
+        bodies: MuJoCo's number of each body of the scene.
+        passive: MuJoCo's number of each joint of the scene.
     """
 
     model: Any
     parts: tuple[str, ...]
     links: dict[str, int]
     joints: tuple[int, ...]
+    bodies: dict[str, int]
+    passive: tuple[int, ...]
 
 
 def build(
@@ -102,15 +105,26 @@ def build(
     if settings.self_collision:
         _collide_only(spec, robot, bodies, settings.self_collision)
     geoms: dict[str, list[str]] = {}
-    for k, body in enumerate(scene.bodies):
+    made_of: dict[str, Any] = {}
+    for k, body in in_trees(scene):
         geoms[body.name] = []
-        made = spec.worldbody.add_body(name=f"body{k}", **_placed(body))
+        moved = next(((n, joint) for n, joint in enumerate(scene.joints) if joint.child == body.name), None)
+        if moved is None:
+            made = spec.worldbody.add_body(name=f"body{k}", **_placed(body))
+        else:
+            number, joint = moved
+            where = place_in_parent(joint, scene.body(joint.parent), body)
+            made = made_of[joint.parent].add_body(name=f"body{k}", **(_placed(body) | where))
+            add_joint(mujoco, made, joint, body, number)
+        made_of[body.name] = made
         contact = {"contype": SCENE, "conaffinity": SCENE | ROBOT, "priority": 1, **solver}
         contact |= towards_robot(robot, body)
         for geometry in body.geometries:
             geoms[body.name] += shapes.add(made, geometry, Transform.of(xyz=-body.X_OI.p), **contact)
-        if not body.fixed:
+        if not body.fixed and moved is None:
             made.add_freejoint()
+    for joint in scene.joints:  # MuJoCo lets a child collide with a fixed parent
+        spec.add_exclude(bodyname1=made_of[joint.parent].name, bodyname2=made_of[joint.child].name)
     for one, two, friction, condim in friction_pairs(scene):
         for a in geoms[one]:
             for b in geoms[two]:
@@ -123,8 +137,10 @@ def build(
     parts = {spec.body(f"body{k}").id: body.name for k, body in enumerate(scene.bodies)}
     links = {name: made.id for name, made in bodies.items()}
     parts |= {k: f"robot/{name}" for name, k in links.items()}
+    bodies_of = {body.name: spec.body(f"body{k}").id for k, body in enumerate(scene.bodies)}
+    passive = tuple(spec.joint(name_of(k)).id for k in range(len(scene.joints)))
     joints = tuple(spec.joint(f"joint{k}").id for k, joint in enumerate(robot.joints) if joint.moves)
-    return Built(model, tuple(parts.get(k, "world") for k in range(model.nbody)), links, joints)
+    return Built(model, tuple(parts.get(k, "world") for k in range(model.nbody)), links, joints, bodies_of, passive)
 
 
 def _options(mujoco: ModuleType, spec: Any, scene: Scene, step: float, impratio: float) -> None:

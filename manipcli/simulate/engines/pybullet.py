@@ -22,19 +22,21 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings, Refusal
+from manipcli.simulate.engines.link_states import LinkStates, joint_state, link_state, start_positions, start_velocities
 from manipcli.simulate.engines.pybullet_attachment import Attachments
 from manipcli.simulate.engines.pybullet_contacts import (
     BulletPoint,
     ContactMerger,
     ContactWatch,
-    Vector,
 )
+from manipcli.simulate.engines.pybullet_joints import BASE, JointedThings, Place
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
 from manipcli.simulate.engines.pybullet_solver import iterations
 from manipcli.simulate.engines.pybullet_world import add_body, centre, close_loops, collide_only, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
+from manipcli.simulate.engines.vectors import Vector, cross, minus, rotated
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 from manipcli.spec.base import Model
 
@@ -81,21 +83,27 @@ class PybulletEngine:
             physicsClientId=client,
         )
         with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
-            self._bodies = [add_body(p, client, body, Path(folder)) for body in scene.bodies]
+            self._things = JointedThings(p, client, scene, settings.step, Path(folder))
+            self._places = {
+                body.name: self._things.places.get(body.name) or Place(add_body(p, client, body, Path(folder)))
+                for body in scene.bodies
+            }
             self._load_robot(robot, scene, settings, Path(folder))
-        self._movable = [
-            (k, *centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
+        self._scene, places = scene, self._places
+        self._rows = {body.name: row for row, body in enumerate(scene.movable)}
+        self._movable = [  # what joints move comes last
+            (places[body.name].body, *centre(body)) for body in scene.movable if places[body.name].link == BASE
         ]
         self._start(robot, settings)
-        self._rows = {body.name: row for row, body in enumerate(scene.movable)}
         links = {name: k for k, name in self._links.items()}
         self._wrenches = WrenchSensors(
             p, client, robot, self._robot, self._joints, links, gravity=scene.gravity, step=settings.step
         )
-        bodies = {body.name: k for body, k in zip(scene.bodies, self._bodies, strict=True)}
-        self._attachments = Attachments(p, client, robot, self._robot, links, bodies)
-        n, m = len(self._joints), len(self._movable)
+        self._attachments = Attachments(p, client, robot, self._robot, links, places)
+        n, m = len(self._joints), len(scene.movable)
         state = self._state = WorldState.room(n, m)
+        self._linked = LinkStates(scene, state)
+        self._room = [0.0] * (7 * len(scene.joints))
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
         self._watch = ContactWatch(self._robot)
         self._points: tuple[BulletPoint, ...] | None = None
@@ -126,10 +134,10 @@ class PybulletEngine:
             p.changeDynamics(self._robot, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
             p.changeDynamics(self._robot, link, lateralFriction=robot.friction, physicsClientId=client)
         self._merge = ContactMerger(
-            {(k, -1): body.name for body, k in zip(scene.bodies, self._bodies, strict=True)}
+            {(place.body, place.link): name for name, place in self._places.items()}
             | {(self._robot, link): f"robot/{name}" for link, name in link_names.items()},
             still=[
-                *((k, -1) for body, k in zip(scene.bodies, self._bodies, strict=True) if body.fixed),
+                *((place.body, place.link) for name, place in self._places.items() if scene.body(name).fixed),
                 *((self._robot, link) for link, name in link_names.items() if name in still_links(robot)),
             ],
         ).merged
@@ -146,7 +154,9 @@ class PybulletEngine:
         for k, position, speed in zip(self._joints, settings.start, velocity, strict=True):
             p.resetJointState(self._robot, k, float(position), float(speed), physicsClientId=client)
         if settings.twists is not None:
-            self._move_bodies(settings.twists)
+            self._move_bodies(settings.twists[: len(self._movable)])
+        if self._things:
+            self._start_joints(settings.twists)
         couple_mimics(p, client, robot, self._robot, self._joints)
         close_loops(p, client, robot, self._robot, {name: k for k, name in self._links.items()})
         add_rotor_inertia(p, client, robot, self._robot, self._joints, step=settings.step)
@@ -157,13 +167,21 @@ class PybulletEngine:
         for row, twist in enumerate(twists.tolist()):
             self._move_body(row, twist)
 
+    def _start_joints(self, twists: Array | None) -> None:
+        """Put the joints of the scene where its bodies are."""
+        scene = self._scene
+        positions = start_positions(scene)
+        velocities = [0.0] * len(positions) if twists is None else start_velocities(scene, twists)
+        for k, (position, velocity) in enumerate(zip(positions, velocities, strict=True)):
+            self._things.set(k, position, velocity)
+
     def _move_body(self, row: int, twist: list[float]) -> None:
         p, client = self._p, self._client
         k, offset, _ = self._movable[row]
         x, y, z, *angular = twist
         if offset is not None:
             wx, wy, wz = angular
-            ax, ay, az = _cross((wx, wy, wz), _rotated(self._pose(row)[1], offset))
+            ax, ay, az = cross((wx, wy, wz), rotated(self._pose(row)[1], offset))
             x, y, z = x + ax, y + ay, z + az
         p.resetBaseVelocity(k, (x, y, z), angular, physicsClientId=client)
 
@@ -174,13 +192,13 @@ class PybulletEngine:
         position, quat = p.getBasePositionAndOrientation(k, client)
         if turned is not None:
             _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
-        return position if offset is None else _minus(position, _rotated(quat, offset)), quat
+        return position if offset is None else minus(position, rotated(quat, offset)), quat
 
     def _velocity(self, row: int, quat: tuple[float, ...]) -> tuple[Vector, Vector]:
         """Velocity of O and angular velocity of a movable body with this orientation."""
         k, offset, _ = self._movable[row]
         linear, angular = self._p.getBaseVelocity(k, self._client)
-        return linear if offset is None else _minus(linear, _cross(angular, _rotated(quat, offset))), angular
+        return linear if offset is None else minus(linear, cross(angular, rotated(quat, offset))), angular
 
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
@@ -193,11 +211,14 @@ class PybulletEngine:
             position, quat = self._pose(row)
             numbers += position
             numbers += quat
-        self._pack(self._buffer, 0, *numbers)
+        self._pack(self._buffer, 0, *numbers, *self._room)
         if velocities:
             for row in range(len(self._movable)):
                 quat = tuple(state.body_quat_xyzw[row].tolist())
                 state.body_linear[row], state.body_angular[row] = self._velocity(row, quat)
+        if self._things:
+            positions, speeds = self._things.read()
+            self._linked.fill(positions, speeds if velocities else None)
         pulls = self._attachments.measure() if self._attachments else ()
         if self._wrenches:
             self._wrenches.measure(state.numbers[: 2 * len(self._joints)], self._contact_points, pulls)
@@ -217,12 +238,20 @@ class PybulletEngine:
 
     def body_state(self, body: str) -> tuple[Transform, Array]:
         row = self._rows[body]
+        if self._places[body].link != BASE:
+            k, joint = self._scene.mover(body)
+            positions, velocities = self._things.read()
+            return link_state(self._scene, joint, self.body_state, positions[k], velocities[k])
         position, quat = self._pose(row)
         twist = np.concatenate(self._velocity(row, quat))
         return Transform.of(xyz=position, quat_xyzw=quat), twist
 
     def place(self, body: str, X_WO: Transform, twist: Array) -> None:
         p, client, row = self._p, self._client, self._rows[body]
+        if self._places[body].link != BASE:
+            k, joint = self._scene.mover(body)
+            self._things.set(k, *joint_state(self._scene, joint, self.body_state, X_WO, twist))
+            return
         k, offset, turned = self._movable[row]
         quat = tuple(X_WO.quat_xyzw.tolist())
         if turned is not None:
@@ -235,6 +264,8 @@ class PybulletEngine:
         last = self._substeps - 1
         for k in range(self._substeps):
             self._motors.push()
+            if self._things:
+                self._things.push()
             if k == last and self._wrenches:
                 self._wrenches.remember()
             self._p.stepSimulation(self._client)
@@ -260,27 +291,6 @@ class PybulletEngine:
         if self._client >= 0:
             self._p.disconnect(self._client)
             self._client = -1
-
-
-# Plain floats: numpy costs ten times as much for three numbers.
-
-
-def _rotated(quat: tuple[float, ...], v: Vector) -> Vector:
-    """R(quat_xyzw) v."""
-    x, y, z, w = quat
-    a, b, c = v
-    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    ax, ay, az = a
-    bx, by, bz = b
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def _library() -> ModuleType:

@@ -10,6 +10,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
+from manipcli.simulate.engines.pybullet_joints import Place
 
 MOST: Final = 1e6
 """[N or N m] Largest effort of the constraint: what breaks it is decided by the session."""
@@ -37,14 +38,14 @@ class Attachments:
         p, client: PyBullet and its world.
         robot, number: the robot, and Bullet's number of its body.
         links: Bullet's numbers of its links.
-        bodies: Bullet's number of each body of the scene.
+        places: Bullet's numbers of each body of the scene.
     """
 
     def __init__(
         self, p: ModuleType, client: int, robot: RobotModel, number: int, links: Mapping[str, int],
-        bodies: Mapping[str, int],
+        places: Mapping[str, Place],
     ) -> None:  # fmt: skip
-        self._p, self._client, self._number, self._bodies = p, client, number, bodies
+        self._p, self._client, self._number, self._places = p, client, number, places
         self._attached: dict[str, _Attached] = {}
         tool = robot.tool
         if tool is not None:
@@ -58,10 +59,10 @@ class Attachments:
 
     def attach(self, name: str) -> Array:
         """Fix a body to the tool; see `Engine.attach`."""
-        p, body = self._p, self._bodies[name]
-        X_OT = self._pose(body, -1).inverse() @ self._tool()
+        p, (body, link) = self._p, self._places[name]
+        X_OT = self._pose(body, link).inverse() @ self._tool()
         constraint = p.createConstraint(
-            self._number, self._link, body, -1, p.JOINT_FIXED, [0, 0, 0],
+            self._number, self._link, body, link, p.JOINT_FIXED, [0, 0, 0],
             parentFramePosition=self._X_IT.p.tolist(), parentFrameOrientation=self._X_IT.quat_xyzw.tolist(),
             childFramePosition=X_OT.p.tolist(), childFrameOrientation=X_OT.quat_xyzw.tolist(),
             physicsClientId=self._client,

@@ -40,12 +40,12 @@ def differences(p: ModuleType, client: int, body: int, robot: RobotModel, links:
             yield from _unlike_joint(p.getJointInfo(body, k, physicsClientId=client), robot)
 
 
-def body_differences(p: ModuleType, client: int, k: int, body: Body) -> Iterator[str]:
-    """Shapes of the scene's `body` that Bullet's body `k` lacks, and a different mass."""
-    shapes = len(p.getCollisionShapeData(k, -1, physicsClientId=client))
+def body_differences(p: ModuleType, client: int, k: int, body: Body, link: int = -1) -> Iterator[str]:
+    """Shapes of the scene's `body` that link `link` of Bullet's body `k` lacks, and a different mass."""
+    shapes = len(p.getCollisionShapeData(k, link, physicsClientId=client))
     if shapes < len(body.geometries):  # each part of a mesh counts
         yield f"it has {shapes} shapes instead of {len(body.geometries)}"
-    mass, wanted = float(p.getDynamicsInfo(k, -1, physicsClientId=client)[0]), 0.0 if body.fixed else body.mass
+    mass, wanted = float(p.getDynamicsInfo(k, link, physicsClientId=client)[0]), 0.0 if body.fixed else body.mass
     if not abs(mass - wanted) <= ABSOLUTE + RELATIVE * wanted:
         yield f"it has a mass of {mass:g} kg instead of {wanted:g} kg"
 

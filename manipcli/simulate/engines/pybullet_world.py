@@ -12,8 +12,8 @@ import numpy as np
 
 from manipcli.core.errors import ManipcliError
 from manipcli.core.geometry import Transform
-from manipcli.description.elements import Inertial, Mimic
-from manipcli.model.normalised_urdf import MASSLESS, body_urdf
+from manipcli.description.elements import Inertial, Link, Mimic
+from manipcli.model.normalised_urdf import MASSLESS, links_urdf
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body
 from manipcli.shapes.mesh import clean_mesh
@@ -98,7 +98,7 @@ def _from_description(p: ModuleType, client: int, body: Body, folder: Path) -> i
     if not body.fixed:  # isotropic, as Bullet would otherwise rotate the frame; `add_body` sets the true inertia
         inertial = Inertial(mass=body.mass, X_LI=Transform.identity(), inertia=np.eye(3))
     file = folder / f"body_{p.getNumBodies(physicsClientId=client)}.urdf"
-    file.write_text(body_urdf(shapes, inertial, folder), encoding="utf-8")
+    file.write_text(links_urdf([Link("body", inertial, (), tuple(shapes))], (), folder), encoding="utf-8")
     X_WI = body.X_WO @ body.X_OI
     made = p.loadURDF(
         str(file),

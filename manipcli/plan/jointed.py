@@ -1,0 +1,79 @@
+"""Jointed things in planning: positions of joints, the state with a link moved, the tool's path along a joint.
+
+A hand that holds a link at X_CT keeps it: with the link C at the position q of its joint, the tool is at
+
+    X_WT(q) = X_WC(q) X_CT,   X_WC(q) = X_WP X_PJ motion(axis, q)
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, cross
+from manipcli.plan.motion import PlanningState
+from manipcli.plan.path import ANGULAR_STEP, LINEAR_STEP
+from manipcli.plan.planner import Planner
+from manipcli.plan.prediction import put
+from manipcli.scene.joints import SceneJoint
+
+LEVER: Final = 0.01
+"""[m] A tool nearer to the axis of a hinge turns it by a torque, not by a force."""
+
+
+def position_of(planner: Planner, state: PlanningState, joint: SceneJoint) -> float:
+    """[rad or m] of a joint."""
+    return joint.position(planner.body_pose(state, joint.parent), planner.body_pose(state, joint.child))
+
+
+def link_at(planner: Planner, state: PlanningState, joint: SceneJoint, position: float) -> Transform:
+    """X_WC of the link at a position of its joint."""
+    return joint.child_pose(planner.body_pose(state, joint.parent), position)
+
+
+def moved_to(planner: Planner, state: PlanningState, joint: SceneJoint, position: float) -> PlanningState:
+    """The state with a joint at another position, and with all that moves with its link."""
+    X_WC, there = planner.body_pose(state, joint.child), link_at(planner, state, joint, position)
+    shift = there @ X_WC.inverse()
+    loads = planner.aboard(state, joint.child)
+    return put(planner, state, {joint.child: there, **{name: shift @ planner.body_pose(state, name) for name in loads}})
+
+
+def along(
+    planner: Planner, state: PlanningState, joint: SceneJoint, position: float, X_WT: Transform
+) -> tuple[Transform, ...]:
+    """Poses of a tool that is now at `X_WT` and holds the link, up to a `position` of the joint; near neighbours."""
+    here = position_of(planner, state, joint)
+    X_CT = link_at(planner, state, joint, here).inverse() @ X_WT
+    arm = tool_twist(planner, state, joint, X_WT)
+    far = abs(position - here)
+    steps = max(far * float(np.linalg.norm(arm[:3])) / LINEAR_STEP, far * float(np.linalg.norm(arm[3:])) / ANGULAR_STEP)
+    shares = np.linspace(0.0, 1.0, max(1, int(np.ceil(steps - 1e-9))) + 1)[1:]
+    return (X_WT, *(link_at(planner, state, joint, here + u * (position - here)) @ X_CT for u in shares))
+
+
+def tool_twist(planner: Planner, state: PlanningState, joint: SceneJoint, X_WT: Transform) -> Array:
+    """(6) velocity of the point T and angular velocity, in the world, of what moves with the link at 1 rad/s or m/s."""
+    X_WJ = planner.body_pose(state, joint.parent) @ joint.X_PJ
+    axis = X_WJ.R @ joint.axis
+    if joint.slides:
+        return np.concatenate((axis, np.zeros(3)))
+    return np.concatenate((cross(axis, X_WT.p - X_WJ.p), axis))
+
+
+def needed(joint: SceneJoint, position: float, speed: float) -> float:
+    """[N m or N] The effort that moves a joint through a position at a constant `speed`: friction, spring, damper."""
+    return float(np.sign(speed)) * joint.friction - joint.passive_effort(position, speed)
+
+
+def wrench_of(twist: Array, effort: float) -> Array:
+    """(6) [N, N m] What a tool that moves with a `twist` (6) must give for an effort at the joint.
+
+    It is a force along the path; near the axis of a hinge it is a torque about it. Power at the tool is power at the
+    joint: wrench . twist = effort.
+    """
+    lever = float(np.linalg.norm(twist[:3]))
+    if lever > LEVER * float(np.linalg.norm(twist[3:])):
+        return np.concatenate((effort * twist[:3] / lever**2, np.zeros(3)))
+    return np.concatenate((np.zeros(3), effort * twist[3:] / float(twist[3:] @ twist[3:])))

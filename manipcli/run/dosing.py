@@ -1,0 +1,99 @@
+"""`pour` with an amount: the tilt stops as soon as it has left the cup, and goes back the way it came."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.plan.constrained_motion import smooth_motion
+from manipcli.plan.motion import Motion, PlanningState, StepPlan
+from manipcli.plan.motion_limits import MotionLimits
+from manipcli.plan.path import joint_path
+from manipcli.plan.planner import Planner
+from manipcli.run.pour_watch import PourWatch
+from manipcli.simulate.executor import DONE, Executor, Lane, MotionEnd
+
+ROUNDS: Final = 5
+"""How often the cup is tilted once more."""
+CORNERS: Final = 24
+"""Points of the way back, between which it is smooth."""
+
+
+class Dosing:
+    """Ends the tilt of a pour early, and repeats it where less has left than it seemed.
+
+    Args:
+        planner: of the task.
+        plan: of the pour, with a `portion`.
+        watch: sees what leaves the cup.
+        situation: measures the state.
+    """
+
+    def __init__(
+        self, planner: Planner, plan: StepPlan, watch: PourWatch, situation: Callable[[PlanningState], PlanningState]
+    ) -> None:
+        self._planner, self._plan, self._watch, self._situation = planner, plan, watch, situation
+        self._contents = [planner.scene.body(name) for name in plan.poured]
+        self._pouring = [motion for motion in plan.motions if motion.pours]
+        self._stopped = False
+
+    def _reached(self, names: Sequence[str]) -> bool:
+        portion = self._plan.portion
+        assert portion is not None  # see `Args`
+        return portion.reached(self._contents, [body for body in self._contents if body.name in names])
+
+    def running(self, motion: Motion, executor: Executor, deadline: float | None) -> Lane[MotionEnd]:
+        """A motion of the plan: a pouring one up to the amount, the one after these from where they stopped."""
+        if motion.pours:
+            return (yield from self._pour(motion, executor, deadline))
+        end = yield from self._back(motion, executor, deadline)
+        for _ in range(ROUNDS if self._stopped else 0):
+            if end.outcome != "done" or self._reached(self._watch.left):
+                break
+            self._stopped = False
+            for pouring in self._pouring:
+                end = yield from self._pour(pouring, executor, deadline)
+                if end.outcome != "done":
+                    return end
+            end = yield from self._back(motion, executor, deadline)
+        return end
+
+    def _pour(self, motion: Motion, executor: Executor, deadline: float | None) -> Lane[MotionEnd]:
+        """The motion, until as much has left the cup or cannot be kept in it any more; then nothing."""
+        if self._stopped:
+            return DONE
+        lane = executor.running(motion, until=None, deadline=deadline)
+        try:
+            next(lane)
+            while True:
+                state = yield
+                self._stopped = self._reached(self._watch.leaving)
+                if self._stopped:
+                    lane.close()
+                    return (yield from executor.resting())
+                lane.send(state)
+        except StopIteration as ended:
+            end: MotionEnd = ended.value
+            return end
+
+    def _back(self, motion: Motion, executor: Executor, deadline: float | None) -> Lane[MotionEnd]:
+        """The planned motion; or, where the tilt was stopped, back on its path as fast as the limits allow."""
+        tilts = [each.trajectory for each in self._pouring if each.trajectory is not None]
+        if self._stopped and tilts:
+            names, planned = tilts[0].names, np.concatenate([each.positions for each in tilts])
+            now = self._situation(self._plan.end)
+            here = now.position[self._planner.robot.indices(names)]
+            nearest = int(np.argmin(np.linalg.norm(planned - here, axis=1)))
+            path: Array = planned[np.linspace(nearest, 0, CORNERS).astype(int)]
+            limits = MotionLimits.of(self._planner.robot, names)
+            try:
+                back = smooth_motion(self._planner, now, motion.label, limits, joint_path([here, *path[1:]]))
+            except NotPlannable as refusal:
+                return MotionEnd("failed", f"{motion.label}: {refusal.cause}")
+            motion = replace(motion, trajectory=back, duration=back.duration, begins=now)
+        return (yield from executor.running(motion, until=None, deadline=deadline))
