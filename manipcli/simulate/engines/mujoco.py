@@ -89,7 +89,7 @@ class MujocoEngine:
             self._velocity[:] = settings.velocity
         if settings.twists is not None:
             self._bodies.move(settings.twists)
-        self._motors = Motors(model, data, robot, settings.step)
+        self._motors = Motors(model, data, robot, settings.step, islands=settings.sleep)
         self._contacts = Contacts(model, data, built.parts)
         self._wrenches = WrenchSensors(mujoco, model, data, built.links, settings.step)
         self._attachments = Attachments(mujoco, model, data, robot, scene, built.links)

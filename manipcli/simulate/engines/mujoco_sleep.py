@@ -38,14 +38,18 @@ class Sleep:
         due: whether a look is due.
     """
 
-    def __init__(self, mujoco: ModuleType, model: Any, data: Any, scene: Scene, trees: list[int], period: float) -> None:
+    def __init__(
+        self, mujoco: ModuleType, model: Any, data: Any, scene: Scene, trees: list[int], period: float
+    ) -> None:
         policy = mujoco.mjtSleepPolicy
         self._never, self._allowed = int(policy.mjSLEEP_NEVER), int(policy.mjSLEEP_ALLOWED)
         self._policy, self._asleep = model.tree_sleep_policy, data.tree_asleep
         self._twists = [data.qvel[at : at + n] for at, n in zip(model.tree_dofadr, model.tree_dofnum, strict=True)]
         self._resting, self._trees = Resting(scene, period), trees
         self._row = {body.name: k for k, body in enumerate(scene.movable)}
-        self._row |= {body.name: FIXED for body in scene.bodies if body.fixed and body.name not in self._resting.jointed}
+        self._row |= {
+            body.name: FIXED for body in scene.bodies if body.fixed and body.name not in self._resting.jointed
+        }
         self._kept: dict[tuple[str, str], tuple[int, Contact]] = {}
         self._slept: set[int] = set()  # rows that were asleep after the last tick
         self._before = b""

@@ -115,7 +115,9 @@ class PybulletEngine:
     def _sleeping(self, scene: Scene, settings: EngineSettings) -> Sleep:
         resting = Resting(scene, settings.step * settings.substeps)
         bodies = {row: place[0] for row, place in enumerate(self._movable) if row not in resting.never}
-        fixed = [self._places[body.name].body for body in scene.bodies if body.fixed and body.name not in resting.jointed]
+        fixed = [
+            self._places[body.name].body for body in scene.bodies if body.fixed and body.name not in resting.jointed
+        ]
         return Sleep(self._p, self._client, resting, bodies, fixed)
 
     def _load_robot(self, robot: RobotModel, scene: Scene, settings: EngineSettings, folder: Path) -> None:

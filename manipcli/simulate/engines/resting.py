@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Sphere
@@ -104,5 +103,3 @@ def _radius(body: Body) -> float:
     if centred and all(isinstance(shape, Sphere) for shape in shapes):
         return 0.0
     return float(np.linalg.norm(body.size))
-
-
