@@ -182,11 +182,16 @@ def effortless(world: World) -> str | None:
     return None if world.physics else "the engine has no physics, so joints have no efforts"
 
 
-def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) -> tuple[Problem, ...]:
-    """A problem if the scene has no (movable) body of this name."""
+def unknown_body(
+    scene: Scene, name: str, loc: Loc, *, movable: bool = False, carried: bool = False
+) -> tuple[Problem, ...]:
+    """A problem if the scene has no (movable) body of this name; TASK365 if joints hold one that is to be `carried`."""
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
-        return ()
+        if not carried or not any(name in (joint.parent, joint.child) for joint in scene.joints):
+            return ()
+        hint = "use `open`, `close` or `turn`"
+        return (Problem(loc, f"'{name}' is held by a joint and cannot be carried", hint, "TASK365"),)
     if (several := one_of_many(name, known)) is not None:
         return (Problem(loc, *several),)
     word = "a movable body of the scene" if movable else "in the scene"

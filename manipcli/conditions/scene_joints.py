@@ -33,7 +33,7 @@ def not_one_joint(scene: Scene, body: str, loc: Loc) -> tuple[Problem, ...]:
     if found := unknown_body(scene, body, loc):
         return found
     joints = joints_of(scene.joints, body)
-    if len(joints) == 1:
+    if len(joints) == 1 or (joints and not scene.body(body).kind):  # a placeholder has no kind
         return ()
     if joints:
         links = ", ".join(f"'{joint.child}'" for joint in joints)

@@ -5,12 +5,13 @@ The type of a joint value accepts both, because joint types are known only with 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.units import describe
 from manipcli.description.elements import Joint
 from manipcli.model.robot import Group
+from manipcli.scene.joints import SceneJoint, joints_of
 from manipcli.spec.base import Model
 from manipcli.spec.block_fields import Held, children, unit_of
 from manipcli.spec.expression import quantity_of
@@ -19,23 +20,32 @@ from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode, child, sho
 
 
 def misread_units(
-    spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]
+    spec: Model,
+    source: Source,
+    joints: Iterable[Joint],
+    groups: Iterable[Group],
+    scene_joints: Sequence[SceneJoint] = (),
 ) -> Iterator[Diagnostic]:
     """An error for each quantity such as `5 cm` whose unit does not match the type of its joints.
 
     Args:
         spec, source: the file.
         joints, groups: of the robot.
+        scene_joints: of the scene of a task.
     """
-    return _Reading(source, joints, groups).below((spec, type(spec), ()), source.root, (), ())
+    return _Reading(source, joints, groups, scene_joints).below((spec, type(spec), ()), source.root, (), ())
 
 
 class _Reading:
     """Traversal of a file's nodes together with the values read from them."""
 
-    def __init__(self, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> None:
+    def __init__(
+        self, source: Source, joints: Iterable[Joint], groups: Iterable[Group], scene_joints: Sequence[SceneJoint]
+    ) -> None:
         self._source = source
-        self._joints = {joint.name: joint for joint in joints if joint.moves}
+        self._joints: dict[str, Joint | SceneJoint] = {joint.name: joint for joint in joints if joint.moves}
+        self._joints |= {joint.name: joint for joint in scene_joints}  # '/' is only in their names
+        self._scene = scene_joints
         self._groups = {group.name: group.joints for group in groups}
 
     def below(self, held: Held, node: Node, path: Loc, about: tuple[str, ...]) -> Iterator[Diagnostic]:
@@ -56,11 +66,17 @@ class _Reading:
             part = k if isinstance(node, SequenceNode) else key
             written = child(node, part)
             if written is not None:
-                own = self._joints_of(value, k, key, inside[0], about)
+                of_scene = path[:1] == ("scene",) and path[2:] == ("joints",)
+                own = (f"{path[1]}/{key}",) if of_scene else self._joints_of(value, k, key, inside[0], about)
                 yield from self.below(inside, written, (*path, part), own)
 
     def _named(self, block: object) -> tuple[str, ...]:
-        """The joints that a block names in `group`, `joints` or `joint_names`."""
+        """The joints that a block names in `group`, `joints` or `joint_names`; of the scene in `joint` or `object`."""
+        if self._scene:
+            named, moved = getattr(block, "joint", None), getattr(block, "object", None)
+            found = joints_of(self._scene, moved) if isinstance(moved, str) else ()
+            if isinstance(named, str) or len(found) == 1:
+                return (named,) if isinstance(named, str) else (found[0].name,)
         group = getattr(block, "group", None)
         if isinstance(group, str):
             return self._groups.get(group, ())

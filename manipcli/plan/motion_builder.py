@@ -72,9 +72,9 @@ class MotionBuilder:
         other._motions, other.compliance = [*self._motions], self.compliance
         return other
 
-    def adopt(self, other: MotionBuilder) -> None:
-        """Continue where a copy has led."""
-        self._motions, self._now = other._motions, other._now
+    def adopt(self, other: MotionBuilder, state: PlanningState | None = None) -> None:
+        """Continue where a copy has led, or with a predicted `state` there."""
+        self._motions, self._now = other._motions, other._now if state is None else state
 
     def let_go(self, posture: str) -> PlanningState:
         """The present state with the hand at a pose and empty; collisions are not checked."""

@@ -27,8 +27,10 @@ COLORS: dict[str, Rgba] = {
     "tray": (0.44, 0.52, 0.61, 1.0),
     "mesh": (0.70, 0.66, 0.58, 1.0),
     "urdf": (0.70, 0.66, 0.58, 1.0),
+    "moved": (0.55, 0.63, 0.70, 1.0),
+    "part": (0.30, 0.32, 0.35, 1.0),
 }
-"""By kind of body; `desk` is a fixed box."""
+"""By kind of body; `desk` is a fixed box, `moved` a link that a joint moves, `part` what is fixed to one."""
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 
 

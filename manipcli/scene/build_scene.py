@@ -25,7 +25,7 @@ from manipcli.scene.scene_names import Locate, miscounted, misnamed
 from manipcli.scene.start_overlap import overlaps
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Cylinder, Rgba
-from manipcli.spec.counted import flat_scene, group, written
+from manipcli.spec.counted import flat_scene, group, members, written
 from manipcli.spec.explain import distinct
 from manipcli.spec.scene import BodySpec
 from manipcli.spec.task import TaskSpec
@@ -119,10 +119,14 @@ class _Builder:
             if len(parts.links) == 1 and spec.joints is None:
                 return
             made, faults = jointed(name, spec, parts)
-            self.moved_by |= {joint.child: joint for joint in made.joints}
-            self.parts |= {frame.name: frame for frame in made.frames}
             for fault in faults:
                 self._error(fault.code, fault.message, (*loc, *fault.loc), fault.hint)
+            if spec.count is not None:
+                for one in members(name, spec.count):
+                    self._add_shape(one, "urdf", None if made.joints else made.shapes[name])
+                return
+            self.moved_by |= {joint.child: joint for joint in made.joints}
+            self.parts |= {frame.name: frame for frame in made.frames}
             if not faults:
                 for body, shape in made.shapes.items():
                     self._add_shape(body, "urdf", shape)

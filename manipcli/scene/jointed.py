@@ -22,8 +22,8 @@ from manipcli.description.lint.rigid import box_about
 from manipcli.description.urdf.urdf import Parts
 from manipcli.scene.body_files import in_parts, principal
 from manipcli.scene.body_shapes import COLORS, BodyShape
+from manipcli.scene.hollow import hollow_of
 from manipcli.scene.joints import SceneJoint
-from manipcli.scene.open_box import open_box
 from manipcli.scene.scene import SEPARATOR, Frame
 from manipcli.shapes.primitives import Geometry, Rgba
 from manipcli.spec.scene import BodySpec, SceneJointSpec, UrdfSpec
@@ -79,7 +79,7 @@ def jointed(name: str, spec: BodySpec, parts: Parts) -> tuple[Jointed, tuple[Fau
             members[body].append(links[joint.child])
             frames.append(_part(f"{name}{SEPARATOR}{joint.child}", body, X_BJ, links[joint.child]))
     shapes = {
-        body: _shape([(link, X_BL[link.name]) for link in group], spec.urdf, spec.color)
+        body: _shape([(link, X_BL[link.name]) for link in group], spec.urdf, spec.color, moved=body != name)
         for body, group in members.items()
     }
     if not any(shape.geometries for shape in shapes.values()):
@@ -166,19 +166,19 @@ def _part(name: str, body: str, X_BL: Transform, link: Link) -> Frame:
     return Frame(name, body, X_BL @ Transform.of(xyz=(low + high) / 2.0), frozen(high - low))
 
 
-def _shape(links: Sequence[tuple[Link, Transform]], spec: UrdfSpec, rgba: Rgba | None) -> BodyShape:
+def _shape(links: Sequence[tuple[Link, Transform]], spec: UrdfSpec, rgba: Rgba | None, *, moved: bool) -> BodyShape:
     """The union of links that are fixed to each other, each at its pose in the body."""
-    seen = next((shape.rgba for link, _ in links for shape in link.visuals if shape.rgba is not None), COLORS["urdf"])
     shapes: list[Geometry] = []
-    for link, X_BL in links:
-        own = next((shape.rgba for shape in link.visuals if shape.rgba is not None), seen)
+    for k, (link, X_BL) in enumerate(links):
+        usual = COLORS["part" if moved and k > 0 else "moved" if moved else "urdf"]
+        own = next((shape.rgba for shape in link.visuals if shape.rgba is not None), usual)
         for shape in link.collisions:
             shapes.append(replace(shape, X_LS=X_BL @ shape.X_LS, rgba=rgba or shape.rgba or own))
     geometries = in_parts(shapes, spec.collision)
     low, high = box_about(geometries) or (np.zeros(3), np.zeros(3))
     return BodyShape(
         geometries=geometries,
-        interior=open_box(geometries),
+        interior=hollow_of(geometries),
         size=frozen(high - low),
         centre=frozen((high + low) / 2.0),
         inertial=_union([(link.inertial, X) for link, X in links if link.inertial is not None]),

@@ -53,7 +53,8 @@ def believed_scene(file: Located[TaskSpec], scene: Scene, sample: int | None) ->
             ]
             moved = _moved(bodies, name, inside, known, deviates)
             group = set(moved)
-            if all((a in group) == (b in group) for a, b, _ in overlaps([moved.get(body.name, body) for body in rest])):
+            placed = [moved.get(body.name, body) for body in rest]
+            if all((a in group) == (b in group) for a, b, _ in overlaps(placed, scene.joints)):
                 break
         else:
             message = f"no error within the `known` of '{name}' leaves it free of overlap ({DRAWS} drawn)"

@@ -93,7 +93,7 @@ def disagreements(
     judged = () if found or sensors is None else unjudged(task, robot, scene, sensors)
     warned = () if found else (*judged, *_unfelt(task), *planned_in_the_run(task))
     impossible = () if found or task.source.kept else tuple(_impossible(task, scene))
-    misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
+    misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups, scene.joints)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
     return distinct((*found, *_refused(task, robot, scene), *claimed, *misread, *impossible, *warned))

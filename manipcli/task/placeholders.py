@@ -5,6 +5,7 @@ Nothing is planned or simulated with them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,6 +14,7 @@ from manipcli.conditions.touch import ROBOT
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.scene import SEPARATOR, Body, Frame, Interior, Scene
 from manipcli.shapes.primitives import Box
 from manipcli.spec.counted import flat_scene
@@ -23,18 +25,26 @@ def named_scene(spec: TaskSpec) -> Scene:
     """A scene with the names of the task's bodies and frames. Every body fits every use, so that only unknown names
     are reported."""
     box, scene = Box((1.0, 1.0, 1.0)), flat_scene(spec.scene)
+    inner = [  # what may be a link, a part or a joint of a body from a file
+        word
+        for word in dict.fromkeys(_words(spec.model_dump(serialize_as_any=True)))
+        if (own := scene.get(word.partition(SEPARATOR)[0])) is not None and own.urdf is not None and SEPARATOR in word
+    ]
     origin = Transform.identity()
     bodies = tuple(
         Body(
             name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
-            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name not in scene, X_WO=origin,
+            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name == "floor", X_WO=origin,
             interior=Interior(X_OS=origin, shape=box), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
         )
-        for name in (*(("floor",) if spec.floor else ()), *scene)
+        for name in (*(("floor",) if spec.floor else ()), *scene, *inner)
     )  # fmt: skip
     parts = (f"{name}{SEPARATOR}{part}" for name, body in scene.items() for part in body.parts or ())
-    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in (*spec.frames, *parts))
-    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]))
+    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in (*spec.frames, *parts, *inner))
+    axis, files = frozen([0.0, 0.0, 1.0]), [name for name, body in scene.items() if body.urdf is not None]
+    jointed = [*inner, *(f"{name}{SEPARATOR}" for name in files)]
+    joints = tuple(SceneJoint(name, "continuous", "world", name, origin, axis, -math.inf, math.inf) for name in jointed)
+    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]), joints=joints)
 
 
 def named_robot(spec: TaskSpec) -> RobotModel:

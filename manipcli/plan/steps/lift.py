@@ -67,7 +67,7 @@ def candidates(spec: LiftSpec, planner: Planner, state: PlanningState) -> Candid
 
 def check(spec: LiftSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown object."""
-    return unknown_body(scene, spec.object, ("object",), movable=True)
+    return unknown_body(scene, spec.object, ("object",), movable=True, carried=True)
 
 
 def uncommanded(spec: LiftSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:

@@ -355,7 +355,7 @@ def slopes() -> tuple[float, ...]:
 
 def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown object, part, frame or postures."""
-    unknown = unknown_body(scene, spec.object, ("object",), movable=True)
+    unknown = unknown_body(scene, spec.object, ("object",), movable=True, carried=True)
     if spec.part is not None and not unknown:
         unknown += unknown_part(scene, spec.object, spec.part, ("part",))
     if spec.approach.frame is not None:

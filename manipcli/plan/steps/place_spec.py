@@ -196,7 +196,7 @@ def _relative(at: RelationSpec, part: str | None) -> str:
 
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown names; a place without a support, given twice, or one that nothing stands on."""
-    found = list(unknown_body(scene, spec.object, ("object",), movable=True))
+    found = list(unknown_body(scene, spec.object, ("object",), movable=True, carried=True))
     found += unknown_posture(robot, spec.posture, ("posture",))
     known = not found
     found += _support(spec, scene)

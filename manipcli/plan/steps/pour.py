@@ -274,7 +274,9 @@ def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     """Unknown bodies, a body poured into itself, a lip or an aim that is not over the container, or both of these."""
     if spec.object == spec.into:
         return (Problem(loc=("into",), message=f"'{spec.object}' cannot be poured into itself"),)
-    found = unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
+    found = unknown_body(scene, spec.object, ("object",), movable=True, carried=True) + unknown_body(
+        scene, spec.into, ("into",)
+    )
     if found:
         return found
     if spec.aim is not None and spec.offset:
