@@ -42,6 +42,9 @@ SINGULAR: Final = 1e-3
 class Compliant(Controller, Protocol):
     """A controller that takes the numbers of a compliant motion."""
 
+    tool: Array
+    """(3,) [m] the origin of the compliant frame in the world, at the last update."""
+
     @property
     def pressing(self) -> PressingReference | None:
         """The force with which it presses; None without one."""
@@ -132,6 +135,7 @@ class AdmittanceArm(JointTrajectoryController):
         self._q = np.zeros(len(context.robot.joint_names))
         self._displaced = np.zeros(len(self.joints))
         self._x, self._rate = np.zeros((2, 6))
+        self.tool: Array = np.full(3, np.nan)
 
     @property
     def pressing(self) -> PressingReference | None:
@@ -168,7 +172,7 @@ class AdmittanceArm(JointTrajectoryController):
         turned = R_WR if angle < 1e-9 else R_WR @ matrix_from_axis_angle(self._x[3:] / angle, angle)
         q[columns] += self._displaced
         R, p, J = kinematics.pose_and_jacobian(q, self._link, self._frame)
-        J = J[:, columns]
+        self.tool, J = p, J[:, columns]
         error = np.concatenate([p_WR + R_WR @ self._x[:3] - p, rotation_vector(turned @ R.T)])
         self._displaced += J.T @ np.linalg.solve(J @ J.T + SINGULAR**2 * np.eye(6), error)
         output.commands[0][:] += self._displaced

@@ -183,6 +183,12 @@ class Executor:
                     self._cancel()
                     return MotionEnd("failed", wrong)
                 busy = self._compliance.presses_yet
+            if self._compliance.passed(motion) or (presses and not busy and trajectory is not None):
+                felt, wrong = self._compliance.result(motion)
+                yield from self._come_to_rest()
+                if session.manager.faults:
+                    return _fault(session)
+                return MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
