@@ -12,7 +12,6 @@ from typing import Final, Literal, TypeVar
 import numpy as np
 
 from manipcli.control.action import GoalHandle
-from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.core.errors import InvalidArgument, SimulationFailed
 from manipcli.core.geometry import Array, wrapped
@@ -156,7 +155,7 @@ class Executor:
         trajectory = self._compliance.before(motion)
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
-            switch_text = _switch_text(switched)
+            switch_text = switch_text(switched)
             if not switched.ok:
                 return MotionEnd("failed", switch_text)
         start = session.state.position.copy()
@@ -380,12 +379,6 @@ class Executor:
 def _fault(session: Session) -> MotionEnd:
     """A controller failed, even if no step uses it: the robot is no longer the one that the task was planned for."""
     return MotionEnd("failed", session.manager.faults[-1].message)
-
-
-def _switch_text(switched: SwitchResult) -> str:
-    parts = [f"activated {', '.join(switched.activated)}"] if switched.activated else []
-    parts += [f"deactivated {', '.join(switched.deactivated)}"] if switched.deactivated else []
-    return "; ".join((*parts, *switched.messages)) or "nothing to switch"
 
 
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:
