@@ -151,13 +151,13 @@ class Executor:
         """
         session = self._session
         latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
-        switch_text = ""
+        text = ""
         trajectory = self._compliance.before(motion)
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
-            switch_text = switch_text(switched)
+            text = switch_text(switched)
             if not switched.ok:
-                return MotionEnd("failed", switch_text)
+                return MotionEnd("failed", text)
         start = session.state.position.copy()
         try:
             handles = self._send(motion, trajectory)
@@ -206,7 +206,7 @@ class Executor:
                     return MotionEnd("failed", far or wrong)
                 if felt:
                     return replace(DONE, text=felt)
-                return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
+                return replace(DONE, text=text) if text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
                 late = f"limit reached at t = {session.time:.3f} s, before {late}"
