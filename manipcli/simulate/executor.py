@@ -19,7 +19,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import OPENING, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.compliance_switch import ComplianceSwitch
-from manipcli.simulate.goals import arm_goal, gripper_goal
+from manipcli.simulate.goals import arm_goal, gripper_goal, switch_text
 from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
