@@ -65,6 +65,8 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "lift": (LIFT, (PICK,)),
     "pour": (("pour", {"object": "cup", "into": "tray"}), (PICK, LIFT)),
     "place": (("place", {"object": "cup"}), (PICK, LIFT)),
+    "insert": (("insert", {"object": "cup", "into": "tray", "depth": "1 cm", "force": "6 N"}), (PICK, LIFT)),
+    "push": (("push", {"object": "cup", "by": "5 cm", "posture": "wrap"}), ()),
     "locate": (("locate", {"object": "cup", "with": "wrist_camera"}), ()),
 }  # fmt: skip
 TICK = 1e-3
