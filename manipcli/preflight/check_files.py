@@ -15,7 +15,7 @@ from manipcli.description.lint.inspection import DESCRIPTIONS, inspect
 from manipcli.plan.steps import STEPS
 from manipcli.preflight.findings import preflight_findings
 from manipcli.preflight.robot_findings import robot_findings
-from manipcli.scene.build_scene import SHAPES
+from manipcli.scene.overlap_hints import SHAPES
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
