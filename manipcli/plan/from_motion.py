@@ -1,4 +1,4 @@
-"""Time-optimal motions from any state of motion with Ruckig: to rest, or to a goal at rest.
+"""Time-optimal stops from any state of motion with Ruckig.
 
 Ruckig (Berscheid and Kroeger, RSS 2021) keeps velocity, acceleration and jerk from any initial velocity and
 acceleration. A state beyond a limit is first brought back within it, as fast as the next limit allows.
@@ -7,18 +7,13 @@ acceleration. A state beyond a limit is first brought back within it, as fast as
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
-from manipcli.plan.motion_limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.trajectory_sampling import LONGEST
-
-if TYPE_CHECKING:
-    import ruckig
 
 _STRAIGHT = 1e-6  # share of the acceleration limits
 
@@ -60,47 +55,6 @@ def stopped(
     problem = ruckig.InputParameter(len(names))
     problem.control_interface = ruckig.ControlInterface.Velocity
     problem.synchronization = ruckig.Synchronization.Time if together else ruckig.Synchronization.No
-    return _motion(problem, names, state, acceleration, jerk, period)
-
-
-def redirected(q: Array, v: Array, a: Array, goal: Array, limits: MotionLimits, *, period: float) -> JointTrajectory:
-    """The quickest motion from a state of motion to rest at `goal` (n); all joints arrive together.
-
-    Args:
-        q, v, a: (n) in the order of `limits.names`.
-        goal: (n) position.
-        limits: velocity, acceleration, and jerk where finite. The path is not straight: check position limits and
-            collisions.
-        period: control period [s]; one point per tick, and the last at rest.
-
-    Raises:
-        NotPlannable: Ruckig finds none, or it takes longer than `LONGEST`.
-    """
-    import ruckig
-
-    problem = ruckig.InputParameter(len(q))
-    problem.target_position, problem.max_velocity = goal.tolist(), limits.velocity.tolist()
-    return _motion(problem, limits.names, (q, v, a), limits.acceleration, limits.jerk, period, goal)
-
-
-def _along(v: Array, a: Array, limit: Array) -> float | None:
-    """k where a = k v within rounding; else None. `limit` (n) of the acceleration."""
-    k = float(a @ v) / max(float(v @ v), 1e-12)
-    return k if bool((np.abs(a - k * v) <= _STRAIGHT * limit).all()) and v.any() else None
-
-
-def _motion(
-    problem: ruckig.InputParameter,
-    names: Sequence[str],
-    state: tuple[Array, Array, Array],
-    acceleration: Array,
-    jerk: Array,
-    period: float,
-    goal: Array | None = None,
-) -> JointTrajectory:
-    """With the rest of `problem` filled in."""
-    import ruckig
-
     problem.current_position, problem.current_velocity, problem.current_acceleration = (x.tolist() for x in state)
     problem.target_velocity = problem.target_acceleration = [0.0] * len(names)
     problem.max_acceleration, problem.max_jerk = acceleration.tolist(), jerk.tolist()
@@ -118,6 +72,10 @@ def _motion(
     times = np.arange(ticks + 1) * period
     positions, velocities, accelerations = np.array([profile.at_time(t) for t in times.tolist()]).transpose(1, 0, 2)
     velocities[-1] = accelerations[-1] = 0.0
-    if goal is not None:
-        positions[-1] = goal
     return JointTrajectory.of_arrays(names, frozen(times), frozen(positions), frozen(velocities), frozen(accelerations))
+
+
+def _along(v: Array, a: Array, limit: Array) -> float | None:
+    """k where a = k v within rounding; else None. `limit` (n) of the acceleration."""
+    k = float(a @ v) / max(float(v @ v), 1e-12)
+    return k if bool((np.abs(a - k * v) <= _STRAIGHT * limit).all()) and v.any() else None

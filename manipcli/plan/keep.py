@@ -20,7 +20,7 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.timing_bound import TimingBound
 from manipcli.spec.keep import KeepSpec
 
-POURING = frozenset({"tilt", "tilt back"})
+POURING = frozenset({"tilt", "dose", "tilt back"})
 """Labels of the motions that tilt a container."""
 RESERVE = 0.002
 """[m] Of a margin that is a length."""

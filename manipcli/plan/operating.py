@@ -94,9 +94,9 @@ def ways(handling: Handling, planner: Planner, state: PlanningState) -> Iterator
             builder.reach("reach", back, speed=1.0, hand=handling.open)
         builder.straight("approach", frame.X_WT, speed=handling.speed)
         builder.close(handling.posture, force=handling.force, must_hold=True, body=joint.child)
-        _follow(handling, planner, builder)
+        follow(handling, planner, builder)
         builder.open(handling.open, must_arrive=True)
-        return _withdrawn(handling, planner, builder)
+        return withdrawn(handling, planner, builder)
 
     for frame in handle_frames(X_WP, size, outward, planner.tool_pose(state).R):
         for distance in spread(handling.approach):
@@ -124,7 +124,7 @@ def _outward(planner: Planner, state: PlanningState, handling: Handling, X_WP: T
     return np.asarray(np.sign(away[k]) * X_WP.R[:, k])
 
 
-def _follow(handling: Handling, planner: Planner, builder: MotionBuilder) -> None:
+def follow(handling: Handling, planner: Planner, builder: MotionBuilder) -> None:
     """Move the link with the hand to the goal, and further by the lead of the compliant hand."""
     joint, goal, state = handling.joint, handling.goal, builder.now
     X_WT = planner.tool_pose(state)
@@ -162,7 +162,7 @@ def compliance(twist: Array, X_WT: Transform) -> tuple[Compliance, float]:
     return Compliance(frozen(stiffness), X_TC=X_TC), own
 
 
-def _withdrawn(handling: Handling, planner: Planner, builder: MotionBuilder) -> StepPlan:
+def withdrawn(handling: Handling, planner: Planner, builder: MotionBuilder) -> StepPlan:
     """The plan with a withdrawal straight back, the shortest first; the joint is at its goal."""
     X_WT = planner.tool_pose(builder.now)
     refused: NotPlannable | None = None

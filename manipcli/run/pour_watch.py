@@ -27,17 +27,23 @@ class _Poured:
     """One body.
 
     Attributes:
-        below, velocity: [m] of its centre below the rim, and its velocity (3,) [m/s], when last seen in the cup.
+        below, centre, velocity: [m] how far its centre is below the rim, its centre (3,) [m] and velocity (3,) [m/s],
+            when last seen in the cup.
         out: [m/s] its velocity along the axis of the cup, towards the rim.
         left: its velocity (3,) [m/s] at the rim; None: it is in the cup.
+        passed: its centre (3,) [m] at the rim; None: it is in the cup.
+        over: where that is, of the receiving container.
         tilt: [rad] of the cup at that time.
         landed: where; "" while it flies.
     """
 
     below: float = math.inf
+    centre: Array | None = None
     velocity: Array | None = None
     out: float = 0.0
     left: Array | None = None
+    passed: Array | None = None
+    over: str = ""
     tilt: float = 0.0
     landed: str = ""
 
@@ -73,11 +79,14 @@ class PourWatch:
                 below = hollow.rim - float(p_S[2])
                 velocity = np.array(state.body_linear[names.index(name)])
                 if below >= 0.0:
-                    one.below, one.velocity, one.out = below, velocity, float(velocity @ X_WS.R[:, 2])
+                    one.below, one.centre, one.velocity = below, centre, velocity
+                    one.out = float(velocity @ X_WS.R[:, 2])
                     continue
                 share = one.below / (one.below - below) if math.isfinite(one.below) else 1.0
                 before = velocity if one.velocity is None else one.velocity
                 one.left = before + share * (velocity - before)
+                one.passed = centre if one.centre is None else one.centre + share * (centre - one.centre)
+                one.over = self._over(state, one.passed, one.left)
                 one.tilt = math.acos(min(1.0, max(-1.0, float(X_WS.R[2, 2]))))
             else:
                 ground = self._met(name, contacts)
@@ -103,7 +112,9 @@ class PourWatch:
             if one.left is not None and not one.landed.startswith("in "):
                 speed = f"{float(np.linalg.norm(one.left)):.2f} m/s"
                 end = f"landed {one.landed}" if one.landed else "has not landed"
-                told.append(f"'{name}' left the rim at {speed}, tilted {math.degrees(one.tilt):.0f} deg, and {end}")
+                told.append(
+                    f"'{name}' left the rim{one.over} at {speed}, tilted {math.degrees(one.tilt):.0f} deg, and {end}"
+                )
         more = len(told) - SHOWN
         return "; ".join(told[:SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
@@ -115,6 +126,19 @@ class PourWatch:
                 if other != self._cup and other not in self._bodies and not other.startswith(LINK):
                     return other
         return ""
+
+    def _over(self, state: WorldState, p: Array, velocity: Array) -> str:
+        """` 59 mm before the middle of 'mug' and 94 mm above its rim`."""
+        hollow = self._scene.body(self._into).interior
+        if hollow is None:
+            return ""
+        X_WS = _pose(self._scene, state, self._into) @ hollow.X_OS
+        away = p - X_WS.apply([0.0, 0.0, hollow.rim])
+        level = float(np.linalg.norm(velocity[:2]))
+        ahead = float(away[:2] @ velocity[:2]) / level if level > 0.0 else float(np.linalg.norm(away[:2]))
+        side, high = ("beyond" if ahead >= 0.0 else "before"), ("above" if away[2] >= 0.0 else "below")
+        lengths = readable(abs(ahead), "m"), readable(abs(float(away[2])), "m")
+        return f" {lengths[0]} {side} the middle of '{self._into}' and {lengths[1]} {high} its rim"
 
     def _place(self, state: WorldState, centre: Array, left: Array, ground: str) -> str:
         """`41 mm beyond the rim of 'mug', on 'desk'`."""

@@ -56,6 +56,13 @@ class Walls:
         inside = edge[..., 0] * start[..., 1] - edge[..., 1] * start[..., 0] > 0.0
         return np.asarray(np.where(inside, nearest, -nearest))
 
+    @property
+    def widths(self) -> tuple[float, float]:
+        """[m] The least and the greatest width of the rim across the axis."""
+        radii = np.array(self.radii[-1])
+        across = radii + np.roll(radii, len(radii) // 2)
+        return float(across.min()), float(across.max())
+
     def reach(self, direction: Array) -> float:
         """[m] How far the rim is from the axis in a direction (2,) of S."""
         radii = np.array(self.radii[-1])

@@ -42,7 +42,7 @@ class Model(BaseModel):
     renamed: ClassVar[Mapping[str, str]] = {}
     """Old key -> new key; an old key is refused, and the message names the new one."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(defer_build=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: type[BaseModel], handler: GetCoreSchemaHandler, /) -> CoreSchema:

@@ -148,6 +148,9 @@ def _unpourable(scene: Scene, name: str, into: str, before: Sequence[Model]) -> 
             message = f"nothing can be poured {verb} '{one}': it is one convex part, which has no hollow"
             parts = "a mesh with a hollow has `collision: parts`; " if body.kind == "mesh" else ""
             yield key, NO_HOLLOW, message, parts + hint
+        elif body.interior is None:
+            message = f"nothing can be poured {verb} '{one}': it has no hollow that is open along its z axis"
+            yield key, NO_HOLLOW, message, hint
     if any(isinstance(step, PourSpec) and step.object == name for step in before):
         return  # what it held at the start may be elsewhere
     taken = {getattr(step, "object", None) for step in before}
@@ -182,8 +185,10 @@ def _too_large(body: Body, container: Body) -> str:
     least, most = (x, x) if body.kind in ROUND else (min(x, y), math.hypot(x, y))
     if body.kind == "sphere":
         least = most = min(x, y, z)
-    shape = container.interior.shape
-    if isinstance(shape, Cylinder):
+    shape, walls = container.interior.shape, container.interior.walls
+    if walls is not None:
+        narrow, wide = walls.widths
+    elif isinstance(shape, Cylinder):
         narrow, wide = 2.0 * shape.radius, 2.0 * shape.radius
     else:
         narrow, wide = min(shape.size[:2]), math.hypot(*shape.size[:2])

@@ -15,6 +15,8 @@ from manipcli.task.load_task import load_task
 MUG = Path(__file__).resolve().parents[2] / "tasks" / "pour_into_mug.yaml"
 TIP = np.array([np.sin(np.pi / 3.0), 0.0, 0.0, np.cos(np.pi / 3.0)])  # 120 deg about x: the rim points along -y, down
 CUP = np.array([0.72, 0.45, 0.7])
+OVER = " 34.7 mm before the middle of 'mug' and 155 mm above its rim"
+"""At 0.110 m along the axis of the cup: 0.45 m - 0.110 m sin(120 deg) against 0.32 m, 0.645 m against 0.49 m."""
 
 
 @pytest.fixture(scope="module")
@@ -61,9 +63,9 @@ def test_a_text_says_where_it_left_how_fast_and_where_it_landed(
     touching = [Contact("ball", "cup", 0.1, 0.0), Contact("ball", "robot/palm", 0.1, 0.0)]
     for state, contacts in ((inside, touching), (beyond, touching), (flying, touching)):
         watch.look(state, contacts)
-    assert watch.text() == "'ball' left the rim at 0.62 m/s, tilted 120 deg, and has not landed"
+    assert watch.text() == f"'ball' left the rim{OVER} at 0.62 m/s, tilted 120 deg, and has not landed"
     watch.look(ended, [Contact("ball", on, 0.1, 0.0)])
-    assert watch.text() == f"'ball' left the rim at 0.62 m/s, tilted 120 deg, and {text}"
+    assert watch.text() == f"'ball' left the rim{OVER} at 0.62 m/s, tilted 120 deg, and {text}"
 
 
 def test_what_stays_in_the_cup_or_lands_in_the_container_needs_no_text(scene: Scene) -> None:
@@ -81,4 +83,4 @@ def test_the_speed_at_the_rim_is_between_those_before_and_after_it(scene: Scene)
     watch = PourWatch(scene, "cup", "mug", ["ball"])
     watch.look(states(scene, [along(0.105)], (0.0, -0.4, 0.0))[0], [])
     watch.look(states(scene, [along(0.125)], (0.0, -0.8, 0.0))[0], [])
-    assert watch.text().startswith("'ball' left the rim at 0.50 m/s")
+    assert watch.text().startswith(f"'ball' left the rim{OVER} at 0.50 m/s")

@@ -39,7 +39,7 @@ def candidates(spec: CloseSpec, planner: Planner, state: PlanningState) -> Candi
     """The ways to take the handle."""
     joint, handle = joint_and_handle(planner.scene, spec)
     goal = JointGoal(joint.name, joint.closed, -opening(joint), WITHIN[joint.unit])
-    return by_hand(spec, planner, state, joint, handle, goal)
+    return by_hand(spec, planner, state, joint, handle, goal, push=True)
 
 
 def clause(spec: CloseSpec, robot: RobotModel) -> str:

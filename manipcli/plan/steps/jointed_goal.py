@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Annotated, ClassVar, Final
 
@@ -18,6 +19,7 @@ from manipcli.plan.jointed import position_of
 from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.operating import Handling, ways
 from manipcli.plan.planner import Planner
+from manipcli.plan.pushing import pushes
 from manipcli.plan.ranges import Range
 from manipcli.plan.steps.grasp import DEFAULT_FORCE
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
@@ -78,7 +80,14 @@ def joint_and_handle(scene: Scene, spec: HandleSpec) -> tuple[SceneJoint, Frame]
 
 
 def by_hand(
-    spec: HandleSpec, planner: Planner, state: PlanningState, joint: SceneJoint, handle: Frame, goal: JointGoal
+    spec: HandleSpec,
+    planner: Planner,
+    state: PlanningState,
+    joint: SceneJoint,
+    handle: Frame,
+    goal: JointGoal,
+    *,
+    push: bool = False,
 ) -> Candidates:
     """The ways to take the handle and to move the joint to the goal; no motion where it is there already.
 
@@ -95,7 +104,8 @@ def by_hand(
     planner.free_hand(state, joint.child)
     planner.free_start(state)
     what = f"cannot {spec.verb} '{spec.object}'"
-    return Candidates(ways(handling, planner, state), what=what, decides="branch")
+    options = itertools.chain(pushes(handling, planner, state) if push else (), ways(handling, planner, state))
+    return Candidates(options, what=what, decides="branch")
 
 
 def opening(joint: SceneJoint) -> float:

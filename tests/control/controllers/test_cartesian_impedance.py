@@ -13,13 +13,13 @@ from manipcli.control.controllers.cartesian_impedance import (
     check,
 )
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
-from manipcli.spec.impedance import PostureSpec, TaskSpaceSpec
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, matrix_from_axis_angle
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.pose_error import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
+from manipcli.spec.impedance import PostureSpec, TaskSpaceSpec
 from manipcli.spec.load import load_robot
 
 ROBOT = Path(__file__).parents[3] / "robots" / "arm7_hand3" / "robot.yaml"

@@ -142,21 +142,25 @@ def test_the_faulty_python_raises_the_code_and_the_sound_one_nothing(page: CodeP
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The log of a short run, for examples that read one."""
-    folder = tmp_path_factory.mktemp("log")
-    (folder / "task.yaml").write_text(BASES["task"])
-    assert app.main(["run", str(folder / "task.yaml"), "--log", str(folder / "run.mcap")]) == ExitCode.PASSED
-    return (folder / "run.mcap").read_bytes()
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, bytes]:
+    """Logs of short runs by robot, for examples that read one; a wrist is drawn faster than an arm."""
+    made = {}
+    for robot in ("arm7_hand3", "differential_wrist"):
+        folder = tmp_path_factory.mktemp("log")
+        (folder / "task.yaml").write_text(BASES["task"].replace("arm7_hand3", robot))
+        assert app.main(["run", str(folder / "task.yaml"), "--log", str(folder / "run.mcap")]) == ExitCode.PASSED
+        made[robot] = (folder / "run.mcap").read_bytes()
+    return made
 
 
 @pytest.mark.parametrize("page", COMMANDS, ids=lambda page: page.code)
 def test_the_faulty_command_gets_the_code_and_the_sound_one_passes(
-    page: CodePage, log: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    page: CodePage, logs: Mapping[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
     surround(page, tmp_path)
     (tmp_path / "task.yaml").write_text(BASES["task"])
-    (tmp_path / "run.mcap").write_bytes(log)
+    (tmp_path / "run.mcap").write_bytes(logs["arm7_hand3" if "manipcli run" in page.bad else "differential_wrist"])
     monkeypatch.chdir(tmp_path)
     for command in filter(None, (page.bad, page.good)):
         settings, _, words = command.partition("manipcli ")
