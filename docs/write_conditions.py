@@ -85,9 +85,9 @@ Three words take one condition and a selection, `of` (in quotes: YAML reads brac
   - any_of: {above: {object: cup, of: 'ball[*]'}}
 ```
 
-`of` is the `object` of the condition, also inside `not`, `all` and `any`. A condition with one other required value takes
-this value alone: `inside: tray` is `inside: {of: tray}`. Without `of`, the condition itself names the selection in place
-of a body, as in the last line.
+`of` is the `object` of the condition, also inside `not`, `all` and `any`. A condition with one other required value
+takes this value alone: `inside: tray` is `inside: {of: tray}`. Without `of`, the condition itself names the selection
+in place of a body, as in the last line.
 
 The margin is the n-th greatest of those of the bodies (the least for `all_of`, the greatest for `any_of`), so it is 0
 or more exactly if the condition holds for as many. Reports show how many hold, and the body that decides.
