@@ -201,7 +201,7 @@ class StepAttempt:
             if pour is not None:
                 self._pour = None
         if end.outcome == "done":
-            return end
+            return end if pour is None else replace(end, text=pour.with_times(end.text))
         flown = "" if pour is None or not pour.text() else f"; {pour.text()}"
         return MotionEnd(end.outcome, end.text + flown + found + saturated_since(before, self._session))
 
