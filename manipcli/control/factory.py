@@ -8,7 +8,7 @@ from functools import cache
 from manipcli.control.as_meant import as_meant
 from manipcli.control.chain import chain_finding, target_of
 from manipcli.control.command import may_go_together
-from manipcli.control.compliant_build import compliant_controllers
+from manipcli.control.compliant_build import WristSensor, compliant_controllers
 from manipcli.control.controller import BuildContext
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.feed_forward import ModelFeedForward
@@ -41,6 +41,7 @@ def build_controllers(
     compat: Compat | None = None,
     stop_planner: StopPlanner | None = None,
     compliant: bool = False,
+    wrist: WristSensor | None = None,
 ) -> ControllerManager:
     """The controllers of a file, for a robot: loaded, configured, and activated where the file has `active: true`.
 
@@ -53,6 +54,7 @@ def build_controllers(
         compat: the rules where ROS 1 and 2 differ; None: the safer rule of each.
         stop_planner: plans stops without `compat`; None: they have a constant deceleration.
         compliant: with the controllers of compliant steps, see `compliant_build.py`.
+        wrist: measures the felt force; None: it is estimated.
 
     Raises:
         InvalidInput: `controller_findings` has errors.
@@ -63,7 +65,7 @@ def build_controllers(
     context = BuildContext(robot, cache(lambda: kinematics or Kinematics(robot)), compat, stop_planner)
     every = {name: CONTROLLERS[own.type].build(name, own, context) for name, own in spec.controllers.items()}
     built = {name: controller for name, controller in every.items() if controller is not None}
-    further = compliant_controllers(spec, context) if compliant else ()
+    further = compliant_controllers(spec, context, wrist) if compliant else ()
     wanted = any(controller.feed_forward != "none" for controller in (*built.values(), *further))
     manager = ControllerManager(
         joints=robot.joint_names,

@@ -3,7 +3,7 @@
 With the felt force p along the axis and the stiffness k of the spring, the shift s obeys
 
     s' = speed                              before contact,
-    s' = 2 pi bandwidth (target - p) / k    in contact.
+    s' = 2 pi bandwidth (target - p) / k    in contact; at most `speed` where what is touched may give way.
 
 In contact with something stiff p' = k s', so that p tends to the target as exp(-2 pi bandwidth t) and never exceeds it.
 Contact begins above `TOUCH` of the target, at least `LEAST` [N], and is lost below half of that: the reference then
@@ -66,6 +66,8 @@ class PressingReference:
     def missed(self) -> str:
         """That it met nothing within reach, or that what it touches gives way; "" otherwise."""
         pressing = self.pressing
+        if pressing.yields:
+            return ""
         if self.contact is None and self.shift >= pressing.reach:
             return f"the tool met nothing within {readable(pressing.reach, 'm')}"
         depth = 0.0 if self.contact is None else self.shift - self.contact
@@ -85,6 +87,8 @@ class PressingReference:
     def unsteady(self) -> str:
         """Why the mean is not the target; "" where it is."""
         target = self.pressing.target
+        if self.pressing.yields:
+            return ""
         if self.contact is None:
             return f"the tool touched nothing: it felt at most {self.peak:.3g} N of {target:g} N"
         if abs(self.mean - target) <= TOLERANCE * target:
@@ -109,6 +113,8 @@ class PressingReference:
         self.touching = touching
         error = pressing.target - felt
         step = self._rate * error if touching else pressing.speed
+        if pressing.yields:
+            step = min(step, pressing.speed)
         if step < 0.0 or not self.missed:
             self.shift += step * period
         if self.contact is not None:

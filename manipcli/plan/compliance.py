@@ -41,6 +41,7 @@ class Pressing:
         bandwidth: [Hz] of the force in stiff contact.
         hold: [s] the motion ends when the force has been within `TOLERANCE` of the target for this long; None: it ends
             with its trajectory.
+        yields: what it touches may give way, as a peg in a hole does: the reference then advances at most at `speed`.
     """
 
     axis: Array
@@ -49,6 +50,22 @@ class Pressing:
     reach: float
     bandwidth: float = 1.0
     hold: float | None = None
+    yields: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beyond:
+    """A plane that ends a motion as soon as the origin of the compliant frame is beyond it.
+
+    Attributes:
+        normal: (3,) unit vector in the world.
+        offset: [m] the plane is n . p = offset.
+        otherwise: why the step has failed if the motion ends before the plane; "": that is no failure.
+    """
+
+    normal: Array
+    offset: float
+    otherwise: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,11 +76,17 @@ class Compliance:
         stiffness: (6,) along and about x, y, z of the compliant frame [N/m, N m/rad].
         force: with which it presses besides; None: only the spring.
         X_TC: the compliant frame in the tool frame; None: the tool frame itself.
+        until: ends the motion; None: nothing but its trajectory and its force.
+        relative: the trajectory is followed from where the reference is, which a search has moved off the plan.
+        here: the reference begins where the arm is, so that it exerts no force.
     """
 
     stiffness: Array
     force: Pressing | None = None
     X_TC: Transform | None = None
+    until: Beyond | None = None
+    relative: bool = False
+    here: bool = False
 
     @property
     def ends_held(self) -> bool:

@@ -16,7 +16,9 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.pose_error import pointed
 
 HOVER: Final = 0.005
-"""[m] Gap between the hand, or what it holds, and the body, from which on it approaches slowly: above the clearance."""
+"""[m] Gap between the hand, or what it holds, and a body along which it moves: above the clearance."""
+CLOSE: Final = 0.0025
+"""[m] Gap from which the hand approaches slowly: more than its controllers deviate."""
 FAR: Final = 0.08
 """[m] Distance of the tool's origin from the point, from which the hand comes straight on."""
 SEEN: Final = 0.2
@@ -93,8 +95,17 @@ def gap(planner: Planner, state: PlanningState, body: str) -> float:
     return min((hit.distance for hit in hits), default=SEEN)
 
 
-def hover(builder: MotionBuilder, planner: Planner, body: str, point: Array, axis: Array, *, speed: float) -> Transform:
-    """Move the tool before a body, its z axis along `axis`, and on to a gap of `HOVER`; X_WT there.
+def hover(
+    builder: MotionBuilder,
+    planner: Planner,
+    body: str,
+    point: Array,
+    axis: Array,
+    *,
+    speed: float,
+    left: float = HOVER,
+) -> Transform:
+    """Move the tool before a body, its z axis along `axis`, and on to a gap; X_WT there.
 
     Args:
         builder: of the step.
@@ -103,6 +114,7 @@ def hover(builder: MotionBuilder, planner: Planner, body: str, point: Array, axi
         point: (3,) in the world, on the line on which the tool's origin moves.
         axis: (3,) unit vector in the world, from the hand to the body.
         speed: share of the limits.
+        left: the gap [m].
 
     Raises:
         NotPlannable: the tool cannot be there, or its line does not meet the body.
@@ -112,16 +124,17 @@ def hover(builder: MotionBuilder, planner: Planner, body: str, point: Array, axi
     X_WA, state = planner.tool_pose(builder.now), builder.now
     travel, near = 0.0, gap(planner, state, body)
     for _ in range(ADVANCES):
-        if near - HOVER < 1e-4:
+        if near - left < 1e-4:
             break
-        travel += near - HOVER
+        travel += near - left
         if travel > FAR + SEEN / 2.0:
             raise NotPlannable(f"the tool does not meet '{body}' on its line", hint="set another point under `at`")
         q = planner.solver.solve(_along(X_WA, travel, axis), state.position, planner.rng)
         state = state.moved(q)
         near = gap(planner, state, body)
     if travel > 0.0:
-        builder.straight("approach", _along(X_WA, travel, axis), speed=speed)
+        touching = planner.may_touch(builder.now, [body])
+        builder.straight("approach", _along(X_WA, travel, axis), speed=speed, allowed=touching)
     return planner.tool_pose(builder.now)
 
 

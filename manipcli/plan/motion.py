@@ -199,6 +199,24 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True)
+class Insertion:
+    """A peg that a step puts into a hole.
+
+    Attributes:
+        peg, hole: names of the bodies.
+        depth: [m] of the end of the peg below the rim.
+        clearance: [m] to each side.
+        radius: [m] of the search.
+    """
+
+    peg: str
+    hole: str
+    depth: float
+    clearance: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
 class JointGoal:
     """Where a step moves a joint of the scene.
 
@@ -229,6 +247,7 @@ class StepPlan:
         placed: the body that it sets down at its pose in `end`; "" for none.
         poured: the bodies that it pours into the container `into`.
         stream: where they land; None if the plan does not predict it.
+        inserted: what it puts into a hole.
         joint: the joint of the scene that it moves; None for none.
         portion: how much of them; None: all.
     """
@@ -239,6 +258,7 @@ class StepPlan:
     poured: tuple[str, ...] = ()
     into: str = ""
     stream: Stream | None = None
+    inserted: Insertion | None = None
     joint: JointGoal | None = None
     portion: Portion | None = None
 

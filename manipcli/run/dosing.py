@@ -18,6 +18,8 @@ from manipcli.plan.planner import Planner
 from manipcli.run.pour_watch import PourWatch
 from manipcli.simulate.executor import DONE, Executor, Lane, MotionEnd
 
+Situation = Callable[[PlanningState], PlanningState]
+"""Measures the state, from the one that is believed."""
 ROUNDS: Final = 5
 """How often the cup is tilted once more."""
 FAST: Final = 0.9
@@ -36,22 +38,14 @@ class Dosing:
         situation: measures the state.
     """
 
-    def __init__(
-        self, planner: Planner, plan: StepPlan, watch: PourWatch, situation: Callable[[PlanningState], PlanningState]
-    ) -> None:
+    def __init__(self, planner: Planner, plan: StepPlan, watch: PourWatch, situation: Situation) -> None:
         self._planner, self._plan, self._watch, self._situation = planner, plan, watch, situation
         self._contents = [planner.scene.body(name) for name in plan.poured]
         self._pouring = [motion for motion in plan.motions if motion.pours]
         self._stopped = False
 
     @classmethod
-    def of(
-        cls,
-        planner: Planner,
-        plan: StepPlan,
-        watch: PourWatch | None,
-        situation: Callable[[PlanningState], PlanningState],
-    ) -> Dosing | None:
+    def of(cls, planner: Planner, plan: StepPlan, watch: PourWatch | None, situation: Situation) -> Dosing | None:
         """None for a plan without a portion."""
         return None if plan.portion is None or watch is None else cls(planner, plan, watch, situation)
 

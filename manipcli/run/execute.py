@@ -33,7 +33,7 @@ from manipcli.simulate.quiet import stdout_to_stderr
 from manipcli.simulate.sensor import Picture
 from manipcli.simulate.sensor_layout import sensed_by_name
 from manipcli.simulate.session import Session
-from manipcli.task.felt import complies, felt
+from manipcli.task.felt import complies, felt, wrist_sensor
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
@@ -53,7 +53,8 @@ def build_manager(task: Task, kinematics: Kinematics | None = None) -> Controlle
     kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
     return build_controllers(
         file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat,
-        stop_planner=stopped, compliant=complies(task.spec) and ENGINES[task.spec.simulation.engine].physics == "full",
+        stop_planner=stopped, wrist=wrist_sensor(task.robot, task.controllers, task.sensors),
+        compliant=complies(task.spec) and ENGINES[task.spec.simulation.engine].physics == "full",
     )  # fmt: skip
 
 

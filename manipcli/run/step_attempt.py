@@ -344,9 +344,9 @@ class StepAttempt:
         return MotionEnd("failed", f"'{carried.body}' did not follow the hand: {why}") if why else None
 
     def _without_result(self, step: StepSpec, planned: PlannedStep) -> MotionEnd | None:
-        """A failure where an object is not where the step places or pours it; `until` may define another pour."""
+        """A failure where an object is not where the step puts or pours it; `until` may define another pour."""
         plan, planner = planned.plan, self._plan.planner
-        if not self._physics or not (plan.placed or plan.poured or plan.joint):
+        if not self._physics or not (plan.placed or plan.poured or plan.joint or plan.inserted):
             return None
         now = self._measured.situation(replace(plan.end, carried=None))
         why = missed(planner, plan, now, poured=step.until is None)

@@ -16,6 +16,7 @@ from manipcli.model.state import Contact
 from manipcli.plan.jointed import position_of
 from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
+from manipcli.run.inserted import insertion_text, not_inserted
 from manipcli.run.replan import between, deg, mm
 from manipcli.scene.joints import SceneJoint
 from manipcli.spec.counted import selections
@@ -108,7 +109,7 @@ def _travel(value: float, joint: SceneJoint) -> str:
 
 def missed(planner: Planner, plan: StepPlan, now: PlanningState, *, poured: bool) -> str:
     """Why a step does not have its result in the state `now`; "" where it has. `poured`: what it pours counts."""
-    why = not_placed(planner, plan, now) or not_moved(planner, plan, now)
+    why = not_placed(planner, plan, now) or not_moved(planner, plan, now) or not_inserted(planner, plan.inserted, now)
     return why or (not_poured(planner, plan, now) if poured else "")
 
 
@@ -124,6 +125,8 @@ def result_texts(
     planner: Planner, plan: StepPlan, situation: Callable[[PlanningState], PlanningState] | None
 ) -> list[str]:
     """What a step that is done reports of its result. `situation`: measures the state; None without physics."""
+    if plan.inserted is not None and situation is not None:
+        return [insertion_text(planner, plan.inserted, situation(plan.end))]
     if plan.joint is None or situation is None:
         return poured_texts(planner, plan, situation)
     joint, position = _joint(planner, plan.joint, situation(plan.end))

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from manipcli.control.compliant_arm import Compliant, complies
 from manipcli.control.manager import ControllerManager
-from manipcli.control.pressing import PressingReference
+from manipcli.control.pressing import LEAST, PressingReference
 from manipcli.core.errors import InvalidArgument
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, frozen
+from manipcli.plan.compliance import Pressing
 from manipcli.plan.motion import Motion, Switch
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import Session
 
 BLEND = 0.5
 """[s] Time in which a trajectory that begins elsewhere than planned joins its plan."""
+HOLDING_SPEED = 0.002
+"""[m/s] At which a force that a guarded motion stopped at follows what it presses on."""
+HOLDING_REACH = 0.05
+"""[m] As far as it follows."""
 TOGETHER = 1e-12
 """[rad or m] Below this a trajectory begins where it was planned."""
 
@@ -55,11 +63,27 @@ class ComplianceSwitch:
         own = self._pressing
         return "" if own is None else own.missed
 
+    def passed(self, motion: Motion) -> bool:
+        """Whether the motion is over because the tool is beyond its plane."""
+        until, arm = None if motion.compliance is None else motion.compliance.until, self._arm
+        return until is not None and arm is not None and float(until.normal @ arm.tool) >= until.offset
+
+    @property
+    def felt(self) -> str:
+        """What was felt in the motion, in words."""
+        own = self._pressing
+        return "the arm has no goal" if own is None else own.text
+
     def result(self, motion: Motion) -> tuple[str, str]:
         """What was felt in a motion with a force that has ended, and why that is a failure; "" where it is none."""
         own = self._pressing
+        until = None if motion.compliance is None else motion.compliance.until
+        if until is not None and until.otherwise and not self.passed(motion):
+            return "", until.otherwise
         if motion.compliance is None or motion.compliance.force is None or own is None:
             return "", ""
+        if until is not None:
+            return f"{motion.label}: {own.text}", ""
         return own.text, "" if motion.compliance.ends_held else own.unsteady
 
     def before(self, motion: Motion) -> JointTrajectory | None:
@@ -85,12 +109,32 @@ class ComplianceSwitch:
         fresh = not self._manager.is_active(arm.name)
         if fresh:
             self._owners = self._switch((arm.name,))
+        if motion.compliance.here:
+            arm.deactivate(self._session.time)
         arm.comply(motion.compliance)
         if fresh:
             return self._joined(trajectory, arm, self._session.state.position)
         reference = np.array(self._session.state.position)
         reference[self._session.robot.indices(arm.joints)] = arm.output.position
-        return self._joined(trajectory, arm, reference)
+        return self._joined(trajectory, arm, reference, stays=motion.compliance.relative)
+
+    def holding(self, motion: Motion) -> Callable[[], str]:
+        """Holds the force that is felt now along one axis, once a guarded motion has stopped; says what it holds."""
+        arm, compliance = self._arm, motion.compliance
+        if arm is None or compliance is None or compliance.force is not None:
+            return str
+        felt = arm.felt[:3]
+        k = int(np.argmax(np.abs(felt)))
+        force = abs(float(felt[k]))
+        if force < LEAST:
+            return str
+        pressing = Pressing(frozen(np.sign(felt[k]) * np.eye(3)[k]), force, HOLDING_SPEED, HOLDING_REACH)
+
+        def hold() -> str:
+            arm.comply(replace(compliance, force=pressing))
+            return f"; it stays and presses with {force:.3g} N"
+
+        return hold
 
     def _switch(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The controllers that were deactivated."""
@@ -99,14 +143,21 @@ class ComplianceSwitch:
             raise InvalidArgument("CTRL152", "; ".join(done.messages))
         return done.deactivated
 
-    def _joined(self, trajectory: JointTrajectory | None, arm: Compliant, position: Array) -> JointTrajectory | None:
-        """The trajectory from `position` (n), which it leaves with minimum jerk for its plan."""
+    def _joined(
+        self, trajectory: JointTrajectory | None, arm: Compliant, position: Array, *, stays: bool = False
+    ) -> JointTrajectory | None:
+        """The trajectory from `position` (n), which it leaves with minimum jerk for its plan unless it `stays` off."""
         if trajectory is None:
             return None
         off = position[self._session.robot.indices(trajectory.names)] - trajectory.positions[0]
         off[[name not in arm.joints for name in trajectory.names]] = 0.0
         if np.abs(off).max() < TOGETHER:
             return trajectory
+        if stays:
+            own = trajectory
+            return JointTrajectory.of_arrays(
+                own.names, own.times, own.positions + off, own.velocities, own.accelerations
+            )
         span = max(min(BLEND, trajectory.duration), self._session.period)
         u = np.clip((trajectory.times - trajectory.times[0]) / span, 0.0, 1.0)
         curves = (

@@ -11,16 +11,16 @@ from typing import Final, Literal, TypeVar
 
 import numpy as np
 
-from manipcli.control.action import GoalHandle, GripperGoal
+from manipcli.control.action import GoalHandle
 from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
-from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument, SimulationFailed
 from manipcli.core.geometry import Array, wrapped
 from manipcli.model.state import WorldState
-from manipcli.plan.motion import OPENING, GoalTolerances, Grip, Motion
+from manipcli.plan.motion import OPENING, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.compliance_switch import ComplianceSwitch
+from manipcli.simulate.goals import arm_goal, gripper_goal
 from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
@@ -183,16 +183,23 @@ class Executor:
                     self._cancel()
                     return MotionEnd("failed", wrong)
                 busy = self._compliance.presses_yet
+            if self._compliance.passed(motion) or (presses and not busy and trajectory is not None):
+                felt, wrong = self._compliance.result(motion)
+                yield from self.come_to_rest()
+                if session.manager.faults:
+                    return _fault(session)
+                return MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
+                hold = self._compliance.holding(motion)
                 yield from self.come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
-                return replace(DONE, text=f"stopped {when}: `until` held")
+                return replace(DONE, text=f"stopped {when}: `until` held{hold()}")
             if not busy and (awaited is None or holds):
                 far = self._far(motion, start, state)
                 felt, wrong = self._compliance.result(motion)
@@ -278,13 +285,13 @@ class Executor:
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
             whole = self._completed(trajectory, follower)
             own = motion.tolerances
-            self._accept(follower.name, follower.send_goal(whole if own is None else _goal(whole, own)))
+            self._accept(follower.name, follower.send_goal(whole if own is None else arm_goal(whole, own)))
             self._serving += (follower,)
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not is_hand(gripper):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is not a gripper")
-            self._accept(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip)))
+            self._accept(gripper.name, gripper.send_goal(gripper_goal(gripper, motion.grip)))
             self._serving += (gripper,)
         return self._handles
 
@@ -354,6 +361,8 @@ class Executor:
             if handle.active
             for name, error in zip(controller.joints, handle.feedback().error.tolist(), strict=True)
         ]
+        if not active:
+            return self._compliance.felt
         far, name = max(active)
         unit = self._session.robot.joint(name).unit
         return f"joint '{name}' is {far:.3g} {unit} from its reference, the largest error"
@@ -361,12 +370,6 @@ class Executor:
     def _cancel(self) -> None:
         for handle in self._handles:
             handle.cancel()
-
-
-def _goal(trajectory: JointTrajectory, own: GoalTolerances) -> TrajectoryGoal:
-    return TrajectoryGoal(
-        trajectory, path_tolerance=own.path, goal_tolerance=own.goal, goal_time_tolerance=own.goal_time
-    )
 
 
 def _fault(session: Session) -> MotionEnd:
@@ -393,8 +396,3 @@ def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> Motio
             return MotionEnd("failed", f"the hand did not {what}: {text}")
         weak = motion.grip.force is not None and "stalled" in stops
     return MotionEnd("done", text, weak=weak)
-
-
-def _gripper_goal(gripper: Hand, grip: Grip) -> GripperGoal:
-    target = grip.target[[grip.joints.index(name) for name in gripper.joints]]
-    return GripperGoal(target=target, force=grip.force, reflex=grip.reflex)

@@ -13,10 +13,14 @@ Spread = Annotated[Length, Field(ge=0.0, le=10.0)]
 
 
 class RegionSpec(Model):
-    """Positions about the true one, one of `radius` and `box`; the believed position is drawn uniformly from them."""
+    """Positions about the true one, `radius`, `circle` or `box`; the believed position is drawn uniformly from them."""
 
     radius: Annotated[Length, Field(gt=0.0, le=10.0)] | None = Field(
         None, description="Radius of a level disc [m], above 0 to 10 m."
+    )
+    circle: Annotated[Length, Field(gt=0.0, le=10.0)] | None = Field(
+        None,
+        description="Radius of a level circle [m], on which the position is: always off by that, in any direction.",
     )
     box: tuple[Spread, Spread, Spread] | None = Field(
         None, description="Full lengths along the axes of the world [m], 0 to 10 m."
@@ -24,10 +28,10 @@ class RegionSpec(Model):
 
     @model_validator(mode="after")
     def _one(self) -> RegionSpec:
-        if (self.radius is None) == (self.box is None):
-            found = "none" if self.radius is None else "both"
-            at = () if self.radius is None else ("box",)
-            raise problem("conflict", f"expected exactly one of radius, box, got {found}", at=at, key=bool(at))
+        given = [key for key in ("radius", "circle", "box") if getattr(self, key) is not None]
+        if len(given) != 1:
+            found, at = " and ".join(given) or "none", tuple(given[-1:])
+            raise problem("conflict", f"expected exactly one of radius, circle, box, got {found}", at=at, key=bool(at))
         return self
 
 
@@ -41,7 +45,8 @@ class KnownSpec(Model):
 
     @model_validator(mode="after")
     def _uncertain(self) -> KnownSpec:
-        box = () if self.region is None else self.region.box or (self.region.radius or 0.0,)
+        region = self.region
+        box = () if region is None else region.box or (region.radius or region.circle or 0.0,)
         if self.rotation == 0.0 and not any(box):
             hint = "write `region: {radius: 3 cm}` or `rotation: 10 deg`, or remove `known`"
             raise problem("conflict", "`known` has neither a region nor a rotation", hint=hint)

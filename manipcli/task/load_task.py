@@ -15,6 +15,7 @@ from manipcli.spec.load import load_controllers, load_robot
 from manipcli.spec.load import load_task as load_task_file
 from manipcli.task.believed_scene import believing
 from manipcli.task.changed_files import Files, bound
+from manipcli.task.compliance_checks import compliance_findings
 from manipcli.task.consistency import consistent
 from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample
@@ -146,6 +147,8 @@ def _as_written(
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
     warnings = consistent(file, controllers_file, robot, scene, sensed(file, robot_file, robot, scene))
     refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
+    complying = (*compliance_findings(file, robot_file, controllers_file, robot),)
+    refuse([finding for finding in complying if finding.severity == "error"])
     varied = bound(Files(file, robot_file, controllers_file))
-    findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings)
+    findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings, *complying)
     return believing(Task(file, robot_file, controllers_file, robot, scene, findings)), varied

@@ -24,6 +24,7 @@ from manipcli.spec.partial.partial_robot import is_whole
 from manipcli.spec.robot import Arguments, RobotSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.changed_files import Files, out_of_range
+from manipcli.task.compliance_checks import compliance_findings
 from manipcli.task.consistency import disagreements, not_there
 from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
@@ -79,6 +80,8 @@ def every_finding(
     else:
         errors.found += not_there(partial, named_robot(partial.spec), known_scene, None)
     if task is not None and robot.file is not None and controllers_file is not None:
+        if robot.model is not None and not errors.found:
+            errors.found += compliance_findings(task, robot.file, controllers_file, robot.model)
         varied, wrong = bind(task, robot.file, controllers_file)
         errors.found += (*wrong, *out_of_range(Files(task, robot.file, controllers_file), varied))
     return errors.refusal(first)

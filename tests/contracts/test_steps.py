@@ -65,6 +65,8 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "lift": (LIFT, (PICK,)),
     "pour": (("pour", {"object": "cup", "into": "tray"}), (PICK, LIFT)),
     "place": (("place", {"object": "cup"}), (PICK, LIFT)),
+    "press": (("press", {"object": "desk", "force": "5 N", "at": [-0.2, -0.15, 0.2]}), ()),
+    "slide": (("slide", {"object": "desk", "force": "5 N", "along": [[-0.2, -0.15], [-0.2, -0.1]]}), ()),
     "locate": (("locate", {"object": "cup", "with": "wrist_camera"}), ()),
 }  # fmt: skip
 TICK = 1e-3

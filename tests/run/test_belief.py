@@ -125,8 +125,8 @@ def test_no_believed_body_overlaps_another(tmp_path: Path) -> None:
 def test_bad_knowledge_is_refused(tmp_path: Path) -> None:
     for known, text in (
         ("{}", "neither a region nor a rotation"),
-        ("{region: {}}", "expected exactly one of radius, box, got none"),
-        ("{region: {radius: 1 cm, box: [0, 0, 0]}}", "expected exactly one of radius, box, got both"),
+        ("{region: {}}", "expected exactly one of radius, circle, box, got none"),
+        ("{region: {radius: 1 cm, box: [0, 0, 0]}}", "expected exactly one of radius, circle, box, got radius and box"),
         ("{region: {box: [-1 cm, 0, 0]}}", "greater than or equal to 0|0 or more|at least 0"),
         ("{rotation: 200 deg}", "200 deg|3.14"),
         ("{region: {radius: 3}, rotation: 1 m}", "angle"),

@@ -193,6 +193,7 @@ class CartesianImpedanceController:
         self._singular = SINGULAR**2 * np.eye(6)
         self.output = ControllerOutput.of(len(self.joints), 1, speed=self._follower.output.speed)
         self._error = self._stretch = np.zeros(6)
+        self.tool: Array = np.full(3, np.nan)  # in the world, at the last update
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))
         self._updates = 0
@@ -282,6 +283,7 @@ class CartesianImpedanceController:
         q[self._columns] = measured.position
         R_WT, p_WT, jacobian = kinematics.pose_and_jacobian(q, self._link, self._offset)
         J = jacobian[:, self._columns]
+        self.tool = p_WT
         error, slip = self._error, output.velocity - measured.velocity
         error[:3] = p_WR - p_WT
         if self._force is not None:

@@ -20,7 +20,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import SOFT, Compliance, Pressing, compliant
-from manipcli.plan.contact_line import approach_speed, effective_mass, hover, refuse_too_strong
+from manipcli.plan.contact_line import CLOSE, HOVER, approach_speed, effective_mass, hover, refuse_too_strong
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -35,6 +35,8 @@ from manipcli.spec.robot import Vector3
 DOWN: Final = (0.0, 0.0, -1.0)
 RISE: Final = 1.0
 """[s] Planned time from the contact to the force."""
+AWAY: Final = 0.03
+"""[m] By which the hand withdraws."""
 RELAX: Final = 0.4
 """[s] In which the force is given up."""
 
@@ -96,14 +98,10 @@ class PressSpec(ForceSpec):
     )
 
 
-def pressed_point(spec: PressSpec, planner: Planner, state: PlanningState) -> Array:
-    """(3,) the point in the world."""
-    X_WF = planner.frame(spec.object, state)
-    if spec.at is not None:
-        return X_WF.apply(spec.at)
-    if carrier(planner.scene, spec.object) != spec.object:
-        return X_WF.p
-    return planner.frame(f"{spec.object}/top", state).p
+def face(spec: ForceSpec, planner: Planner, state: PlanningState) -> Transform:
+    """X_WF of the part that is touched; of a body the middle of its upper face."""
+    part = carrier(planner.scene, spec.object) != spec.object
+    return planner.frame(spec.object if part else f"{spec.object}/top", state)
 
 
 def comply(spec: ForceSpec, planner: Planner, q: Array, *, hold: float | None) -> Compliance:
@@ -131,23 +129,27 @@ def press(builder: MotionBuilder, label: str, compliance: Compliance) -> None:
 def relax(builder: MotionBuilder, compliance: Compliance) -> None:
     """Give the force up: the tool goes back to where it pressed from."""
     with compliant(builder, replace(compliance, force=None)):
-        builder.dwell("back off", RELAX)
+        builder.dwell("back off", RELAX, awaits=False)
 
 
 def _plan(spec: PressSpec, planner: Planner, state: PlanningState) -> StepPlan:
     builder = MotionBuilder(planner, state, verb="press")
-    where, axis = pressed_point(spec, planner, state), spec.axis
-    X_WH = hover(builder, planner, carrier(planner.scene, spec.object), where, axis, speed=spec.velocity_scaling)
+    where, axis = face(spec, planner, state).p, spec.axis
+    if spec.at is not None:
+        where = planner.frame(spec.object, state).apply(spec.at)
+    body = carrier(planner.scene, spec.object)
+    X_WH = hover(builder, planner, body, where, axis, speed=spec.velocity_scaling, left=HOVER if spec.stay else CLOSE)
     compliance = comply(spec, planner, builder.now.position, hold=spec.hold)
     press(builder, "press", compliance)
     if spec.stay:
         return builder.plan()
     relax(builder, compliance)
-    builder.straight("withdraw", Transform.of(xyz=-0.03 * axis) @ X_WH, speed=spec.velocity_scaling)
+    touching, X_WA = planner.may_touch(builder.now, [body]), Transform.of(xyz=-AWAY * axis) @ X_WH
+    builder.straight("withdraw", X_WA, speed=spec.velocity_scaling, allowed=touching)
     return builder.plan()
 
 
-def check(spec: PressSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+def check(spec: ForceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """An unknown body or part."""
     if "/" in spec.object:
         return unknown_frame(robot, scene, spec.object, ("object",))
