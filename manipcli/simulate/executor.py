@@ -167,7 +167,7 @@ class Executor:
             raise
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
-        presses = motion.compliance is not None and motion.compliance.ends_held
+        presses = self._compliance.ends_held(motion)
         while True:
             state = yield
             for handle in handles:
