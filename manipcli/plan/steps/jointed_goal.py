@@ -34,6 +34,8 @@ WITHIN: Final = {"m": 0.005, "rad": math.radians(3.0)}
 """Tolerance of the position that a step moves a joint to."""
 LABELS: Final = {"open": "pull", "close": "push", "turn": "turn"}
 """The phase of a step in which the joint moves."""
+PLACEHOLDER: Final = "world"
+"""The parent of a joint of a file with faults, of which only the name is known."""
 ROUNDING: Final = 1e-9
 
 
@@ -61,7 +63,7 @@ class HandleSpec(Model):
 def moved_joint(scene: Scene, name: str) -> SceneJoint | None:
     """The joint of a body with a single one, or of a link, by the name of the body; None: it has none, or several."""
     own = [joint for joint in scene.joints if joint.child == name] or [*joints_of(scene.joints, name)]
-    return own[0] if len(own) == 1 else None
+    return own[0] if len(own) == 1 and own[0].parent != PLACEHOLDER else None
 
 
 def handle_of(scene: Scene, joint: SceneJoint, part: str) -> Frame | None:
@@ -132,19 +134,19 @@ def _unmovable(spec: HandleSpec, scene: Scene) -> tuple[Problem, ...]:
     name = spec.object
     own = joints_of(scene.joints, name)
     joint = moved_joint(scene, name)
+    if any(each.parent == PLACEHOLDER for each in own):
+        return ()
     if joint is None and own:
         links = ", ".join(f"`{each.child}`" for each in own)
         message = f"'{name}' has {len(own)} joints; which is meant?"
         return (Problem(("object",), message, f"name the link: {links}", code="TASK370"),)
     if joint is None:
         jointed = [joint.name.rpartition(SEPARATOR)[0] for joint in scene.joints]
-        known = list(dict.fromkeys([*jointed, *(joint.child for joint in scene.joints)]))
+        known = list(dict.fromkeys([*jointed, *(each.child for each in scene.joints if each.parent != PLACEHOLDER)]))
         if name not in [body.name for body in scene.bodies]:
             return (Problem(("object",), f"'{name}' is not in the scene", did_you_mean(name, known)),)
         hint = f"bodies with joints: {', '.join(known)}" if known else "a body from a `urdf` with joints has them"
         return (Problem(("object",), f"'{name}' has no joint", hint, code="TASK370"),)
-    if joint.child not in {body.name for body in scene.bodies}:  # a placeholder, in a file with faults
-        return ()
     if handle_of(scene, joint, spec.part) is None:
         parts = [part for part in scene.parts(joint.child) if handle_of(scene, joint, part) is not None]
         hint = f"add a link '{spec.part}' on a fixed joint to its file, or name a part: `part: {parts[0]}`"
