@@ -51,6 +51,10 @@ class ComplianceSwitch:
         arm = self._arm
         return None if arm is None else arm.pressing
 
+    def ends_held(self, motion: Motion) -> bool:
+        """Whether a motion ends when its force has been held; in an engine without forces it ends after its time."""
+        return motion.compliance is not None and motion.compliance.ends_held and not self._session.engine.ideal
+
     @property
     def presses_yet(self) -> bool:
         """Whether the force of the motion has not been held for its time."""
@@ -93,6 +97,8 @@ class ComplianceSwitch:
             InvalidArgument: no controller complies, or the switch was refused.
         """
         arm, trajectory = self._arm, motion.trajectory
+        if self._session.engine.ideal:
+            return trajectory  # without physics nothing yields
         if motion.compliance is None:
             if arm is None or not self._owners or (trajectory is None and motion.switch is None):
                 return trajectory

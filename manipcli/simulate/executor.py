@@ -167,7 +167,7 @@ class Executor:
             raise
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
-        presses = motion.compliance is not None and motion.compliance.ends_held
+        presses = self._compliance.ends_held(motion)
         while True:
             state = yield
             for handle in handles:
@@ -185,7 +185,7 @@ class Executor:
                 busy = self._compliance.presses_yet
             if self._compliance.passed(motion) or (presses and not busy and trajectory is not None):
                 felt, wrong = self._compliance.result(motion)
-                yield from self._come_to_rest()
+                yield from self.come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 return MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
@@ -195,7 +195,7 @@ class Executor:
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
                 hold = self._compliance.holding(motion)
-                yield from self._come_to_rest()
+                yield from self.come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
@@ -231,11 +231,6 @@ class Executor:
                 return DONE
         return MotionEnd("timeout", f"`until` did not hold by t = {self._session.time:.3f} s", awaited=True)
 
-    def resting(self) -> Lane[MotionEnd]:
-        """Stop the motion, within the limits of its joints."""
-        yield from self._come_to_rest()
-        return _fault(self._session) if self._session.manager.faults else DONE
-
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
         for _ in range(self._ticks(duration)):
@@ -251,7 +246,7 @@ class Executor:
         while self._moving and not self._session.manager.faults:  # a stop with a low limit takes longer
             self._session.tick()
 
-    def _come_to_rest(self) -> Lane[None]:
+    def come_to_rest(self) -> Lane[None]:
         """Cancel active goals, and tick until all references rest, or a controller fails."""
         self._cancel()
         yield

@@ -67,6 +67,8 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "place": (("place", {"object": "cup"}), (PICK, LIFT)),
     "press": (("press", {"object": "desk", "force": "5 N", "at": [-0.2, -0.15, 0.2]}), ()),
     "slide": (("slide", {"object": "desk", "force": "5 N", "along": [[-0.2, -0.15], [-0.2, -0.1]]}), ()),
+    "insert": (("insert", {"object": "cup", "into": "tray", "depth": "1 cm", "force": "6 N"}), (PICK, LIFT)),
+    "push": (("push", {"object": "cup", "by": "5 cm", "posture": "wrap"}), ()),
     "locate": (("locate", {"object": "cup", "with": "wrist_camera"}), ()),
 }  # fmt: skip
 TICK = 1e-3

@@ -88,8 +88,7 @@ class InsertSpec(Model):
         None, description="How deep the end of the peg goes, from the rim [m]. Default: to the floor of the hole."
     )
     search: Annotated[Length, Field(ge=0, le=0.1)] | None = Field(
-        None,
-        description="Radius of the spiral [m]; 0: none. Default: how well the hole is `known`, and 2 mm more.",
+        None, description="Radius of the spiral [m]; 0: none. Default: how well the hole is `known`, and 2 mm more."
     )
     clearance: Annotated[Range, Field(description="Height above the rim from which it is lowered [m].")] = (0.003, 0.02)
     velocity_scaling: VelocityScaling = Field(
@@ -150,7 +149,7 @@ def _attempt(
     with compliant(builder, law(light, slow, FIRM, SUNK)):
         builder.dwell("touch", high / slow + FELT)
     radius = _radius(spec, planner)
-    if radius > 0.0:
+    if radius > fitted.clearance:
         none = f"no hole was found within {readable(radius, 'm')} of where '{spec.into}' is believed to be"
         with compliant(builder, law(light, LOWERING, FIRM, SUNK, none, hold=None)):
             search_motion(builder, planner, X_WT, X_WS.R, pitch_of(fitted.clearance), radius)

@@ -135,7 +135,7 @@ def _unmovable(spec: HandleSpec, scene: Scene) -> tuple[Problem, ...]:
     if joint is None and own:
         links = ", ".join(f"`{each.child}`" for each in own)
         message = f"'{name}' has {len(own)} joints; which is meant?"
-        return (Problem(("object",), message, f"name the link: {links}", code="TASK371"),)
+        return (Problem(("object",), message, f"name the link: {links}", code="TASK370"),)
     if joint is None:
         jointed = [joint.name.rpartition(SEPARATOR)[0] for joint in scene.joints]
         known = list(dict.fromkeys([*jointed, *(joint.child for joint in scene.joints)]))
@@ -143,6 +143,8 @@ def _unmovable(spec: HandleSpec, scene: Scene) -> tuple[Problem, ...]:
             return (Problem(("object",), f"'{name}' is not in the scene", did_you_mean(name, known)),)
         hint = f"bodies with joints: {', '.join(known)}" if known else "a body from a `urdf` with joints has them"
         return (Problem(("object",), f"'{name}' has no joint", hint, code="TASK370"),)
+    if joint.child not in {body.name for body in scene.bodies}:  # a placeholder, in a file with faults
+        return ()
     if handle_of(scene, joint, spec.part) is None:
         parts = [part for part in scene.parts(joint.child) if handle_of(scene, joint, part) is not None]
         hint = f"add a link '{spec.part}' on a fixed joint to its file, or name a part: `part: {parts[0]}`"
@@ -155,7 +157,7 @@ def _fingerless(robot: RobotModel) -> tuple[Problem, ...]:
     if robot.holding is None:
         return ()
     message = f"robot '{robot.name}' holds by {robot.holding.kind}: it cannot take a handle"
-    return (Problem(("object",), message, "use a robot whose hand closes by its fingers", code="TASK374"),)
+    return (Problem(("object",), message, "use a robot whose hand closes by its fingers"),)
 
 
 def beyond(joint: SceneJoint, wanted: float, limit: float, key: str, verb: str) -> tuple[Problem, ...]:
@@ -179,7 +181,7 @@ def taking(spec: HandleSpec) -> str:
 def travel(scene: Scene | None, name: str, value: float) -> str:
     """A position of the joint of an object in its unit; without a scene, in the units that it may have."""
     joint = None if scene is None else moved_joint(scene, name)
-    return f"{value:.4g} rad or m" if joint is None else amount(value, joint.unit)
+    return f"{amount(value, 'rad')} or {amount(value, 'm')}" if joint is None else amount(value, joint.unit)
 
 
 def uncommanded(spec: HandleSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
