@@ -184,7 +184,7 @@ class Executor:
                 busy = self._compliance.presses_yet
             if self._compliance.passed(motion) or (presses and not busy and trajectory is not None):
                 felt, wrong = self._compliance.result(motion)
-                yield from self._come_to_rest()
+                yield from self.come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 return MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
@@ -194,7 +194,7 @@ class Executor:
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
                 hold = self._compliance.holding(motion)
-                yield from self._come_to_rest()
+                yield from self.come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
@@ -230,11 +230,6 @@ class Executor:
                 return DONE
         return MotionEnd("timeout", f"`until` did not hold by t = {self._session.time:.3f} s", awaited=True)
 
-    def resting(self) -> Lane[MotionEnd]:
-        """Stop the motion, within the limits of its joints."""
-        yield from self._come_to_rest()
-        return _fault(self._session) if self._session.manager.faults else DONE
-
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
         for _ in range(self._ticks(duration)):
@@ -250,7 +245,7 @@ class Executor:
         while self._moving and not self._session.manager.faults:  # a stop with a low limit takes longer
             self._session.tick()
 
-    def _come_to_rest(self) -> Lane[None]:
+    def come_to_rest(self) -> Lane[None]:
         """Cancel active goals, and tick until all references rest, or a controller fails."""
         self._cancel()
         yield
