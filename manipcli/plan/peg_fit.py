@@ -22,6 +22,10 @@ from manipcli.shapes.surface import hull
 
 EDGE = 1e-9
 """[m] Below this a section has no height."""
+SAME = 1e-6
+"""[m] Clearances that differ by less are the same."""
+YAWS_DEG = (0.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+"""Rotations about the hole, relative to how the peg is held."""
 RING = 64
 """Points on the edge of a tilted cylinder."""
 
@@ -94,12 +98,11 @@ def fit(peg: Section, interior: Interior, yaw: float = 0.0) -> Fit:
 
 
 def best_yaws(peg: Section, interior: Interior, now: float) -> tuple[float, ...]:
-    """Yaws [rad] of the peg in the hole, the nearest to `now` first: that itself in a round hole."""
-    if isinstance(interior.shape, Cylinder):
-        return (now,)
-    turns = np.array([fit(peg, interior, k * math.pi / 2.0).clearance for k in range(4)])
-    good = [k * math.pi / 2.0 for k in range(4) if turns[k] > turns.max() - 1e-6]
-    return tuple(sorted(good, key=lambda yaw: abs(math.remainder(yaw - now, math.tau))))
+    """Yaws [rad] of the peg in the hole with the most clearance, the nearest to `now` first: of a round one many."""
+    turns = np.array([*(now + np.radians(YAWS_DEG)), *(np.arange(4) * math.pi / 2.0)])
+    clearances = np.array([fit(peg, interior, yaw).clearance for yaw in turns])
+    best = turns[clearances > clearances.max() - SAME]
+    return tuple(sorted((float(yaw) for yaw in best), key=lambda yaw: abs(math.remainder(yaw - now, math.tau))))
 
 
 def _below(geometry: Geometry, top: float) -> tuple[Array, float]:

@@ -14,7 +14,8 @@ from manipcli.task.task import Task
 def engine_settings(task: Task, plan: Plan) -> EngineSettings:
     """Steps, start, the engine's own settings and the links that collide, from the task and its plan.
 
-    Resting bodies sleep where there are many. Links that overlap at the start cannot be kept apart; a preflight check warns of them.
+    Resting bodies sleep where there are many. Links that overlap at the start cannot be kept apart; a preflight check
+    warns of them.
     """
     simulation, start = task.spec.simulation, plan.start.position
     substeps = round(simulation.control_period / simulation.step)
