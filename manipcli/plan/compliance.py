@@ -55,16 +55,18 @@ class Pressing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Beyond:
-    """A plane that ends a motion as soon as the origin of the compliant frame is beyond it.
+    """A plane that ends a motion as soon as the origin of the compliant frame is beyond it, or drops suddenly.
 
     Attributes:
         normal: (3,) unit vector in the world.
         offset: [m] the plane is n . p = offset.
+        drop: [m] it also ends when the origin is this far beyond its mean of the last second; None: it does not.
         otherwise: why the step has failed if the motion ends before the plane; "": that is no failure.
     """
 
     normal: Array
     offset: float
+    drop: float | None = None
     otherwise: str = ""
 
 

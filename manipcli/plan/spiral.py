@@ -34,12 +34,13 @@ def pitch_of(clearance: float) -> float:
 
 
 def spiral(pitch: float, radius: float) -> tuple[Array, Array]:
-    """Times (k) [s] and points (k, 2) [m] of the spiral from the middle to `radius` [m], and straight back.
+    """Times (k) [s] and points (k, 2) [m] of the spiral that covers the disc of `radius` [m], and straight back.
 
     The angular rate is min(TURNING, SPEED / sqrt(r^2 + (pitch / 2 pi)^2)); it rises and falls smoothly.
     """
     a, fine = pitch / math.tau, 1e-3
-    phi = np.linspace(0.0, radius / a, max(100, round(20.0 * radius / a)))
+    last = (radius + pitch / 2.0) / a  # the outermost turn has no neighbour
+    phi = np.linspace(0.0, last, max(100, round(20.0 * last)))
     slow = np.maximum(a * np.hypot(1.0, phi) / SPEED, 1.0 / TURNING)  # [s/rad]
     clock = np.append(0.0, np.cumsum(np.diff(phi) * (slow[1:] + slow[:-1]) / 2.0))
     total = float(clock[-1]) + START
@@ -48,7 +49,7 @@ def spiral(pitch: float, radius: float) -> tuple[Array, Array]:
     passed = np.append(0.0, np.cumsum((pace[1:] + pace[:-1]) / 2.0) * fine)
     out = np.interp(passed / passed[-1] * clock[-1], clock, phi)[:: round(SAMPLE / fine)]
     points = a * out[:, None] * np.stack([np.cos(out), np.sin(out)], axis=1)
-    ticks = max(math.ceil(START / SAMPLE), math.ceil(2.0 * radius / SPEED / SAMPLE))
+    ticks = max(math.ceil(START / SAMPLE), math.ceil(2.0 * a * last / SPEED / SAMPLE))
     back = (1.0 - _smooth(np.arange(1, ticks + 1) / ticks))[:, None] * points[-1]
     points = np.concatenate([points, back])
     return SAMPLE * np.arange(len(points), dtype=np.float64), points

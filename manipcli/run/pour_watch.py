@@ -110,7 +110,7 @@ class PourWatch:
         )
 
     def with_times(self, text: str) -> str:
-        """The text of a pour that is done; for bodies of a `count` with the times of the first and the last at the rim."""
+        """The text of a pour that is done; for bodies of a `count` also when the first and last left the cup."""
         times = sorted(one.at for one in self._bodies.values() if one.left is not None)
         if not times or not selections(self._bodies):
             return text

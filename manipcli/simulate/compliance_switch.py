@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,6 +18,8 @@ from manipcli.plan.motion import Motion, Switch
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import Session
 
+MEAN = 1.0
+"""[s] Time constant of the mean from which the tool drops."""
 BLEND = 0.5
 """[s] Time in which a trajectory that begins elsewhere than planned joins its plan."""
 HOLDING_SPEED = 0.002
@@ -37,6 +40,7 @@ class ComplianceSwitch:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._owners: tuple[str, ...] = ()
+        self._mean, self._passed = math.nan, False
 
     @property
     def _manager(self) -> ControllerManager:
@@ -68,9 +72,16 @@ class ComplianceSwitch:
         return "" if own is None else own.missed
 
     def passed(self, motion: Motion) -> bool:
-        """Whether the motion is over because the tool is beyond its plane."""
+        """Whether the motion is over because the tool is beyond its plane, or dropped; asked at every tick."""
         until, arm = None if motion.compliance is None else motion.compliance.until, self._arm
-        return until is not None and arm is not None and float(until.normal @ arm.tool) >= until.offset
+        if until is None or arm is None:
+            return False
+        along = float(until.normal @ arm.tool)
+        if math.isnan(self._mean):
+            self._mean = along
+        self._mean += (along - self._mean) * min(1.0, self._session.period / MEAN)
+        self._passed = along >= until.offset or (until.drop is not None and along - self._mean >= until.drop)
+        return self._passed
 
     @property
     def felt(self) -> str:
@@ -82,7 +93,7 @@ class ComplianceSwitch:
         """What was felt in a motion with a force that has ended, and why that is a failure; "" where it is none."""
         own = self._pressing
         until = None if motion.compliance is None else motion.compliance.until
-        if until is not None and until.otherwise and not self.passed(motion):
+        if until is not None and until.otherwise and not self._passed:
             return "", until.otherwise
         if motion.compliance is None or motion.compliance.force is None or own is None:
             return "", ""
@@ -97,6 +108,7 @@ class ComplianceSwitch:
             InvalidArgument: no controller complies, or the switch was refused.
         """
         arm, trajectory = self._arm, motion.trajectory
+        self._mean, self._passed = math.nan, False
         if self._session.engine.ideal:
             return trajectory  # without physics nothing yields
         if motion.compliance is None:

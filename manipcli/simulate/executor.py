@@ -12,7 +12,6 @@ from typing import Final, Literal, TypeVar
 import numpy as np
 
 from manipcli.control.action import GoalHandle
-from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.core.errors import InvalidArgument, SimulationFailed
 from manipcli.core.geometry import Array, wrapped
@@ -20,7 +19,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import OPENING, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.compliance_switch import ComplianceSwitch
-from manipcli.simulate.goals import arm_goal, gripper_goal
+from manipcli.simulate.goals import arm_goal, gripper_goal, switch_text
 from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
@@ -152,13 +151,13 @@ class Executor:
         """
         session = self._session
         latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
-        switch_text = ""
+        text = ""
         trajectory = self._compliance.before(motion)
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
-            switch_text = _switch_text(switched)
+            text = switch_text(switched)
             if not switched.ok:
-                return MotionEnd("failed", switch_text)
+                return MotionEnd("failed", text)
         start = session.state.position.copy()
         try:
             handles = self._send(motion, trajectory)
@@ -207,7 +206,7 @@ class Executor:
                     return MotionEnd("failed", far or wrong)
                 if felt:
                     return replace(DONE, text=felt)
-                return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
+                return replace(DONE, text=text) if text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
                 late = f"limit reached at t = {session.time:.3f} s, before {late}"
@@ -375,12 +374,6 @@ class Executor:
 def _fault(session: Session) -> MotionEnd:
     """A controller failed, even if no step uses it: the robot is no longer the one that the task was planned for."""
     return MotionEnd("failed", session.manager.faults[-1].message)
-
-
-def _switch_text(switched: SwitchResult) -> str:
-    parts = [f"activated {', '.join(switched.activated)}"] if switched.activated else []
-    parts += [f"deactivated {', '.join(switched.deactivated)}"] if switched.deactivated else []
-    return "; ".join((*parts, *switched.messages)) or "nothing to switch"
 
 
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:

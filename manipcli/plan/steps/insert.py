@@ -4,7 +4,7 @@
     - insert: {object: plug, into: block/hole, depth: 20 mm, search: 5 mm}
 
 The peg is held upright above the believed hole and lowered until it is felt. If it has not dropped in, it slides along
-a spiral, pressed on with a third of the force, until it does: see `plan.spiral`. It then goes down with at most the
+a spiral, pressed on with a fifth of the force, until it does: see `plan.spiral`. It then goes down with at most the
 force. The arm is soft across the hole, about the tip of the peg, so that the walls guide it.
 """
 
@@ -46,9 +46,11 @@ from manipcli.spec.base import Model
 from manipcli.spec.names import ContainerName, MovableName
 from manipcli.spec.quantity import Force, Length
 
-SUNK: Final = 0.0015
-"""[m] A peg that is this deep has found the hole."""
-SEARCHING: Final = 1.0 / 3.0
+SUNK: Final = 0.006
+"""[m] A hand that is this much lower than at the rim has found the hole: more than the peg slips in it."""
+DROP: Final = 0.0015
+"""[m] A peg that drops by this while it slides has found the hole."""
+SEARCHING: Final = 0.2
 """Share of the force with which the peg is pressed on while it slides."""
 FIRM: Final = 3000.0
 """[N/m] Stiffness across the hole while it slides: friction holds it back by less than a millimetre."""
@@ -82,7 +84,7 @@ class InsertSpec(Model):
     object: MovableName = Field(description="The held peg.")
     into: ContainerName = Field(description="The container whose hollow is the hole.")
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
-        15.0, description="Largest force of the tool along the hole [N], above 0; it slides with a third. Default 15 N."
+        15.0, description="Largest force of the tool along the hole [N], above 0; it slides with a fifth. Default 15 N."
     )
     depth: Annotated[Length, Field(gt=0, le=1.0)] | None = Field(
         None, description="How deep the end of the peg goes, from the rim [m]. Default: to the floor of the hole."
@@ -142,7 +144,7 @@ def _attempt(
         force: float, speed: float, across: float, deep: float, otherwise: str = "", hold: float | None = FELT
     ) -> Compliance:
         pressing = Pressing(frozen([0.0, 0.0, 1.0]), force, speed, high + depth, hold=hold, yields=True)
-        until = Beyond(frozen(down), rim + deep, otherwise)
+        until = Beyond(frozen(down), rim + deep, DROP if otherwise else None, otherwise)
         spring = Compliance.of(along=ALONG, across=across, force=pressing, X_TC=X_TC)
         return replace(spring, until=until, relative=True)
 
@@ -154,7 +156,7 @@ def _attempt(
         with compliant(builder, law(light, LOWERING, FIRM, SUNK, none, hold=None)):
             search_motion(builder, planner, X_WT, X_WS.R, pitch_of(fitted.clearance), radius)
     X_WE = Transform.of(xyz=(high + depth) * down) @ X_WT
-    with compliant(builder, law(spec.force, LOWERING, SOFT, depth if spec.depth else depth + high)):
+    with compliant(builder, law(spec.force, LOWERING, SOFT, depth if spec.depth else depth + SUNK)):
         builder.straight("insert", X_WE, speed=0.05 * spec.velocity_scaling)
     with compliant(builder, replace(Compliance.of(along=ALONG, across=SOFT, X_TC=X_TC), here=True)):
         builder.dwell("rest", FELT)

@@ -146,10 +146,8 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
         end = near + distance + HOVER
         builder.straight("approach", _moved(X_WA, near, axis), speed=spec.velocity_scaling)
         slack = spec.force / STEADY
-        beyond = Beyond(
-            frozen(axis), float(axis @ X_WA.p) + end,
-            f"'{spec.object}' did not go {readable(distance, 'm')}: it needs more than {readable(spec.force, 'N')}",
-        )  # fmt: skip
+        stuck = f"'{spec.object}' did not go {readable(distance, 'm')}: it needs more than {readable(spec.force, 'N')}"
+        beyond = Beyond(frozen(axis), float(axis @ X_WA.p) + end, otherwise=stuck)
         X_TC = X_WA.inverse() @ Transform.of(xyz=X_WA.p, R=np.column_stack([axis, side, UP]))
         law = Compliance.of(along=STEADY, across=FIRM, axis="x", X_TC=replace(X_TC, p=frozen(np.zeros(3))))
         allowed = planner.hand_contacts(spec.object)
