@@ -185,10 +185,9 @@ class Executor:
                 busy = self._compliance.presses_yet
             if self._compliance.passed(motion) or (presses and not busy and trajectory is not None):
                 felt, wrong = self._compliance.result(motion)
-                yield from self._come_to_rest()
-                if session.manager.faults:
-                    return _fault(session)
-                return MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
+                rest = yield from self.resting()
+                ended = MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
+                return ended if rest is DONE else rest
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
@@ -203,10 +202,8 @@ class Executor:
             if not busy and (awaited is None or holds):
                 far = self._far(motion, start, state)
                 felt, wrong = self._compliance.result(motion)
-                if far or wrong:
-                    return MotionEnd("failed", far or wrong)
-                if felt:
-                    return replace(DONE, text=felt)
+                if far or wrong or felt:
+                    return MotionEnd("failed", far or wrong) if far or wrong else replace(DONE, text=felt)
                 return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
