@@ -76,13 +76,18 @@ whole tolerance is left, and signs are kept: 5 mm of 20 mm left (0.25) is less t
 ## Many bodies
 
 A body with a [`count`](task.md#many-bodies) is named by number, `ball[3]`; `ball[*]` is the selection of all of them.
-Three words take one condition with a selection in place of a body (in quotes: YAML reads brackets as a list):
+Three words take one condition and a selection, `of` (in quotes: YAML reads brackets as a list):
 
 ```yaml
-  - at_least: {n: 18, meet: {inside: {object: 'ball[*]', of: tray}}}
-  - all_of: {at_rest: {object: 'ball[*]'}}
-  - any_of: {inside: {object: 'ball[*]', of: cup}}
+  - at_least: {n: 18, of: 'ball[*]', inside: tray}
+  - all_of: {of: 'ball[*]', at_rest: {below: 5 mm/s}}
+  - any_of: {of: 'ball[*]', inside: cup}
+  - any_of: {above: {object: cup, of: 'ball[*]'}}
 ```
+
+`of` is the `object` of the condition, also inside `not`, `all` and `any`. A condition with one other required value
+takes this value alone: `inside: tray` is `inside: {of: tray}`. Without `of`, the condition itself names the selection
+in place of a body, as in the last line.
 
 The margin is the n-th greatest of those of the bodies (the least for `all_of`, the greatest for `any_of`), so it is 0
 or more exactly if the condition holds for as many. Reports show how many hold, and the body that decides.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from manipcli.conditions.formula import Seams, scopes
 from manipcli.core.prose import amount, listing, named, sentence
 from manipcli.model.robot import RobotModel
-from manipcli.spec.condition import END, SELECTING, AtLeastSpec, ConditionSpec, ExpectationSpec
+from manipcli.spec.condition import END, SELECTING, ConditionSpec, ExpectationSpec, SelectedSpec
 from manipcli.spec.counted import selected
 
 
@@ -21,14 +21,9 @@ def condition_clause(spec: ConditionSpec, robot: RobotModel, seam: Seams) -> str
         return f"the robot believes that {inner[0]}"
     if spec.name in SELECTING:
         (selection,) = selected(spec.members[0]) or ("",)
-        body = spec.body if spec.name == "at_least" else None
-        many = (
-            f"at least {body.n}"
-            if isinstance(body, AtLeastSpec)
-            else "all"
-            if spec.name == "all_of"
-            else "at least one"
-        )
+        (member,) = spec.members
+        number = member.n if isinstance(member, SelectedSpec) else None
+        many = f"at least {number}" if number else "all" if spec.name == "all_of" else "at least one"
         return f"for {many} of {named(selection)}, {inner[0]}"
     if len(inner) == 1:
         return inner[0]

@@ -1,7 +1,7 @@
 """Conditions over the bodies of a selection: one condition, with the name of each body in place of `ball[*]`.
 
-all_of: {at_rest: {object: 'ball[*]'}}
-at_least: {n: 18, meet: {inside: {object: 'ball[*]', of: tray}}}
+all_of: {of: 'ball[*]', at_rest: {}}
+at_least: {n: 18, of: 'ball[*]', inside: tray}
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from manipcli.conditions.condition import CheckContext, Problem
 from manipcli.core.text import did_you_mean
 from manipcli.scene.scene import Scene
-from manipcli.spec.condition import SELECTING, AtLeastSpec, ConditionSpec
+from manipcli.spec.condition import SELECTING, ConditionSpec, SelectedSpec
 from manipcli.spec.counted import ALL, selected, selections, with_member
 
 
@@ -30,9 +30,9 @@ def each(spec: ConditionSpec, scene: Scene) -> tuple[ConditionSpec, ...]:
 
 def least_number(spec: ConditionSpec, count: int) -> int:
     """For how many of `count` bodies the condition must hold."""
-    asked = getattr(spec, spec.word)
-    if isinstance(asked, AtLeastSpec):
-        return asked.n
+    (member,) = spec.members
+    if isinstance(member, SelectedSpec) and member.n is not None:
+        return member.n
     return count if spec.name == "all_of" else 1
 
 
@@ -49,6 +49,8 @@ def selection_problems(
     (member,), (loc,) = spec.members, spec.where
     known = selections(body.name for body in context.scene.bodies)
     named = selected(member)
+    if isinstance(member, SelectedSpec) and member.of is not None:
+        loc = (*loc, "of")
     if inner := next((word for word in _words(member) if word in SELECTING), None):
         hint = "write one of them; combine several with `all` and `any`"
         return (Problem(loc, f"`{inner}` inside `{spec.name}`: a condition is over one selection", hint),)
@@ -73,7 +75,7 @@ def selection_problems(
     found: list[Problem] = []
     for one in each(spec, context.scene):
         where = {problem.loc for problem in found}
-        more = (Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in check(one))
+        more = (Problem((spec.name, *p.loc), p.message, p.hint, p.code) for p in check(one))
         found += [problem for problem in more if problem.loc not in where]
     return tuple(found)
 

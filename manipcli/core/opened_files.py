@@ -40,7 +40,8 @@ def _install() -> None:
     def hook(event: str, arguments: tuple[object, ...]) -> None:
         if event == "open" and _recording and isinstance(arguments[0], str | bytes):
             path = Path(os.fsdecode(arguments[0])).absolute()
-            if path.parent.name == "__pycache__":  # written by the first import of a module
+            bytecode = sys.pycache_prefix is not None and path.is_relative_to(sys.pycache_prefix)
+            if bytecode or path.parent.name == "__pycache__":  # written by the first import of a module
                 return
             for stamps in _recording:
                 stamps.setdefault(path, stamp(path))

@@ -45,7 +45,7 @@ class _Reading:
         self._source = source
         self._joints: dict[str, Joint | SceneJoint] = {joint.name: joint for joint in joints if joint.moves}
         self._joints |= {joint.name: joint for joint in scene_joints}  # '/' is only in their names
-        self._scene = scene_joints
+        self._scene = [joint for joint in scene_joints if joint.parent != "world"]  # not of a file with faults
         self._groups = {group.name: group.joints for group in groups}
 
     def below(self, held: Held, node: Node, path: Loc, about: tuple[str, ...]) -> Iterator[Diagnostic]:

@@ -23,7 +23,7 @@ FAR: Final = 0.08
 """[m] Distance of the tool's origin from the point, from which the hand comes straight on."""
 SEEN: Final = 0.2
 """[m] Greatest gap that is measured."""
-ADVANCES: Final = 8
+ADVANCES: Final = 40
 """Steps to the gap; each is as long as the gap is at least."""
 FASTEST: Final = 0.05
 """[m/s]"""
@@ -128,10 +128,13 @@ def hover(
             break
         travel += near - left
         if travel > FAR + SEEN / 2.0:
-            raise NotPlannable(f"the tool does not meet '{body}' on its line", hint="set another point under `at`")
+            break
         q = planner.solver.solve(_along(X_WA, travel, axis), state.position, planner.rng)
         state = state.moved(q)
         near = gap(planner, state, body)
+    if near - left >= 1e-3:
+        hint = "set another point under `at`, or close the hand before: `move: {to: POSE}`"
+        raise NotPlannable(f"the hand does not meet '{body}' on the line of the tool", hint=hint)
     if travel > 0.0:
         touching = planner.may_touch(builder.now, [body])
         builder.straight("approach", _along(X_WA, travel, axis), speed=speed, allowed=touching)

@@ -288,9 +288,9 @@ class MotionBuilder:
         self._add(OPENING, None, grip, allowed=allowed)
         self._motions[-1] = replace(self._motions[-1], lets_go=self._planner.robot.holding is not None)
 
-    def dwell(self, label: str, duration: float) -> None:
-        """Hold still for `duration` [s], and until the step's `until` holds."""
-        self._motions.append(Motion(label, None, None, duration, awaits=True, compliance=self.compliance))
+    def dwell(self, label: str, duration: float, *, awaits: bool = True) -> None:
+        """Hold still for `duration` [s], and if it `awaits` until the step's `until` holds."""
+        self._motions.append(Motion(label, None, None, duration, awaits, compliance=self.compliance))
 
     def look(self, looks: Look, duration: float) -> None:
         """Hold still until the picture in which a body is located has arrived, at most after `duration` [s]."""

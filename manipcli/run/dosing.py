@@ -18,8 +18,12 @@ from manipcli.plan.planner import Planner
 from manipcli.run.pour_watch import PourWatch
 from manipcli.simulate.executor import DONE, Executor, Lane, MotionEnd
 
+Situation = Callable[[PlanningState], PlanningState]
+"""Measures the state, from the one that is believed."""
 ROUNDS: Final = 5
 """How often the cup is tilted once more."""
+FAST: Final = 0.9
+"""Share of the velocity limits of the way back."""
 CORNERS: Final = 24
 """Points of the way back, between which it is smooth."""
 
@@ -34,13 +38,16 @@ class Dosing:
         situation: measures the state.
     """
 
-    def __init__(
-        self, planner: Planner, plan: StepPlan, watch: PourWatch, situation: Callable[[PlanningState], PlanningState]
-    ) -> None:
+    def __init__(self, planner: Planner, plan: StepPlan, watch: PourWatch, situation: Situation) -> None:
         self._planner, self._plan, self._watch, self._situation = planner, plan, watch, situation
         self._contents = [planner.scene.body(name) for name in plan.poured]
         self._pouring = [motion for motion in plan.motions if motion.pours]
         self._stopped = False
+
+    @classmethod
+    def of(cls, planner: Planner, plan: StepPlan, watch: PourWatch | None, situation: Situation) -> Dosing | None:
+        """None for a plan without a portion."""
+        return None if plan.portion is None or watch is None else cls(planner, plan, watch, situation)
 
     def _reached(self, names: Sequence[str]) -> bool:
         portion = self._plan.portion
@@ -75,7 +82,8 @@ class Dosing:
                 self._stopped = self._reached(self._watch.leaving)
                 if self._stopped:
                     lane.close()
-                    return (yield from executor.resting())
+                    yield from executor.come_to_rest()
+                    return DONE
                 lane.send(state)
         except StopIteration as ended:
             end: MotionEnd = ended.value
@@ -90,7 +98,7 @@ class Dosing:
             here = now.position[self._planner.robot.indices(names)]
             nearest = int(np.argmin(np.linalg.norm(planned - here, axis=1)))
             path: Array = planned[np.linspace(nearest, 0, CORNERS).astype(int)]
-            limits = MotionLimits.of(self._planner.robot, names)
+            limits = MotionLimits.of(self._planner.robot, names, velocity_scale=FAST)
             try:
                 back = smooth_motion(self._planner, now, motion.label, limits, joint_path([here, *path[1:]]))
             except NotPlannable as refusal:

@@ -14,11 +14,13 @@ from manipcli.task.task import Task
 def engine_settings(task: Task, plan: Plan) -> EngineSettings:
     """Steps, start, the engine's own settings and the links that collide, from the task and its plan.
 
-    Links that overlap at the start cannot be kept apart; a preflight check warns of them.
+    Resting bodies sleep where there are many. Links that overlap at the start cannot be kept apart; a preflight check
+    warns of them.
     """
     simulation, start = task.spec.simulation, plan.start.position
     substeps = round(simulation.control_period / simulation.step)
-    settings = EngineSettings(simulation.step, substeps, start, simulation.own, _colliding(task, plan))
+    many = any(body.count is not None for body in task.spec.scene.values())
+    settings = EngineSettings(simulation.step, substeps, start, simulation.own, _colliding(task, plan), sleep=many)
     state = task.part.state
     if state is None:
         return settings

@@ -15,6 +15,7 @@ from manipcli.model.grasp import LINK
 from manipcli.model.state import Contact, WorldState, body_pose
 from manipcli.plan.flight import room
 from manipcli.scene.scene import Scene
+from manipcli.spec.counted import selections
 
 REACTION: Final = 0.3
 """[s] Time in which a tilt is stopped and reversed."""
@@ -33,6 +34,7 @@ class _Poured:
         left: its velocity (3,) [m/s] at the rim; None: it is in the cup.
         passed: its centre (3,) [m] at the rim; None: it is in the cup.
         over: where that is, of the receiving container.
+        at: [s] that time, at which it was first seen out of the cup.
         tilt: [rad] of the cup at that time.
         landed: where; "" while it flies.
     """
@@ -42,6 +44,7 @@ class _Poured:
     velocity: Array | None = None
     out: float = 0.0
     left: Array | None = None
+    at: float = 0.0
     passed: Array | None = None
     over: str = ""
     tilt: float = 0.0
@@ -85,6 +88,7 @@ class PourWatch:
                 share = one.below / (one.below - below) if math.isfinite(one.below) else 1.0
                 before = velocity if one.velocity is None else one.velocity
                 one.left = before + share * (velocity - before)
+                one.at = float(state.time)
                 one.passed = centre if one.centre is None else one.centre + share * (centre - one.centre)
                 one.over = self._over(state, one.passed, one.left)
                 one.tilt = math.acos(min(1.0, max(-1.0, float(X_WS.R[2, 2]))))
@@ -104,6 +108,14 @@ class PourWatch:
         return tuple(
             name for name, one in self._bodies.items() if one.left is not None or one.below < REACTION * one.out
         )
+
+    def with_times(self, text: str) -> str:
+        """The text of a pour that is done; for bodies of a `count` also when the first and last left the cup."""
+        times = sorted(one.at for one in self._bodies.values() if one.left is not None)
+        if not times or not selections(self._bodies):
+            return text
+        over = f"first over the rim at {times[0]:.2f} s, last at {times[-1]:.2f} s"
+        return f"{text}; {over}" if text else over
 
     def text(self) -> str:
         """What left the rim and did not land in the container; "" for nothing."""

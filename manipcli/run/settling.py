@@ -56,9 +56,13 @@ def settle(task: Task, session: Session) -> None:
         if k in heaped:
             _check_heaped(task, body, heaped[k], state)
         elif not shift < SETTLED_SHIFT:
+            joint = next((joint for joint in task.true.scene.joints if joint.child == body.name), None)
+            why = "it overlaps another body, has no support, or was hit"
+            if joint is not None:
+                why = f"its weight, its spring or a contact moves joint '{joint.name}'; choose another `start`"
             raise SimulationFailed(
                 f"'{body.name}' moved {1000 * shift:.1f} mm while settling, the limit is {1000 * SETTLED_SHIFT:g} mm: "
-                "it overlaps another body, has no support, or was hit",
+                f"{why}",
                 time=0.0,
             )
         if not speed < SETTLED_SPEED:

@@ -201,7 +201,7 @@ class StepAttempt:
             if pour is not None:
                 self._pour = None
         if end.outcome == "done":
-            return end
+            return end if pour is None else replace(end, text=pour.with_times(end.text))
         flown = "" if pour is None or not pour.text() else f"; {pour.text()}"
         return MotionEnd(end.outcome, end.text + flown + found + saturated_since(before, self._session))
 
@@ -213,9 +213,7 @@ class StepAttempt:
         if before.carried is not None and self._physics:
             self._measured.grasp.begin_step(before.carried, self._state, self._session.touching)
         texts = []
-        dosing = None
-        if planned.plan.portion is not None and self._pour is not None and self._physics:
-            dosing = Dosing(self._plan.planner, planned.plan, self._pour, self._measured.situation)
+        dosing = Dosing.of(self._plan.planner, planned.plan, self._pour, self._measured.situation)
         with self._awaited(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None

@@ -55,6 +55,10 @@ class ComplianceSwitch:
         arm = self._arm
         return None if arm is None else arm.pressing
 
+    def ends_held(self, motion: Motion) -> bool:
+        """Whether a motion ends when its force has been held; in an engine without forces it ends after its time."""
+        return motion.compliance is not None and motion.compliance.ends_held and not self._session.engine.ideal
+
     @property
     def presses_yet(self) -> bool:
         """Whether the force of the motion has not been held for its time."""
@@ -105,6 +109,8 @@ class ComplianceSwitch:
         """
         arm, trajectory = self._arm, motion.trajectory
         self._mean, self._passed = math.nan, False
+        if self._session.engine.ideal:
+            return trajectory  # without physics nothing yields
         if motion.compliance is None:
             if arm is None or not self._owners or (trajectory is None and motion.switch is None):
                 return trajectory

@@ -32,6 +32,7 @@ class EngineSettings:
         velocity: (n) of the joints at the start; None: at rest.
         twists: (m, 6) velocity of each movable body's O and its angular velocity, in the world, at the start; None: at
             rest.
+        sleep: whether islands of bodies that rest are left out of the physics until something touches them.
     """
 
     step: float
@@ -41,6 +42,7 @@ class EngineSettings:
     self_collision: tuple[tuple[str, str], ...] = ()
     velocity: Array | None = None
     twists: Array | None = None
+    sleep: bool = False
 
 
 class Refusal(NamedTuple):

@@ -12,7 +12,6 @@ from typing import Final, Literal, TypeVar
 import numpy as np
 
 from manipcli.control.action import GoalHandle
-from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.core.errors import InvalidArgument, SimulationFailed
 from manipcli.core.geometry import Array, wrapped
@@ -20,7 +19,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.motion import OPENING, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.compliance_switch import ComplianceSwitch
-from manipcli.simulate.goals import arm_goal, gripper_goal
+from manipcli.simulate.goals import arm_goal, gripper_goal, switch_text
 from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
@@ -152,13 +151,13 @@ class Executor:
         """
         session = self._session
         latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
-        switch_text = ""
+        text = ""
         trajectory = self._compliance.before(motion)
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
-            switch_text = _switch_text(switched)
+            text = switch_text(switched)
             if not switched.ok:
-                return MotionEnd("failed", switch_text)
+                return MotionEnd("failed", text)
         start = session.state.position.copy()
         try:
             handles = self._send(motion, trajectory)
@@ -167,7 +166,7 @@ class Executor:
             raise
         last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
-        presses = motion.compliance is not None and motion.compliance.ends_held
+        presses = self._compliance.ends_held(motion)
         while True:
             state = yield
             for handle in handles:
@@ -185,16 +184,17 @@ class Executor:
                 busy = self._compliance.presses_yet
             if self._compliance.passed(motion) or (presses and not busy and trajectory is not None):
                 felt, wrong = self._compliance.result(motion)
-                rest = yield from self.resting()
-                ended = MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
-                return ended if rest is DONE else rest
+                yield from self.come_to_rest()
+                if session.manager.faults:
+                    return _fault(session)
+                return MotionEnd("failed", wrong) if wrong else replace(DONE, text=felt)
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
             holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
                 hold = self._compliance.holding(motion)
-                yield from self._come_to_rest()
+                yield from self.come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
                 when = f"{left:.2f} s before its end" if left else "after its planned end"
@@ -202,9 +202,11 @@ class Executor:
             if not busy and (awaited is None or holds):
                 far = self._far(motion, start, state)
                 felt, wrong = self._compliance.result(motion)
-                if far or wrong or felt:
-                    return MotionEnd("failed", far or wrong) if far or wrong else replace(DONE, text=felt)
-                return replace(DONE, text=switch_text) if switch_text else _held(motion, handles, self._touch)
+                if far or wrong:
+                    return MotionEnd("failed", far or wrong)
+                if felt:
+                    return replace(DONE, text=felt)
+                return replace(DONE, text=text) if text else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion ended" if busy else "the condition under `until` held"
                 late = f"limit reached at t = {session.time:.3f} s, before {late}"
@@ -228,11 +230,6 @@ class Executor:
                 return DONE
         return MotionEnd("timeout", f"`until` did not hold by t = {self._session.time:.3f} s", awaited=True)
 
-    def resting(self) -> Lane[MotionEnd]:
-        """Stop the motion, within the limits of its joints."""
-        yield from self._come_to_rest()
-        return _fault(self._session) if self._session.manager.faults else DONE
-
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
         for _ in range(self._ticks(duration)):
@@ -248,7 +245,7 @@ class Executor:
         while self._moving and not self._session.manager.faults:  # a stop with a low limit takes longer
             self._session.tick()
 
-    def _come_to_rest(self) -> Lane[None]:
+    def come_to_rest(self) -> Lane[None]:
         """Cancel active goals, and tick until all references rest, or a controller fails."""
         self._cancel()
         yield
@@ -377,12 +374,6 @@ class Executor:
 def _fault(session: Session) -> MotionEnd:
     """A controller failed, even if no step uses it: the robot is no longer the one that the task was planned for."""
     return MotionEnd("failed", session.manager.faults[-1].message)
-
-
-def _switch_text(switched: SwitchResult) -> str:
-    parts = [f"activated {', '.join(switched.activated)}"] if switched.activated else []
-    parts += [f"deactivated {', '.join(switched.deactivated)}"] if switched.deactivated else []
-    return "; ".join((*parts, *switched.messages)) or "nothing to switch"
 
 
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:

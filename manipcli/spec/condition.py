@@ -31,16 +31,14 @@ COMBINATIONS = {
     "any": "At least one of these conditions holds.",
     "not": "This condition does not hold.",
     "believed": "This condition holds for the poses that the robot believes, not for the true ones.",
-    "all_of": "This condition, which names a selection such as `ball[*]`, holds for each of its bodies.",
-    "any_of": "This condition, which names a selection such as `ball[*]`, holds for at least one of its bodies.",
-    "at_least": "A condition that names a selection such as `ball[*]` holds for at least `n` of its bodies.",
+    "all_of": "This condition holds for each body of the selection `of`, such as `ball[*]`.",
+    "any_of": "This condition holds for at least one body of the selection `of`, such as `ball[*]`.",
+    "at_least": "This condition holds for at least `n` bodies of the selection `of`, such as `ball[*]`.",
 }
-SINGLE = ("not", "believed", "all_of", "any_of")
+SINGLE = ("not", "believed", "all_of", "any_of", "at_least")
 """Combinations of one condition."""
 SELECTING = ("all_of", "any_of", "at_least")
 """Combinations of one condition over the bodies of a selection."""
-MEET = "meet"
-"""Key of the condition in `at_least`."""
 QUANTIFIERS = {
     "always": "This condition holds all the time.",
     "never": "This condition never holds.",
@@ -84,22 +82,25 @@ class ConditionSpec(KeyedSpec):
         if not self.combines:
             return ()
         found = getattr(self, self.word)
-        if isinstance(found, AtLeastSpec):
-            return (getattr(found, MEET),)
         return (found,) if self.word in SINGLE else found
 
     @property
     def where(self) -> tuple[Loc, ...]:
         """Where each of the members is written in this condition."""
-        if self.word == "at_least":
-            return ((self.word, MEET),)
         return ((self.word,),) if self.word in SINGLE else tuple((self.word, k) for k in range(len(self.members)))
 
 
-class AtLeastSpec(Model):
-    """At least `n` of the bodies of a selection meet a condition."""
+class SelectedSpec(ConditionSpec):
+    """A condition over a selection: under `all_of`, `any_of` or `at_least`."""
 
-    n: Annotated[int, Field(ge=1, description="Least number of bodies, up to that of the selection.")]
+    n: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="Only with `at_least`: least number of bodies, up to that of the selection."
+    )
+    of: str | None = Field(
+        None,
+        description="Selection, such as `ball[*]`: the `object` of the condition. Default: the selection that the "
+        "condition itself names.",
+    )
 
 
 class ExpectationSpec(ConditionSpec):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 from pydantic import BaseModel
 
@@ -43,9 +44,15 @@ def controllers_schema(model: type[ControllersSpec]) -> str:
 
 
 def _schema(model: type[BaseModel], title: str) -> dict[str, Plain]:
-    schema: dict[str, Plain] = model.model_json_schema()
+    schema: dict[str, Plain] = json.loads(_generated(model))
     _tidy(schema, named=False)
     return {"$schema": _DRAFT, **schema, "title": title}
+
+
+@cache
+def _generated(model: type[BaseModel]) -> str:
+    """The schema by pydantic, which takes half a second for tasks: once per process, also for many tasks."""
+    return json.dumps(model.model_json_schema())
 
 
 def _tidy(node: Plain, *, named: bool) -> None:

@@ -23,14 +23,14 @@ from manipcli.spec.base import Model, about, problem
 from manipcli.spec.block import BlockSpec
 from manipcli.spec.condition import (
     COMBINATIONS,
-    MEET,
     QUANTIFIERS,
+    SELECTING,
     SINGLE,
     WATCHED,
-    AtLeastSpec,
     ConditionSpec,
     ExpectationSpec,
     KeyedSpec,
+    SelectedSpec,
     WatchSpec,
 )
 from manipcli.spec.controllers import ControllerSpec
@@ -38,6 +38,7 @@ from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.sensors import SensorName
 from manipcli.spec.simulation import SimulationSpec
+from manipcli.spec.spread import spread, written_as
 from manipcli.spec.step import StepSpec
 from manipcli.spec.structure.words import WORDS, other_word
 from manipcli.spec.task import TaskSpec
@@ -209,20 +210,35 @@ def _conditions(members: Members) -> object:
     """Union of all conditions, and of `all`, `any`, `not` over conditions, recursively."""
     own = ForwardRef(_CONDITION)
     leaves = [_wrapped(ConditionSpec, name, spec, {}) for name, spec in members]
-    combined = [_combined(ConditionSpec, name, own) for name in COMBINATIONS]
-    condition = _union("condition", [*leaves, *combined], common=())
+    combined = [_combined(ConditionSpec, name, own) for name in COMBINATIONS if name not in SELECTING]
+    selected = [_combined(SelectedSpec, name, own) for name in COMBINATIONS if name not in SELECTING]
+    over = _over_selections(ConditionSpec, members, selected)
+    condition = _union("condition", [*leaves, *combined, *over], common=())
     alias = TypeAliasType(_CONDITION, condition)  # type: ignore[misc]  # a named type, which can refer to itself
-    own_fields = [field.annotation for model in combined for field in model.model_fields.values()]
-    counted = [each for each in own_fields if isinstance(each, type) and issubclass(each, AtLeastSpec)]
-    for model in [*counted, *combined]:
+    for model in (*selected, *combined, *over):
         model.model_rebuild(_types_namespace={_CONDITION: alias})
     return alias
 
 
+def _over_selections(
+    base: type[KeyedSpec], members: Members, combined: Sequence[type[KeyedSpec]]
+) -> list[type[KeyedSpec]]:
+    """`base` with each of the fields `all_of`, `any_of`, `at_least`: a condition with its selection."""
+    models = [*(_wrapped(SelectedSpec, name, spec, {}, selected=True) for name, spec in members), *combined]
+    one_of = _union("condition", models, common=tuple(SelectedSpec.model_fields))
+    specs = dict(members)
+    return [
+        _keyed(base, word, Annotated[one_of, BeforeValidator(spread(word, specs))], COMBINATIONS[word])
+        for word in SELECTING
+    ]
+
+
 def _expectations(members: Members, condition: object) -> object:
     """Union of conditions and combinations with their time, and of `always`, `never`, `eventually` over conditions."""
+    plain = [name for name in COMBINATIONS if name not in SELECTING]
     models = [_wrapped(ExpectationSpec, name, spec, {}) for name, spec in members]
-    models += [_combined(ExpectationSpec, name, condition) for name in COMBINATIONS]
+    models += [_combined(ExpectationSpec, name, condition) for name in plain]
+    models += _over_selections(ExpectationSpec, members, [_combined(SelectedSpec, name, condition) for name in plain])
     models += [_keyed(ExpectationSpec, name, condition, text) for name, text in QUANTIFIERS.items()]
     return _union("expectation", models, common=_EXPECTATION)
 
@@ -237,17 +253,7 @@ _CONDITION = "Condition"
 
 
 def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[KeyedSpec]:
-    """`base` with the field `all`, `any` (a list of conditions), `not`, ... (a condition), or `at_least`."""
-    if name == "at_least":
-        meet = (
-            condition,
-            Field(
-                description="The condition, with the selection in place of a body: "
-                "`meet: {inside: {object: 'ball[*]', of: tray}}`."
-            ),
-        )
-        counted = create_model("AtLeast", __base__=AtLeastSpec, __doc__=AtLeastSpec.__doc__, **{MEET: meet})  # type: ignore[call-overload]
-        return _keyed(base, name, counted, COMBINATIONS[name])
+    """`base` with the field `all`, `any` (a list of conditions), or `not`, `believed` (a condition)."""
     # `condition` is a type only at run time; type checkers cannot follow it.
     listed = Annotated[tuple[condition, ...], Field(min_length=1)]  # type: ignore[valid-type]
     return _keyed(base, name, condition if name in SINGLE else listed, COMBINATIONS[name])
@@ -271,10 +277,13 @@ def _tag(name: str) -> str:
     return f"<{name}>"
 
 
-def _wrapped(base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[str, object]) -> type[KeyedSpec]:
-    """`base` with the single field `name`, which holds the member's spec."""
+def _wrapped(
+    base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[str, object], *, selected: bool = False
+) -> type[KeyedSpec]:
+    """`base` with the single field `name`, which holds the member's spec; `selected`: its object may be left out."""
     empty = not any(field.is_required() for field in spec.model_fields.values())
-    default = BeforeValidator(_nothing_is_default, json_schema_input_type=spec | None if empty else spec)
+    written = written_as(spec) if selected else spec | None if empty else spec
+    default = BeforeValidator(_nothing_is_default, json_schema_input_type=written)
     return _keyed(base, name, Annotated[spec, default], about(spec), **fields)
 
 

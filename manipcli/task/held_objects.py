@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from manipcli.plan.steps.grasp import GraspSpec
+from manipcli.plan.steps.jointed_goal import HandleSpec
 from manipcli.plan.steps.lift import LiftSpec
 from manipcli.plan.steps.pick import PickSpec
 from manipcli.plan.steps.place_spec import PlaceSpec
@@ -114,6 +115,10 @@ def _refused(body: Model, scene: Scene, held: Holding, before: Sequence[Model]) 
             holds = "nothing" if other is None else f"'{other}'"
             hint = f"`pick` it first, or `grasp: {{object: {name}}}`"
             yield "object", NOT_HELD, f"'{name}' is not held: the hand holds {holds}", hint
+        case HandleSpec(object=name) if None not in held:
+            other = min(filter(None, held))
+            message = f"the hand cannot take '{name}': it holds '{other}'"
+            yield "object", HANDS_FULL, message, f"`place` '{other}' first"
         case PickSpec(object=name) | GraspSpec(object=str(name)) if None not in held:
             if held == {name}:
                 hint = "remove this step, or `place` the object first"

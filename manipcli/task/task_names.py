@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import InvalidInput
+from manipcli.description.packages import NotFound, Packages
+from manipcli.scene.body_files import read_urdf
+from manipcli.scene.jointed import jointed
 from manipcli.scene.scene import FACES, RIM, SEPARATOR
 from manipcli.scene.scene_names import RESERVED
+from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.spec.counted import flat_names
 from manipcli.spec.load import load_controllers, task_source
 from manipcli.spec.located import Source
 from manipcli.spec.names import NameKind
+from manipcli.spec.scene import BodySpec
 from manipcli.spec.schema_names import TaskNames
-from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
+from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child, plain
 from manipcli.spec.structure.ids import step_ids
 from manipcli.task.robot_file import read_robot
 from manipcli.task.task_files import finder
@@ -31,7 +36,8 @@ def task_names(path: Path, *, package_path: Sequence[Path] = (), allow_outside: 
     """
     find = finder(path, package_path=package_path, allow_outside=allow_outside)
     source, _ = task_source(path, model=task_spec(), find=find)
-    names = {**_of_scene(source), "step": _steps(source), "sensor": _keys(source, "sensors")}
+    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+    names = {**_of_scene(source, packages), "step": _steps(source), "sensor": _keys(source, "sensors")}
     robot_file = _named(source, path, "robot")
     args = None
     if robot_file is not None:
@@ -73,24 +79,50 @@ def _named(source: Source, path: Path, key: str) -> Path | None:
     return path.parent / node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else None
 
 
-def _of_scene(source: Source) -> dict[NameKind, set[str]]:
+def _of_scene(source: Source, packages: Packages) -> dict[NameKind, set[str]]:
     scene, frames = child(source.root, "scene"), child(source.root, "frames")
     bodies = flat_names(scene) if isinstance(scene, MappingNode) else {}
+    links, parts_of_files, joints = _of_files(bodies, packages)
     floor = child(source.root, "floor")
     ground = set() if isinstance(floor, ScalarNode) and floor.value is False else {"floor"}
-    frame = {"world", "base", "tool", *bodies, *ground}
+    frame = {"world", "base", "tool", *bodies, *ground, *links, *parts_of_files}
+    frame |= {f"{link}{SEPARATOR}{part}" for link in links for part in (*FACES, RIM)}
     frame |= {*frames.entries} if isinstance(frames, MappingNode) else set()
     for name, node in bodies.items():
         parts = child(node, "parts")
         own = parts.entries if isinstance(parts, MappingNode) else {}
         frame |= {f"{name}{SEPARATOR}{part}" for part in (*own, *FACES, RIM)}
     return {
-        "body": {*bodies, *ground},
-        "movable": {name for name, node in bodies.items() if not _is_true(child(node, "fixed"))},
-        "container": {name for name, node in bodies.items() if any(child(node, key) for key in HOLLOW)},
-        "part": {*bodies, *ground, "robot"},
+        "body": {*bodies, *ground, *links},
+        "movable": {*links, *(name for name, node in bodies.items() if not _is_true(child(node, "fixed")))},
+        "container": {*links, *(name for name, node in bodies.items() if any(child(node, key) for key in HOLLOW))},
+        "part": {*bodies, *ground, *links, "robot"},
+        "scene_joint": joints,
         "frame": frame - {*RESERVED} | (frame & {"world", "base", "tool", "floor"}),
     }
+
+
+def _of_files(bodies: Mapping[str, Node], packages: Packages) -> tuple[set[str], set[str], set[str]]:
+    """Links that joints move, parts and joints in the files of bodies; without files that cannot be read."""
+    found: tuple[set[str], set[str], set[str]] = (set(), set(), set())
+    for name, node in bodies.items():
+        urdf = child(node, "urdf")
+        if urdf is None:
+            continue
+        try:
+            spec = BodySpec.model_validate({"urdf": plain(urdf)})
+            assert spec.urdf is not None
+            made, _ = jointed(name, spec, read_urdf(spec.urdf, packages))
+        except (InvalidInput, NotFound, UnusableMesh, ValueError):  # reported by `check`
+            continue
+        more = (
+            {joint.child for joint in made.joints},
+            {frame.name for frame in made.frames},
+            {joint.name for joint in made.joints},
+        )
+        for names, own in zip(found, more, strict=True):
+            names |= own
+    return found
 
 
 def _keys(source: Source, key: str) -> set[str]:

@@ -40,6 +40,7 @@ def verb(file: Path) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_an_arm_with_a_hand_picks_and_places(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "--robot", "whole.urdf", "p", "--srdf", "whole.srdf"]) == 0
     out, err = capsys.readouterr()
@@ -56,6 +57,7 @@ def test_an_arm_with_a_hand_picks_and_places(folder: Path, capsys: pytest.Captur
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_in_threads")
 def test_an_arm_without_masses_and_limits_moves(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "--robot", "bare.urdf", "p"]) == 0
     out = capsys.readouterr().out

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from manipcli.conditions.clauses import condition_clause
 from manipcli.conditions.condition import CheckContext, World
@@ -71,13 +71,52 @@ INSIDE = {"inside": {"object": "ball[*]", "of": "tray"}}
 def test_the_margin_is_the_nth_greatest_and_its_sign_counts(n: int) -> None:
     x = np.random.default_rng(n).uniform(-0.3, 0.3, (50, COUNT))
     each = np.stack([margins({"inside": {"object": f"ball[{k}]", "of": "tray"}}, x) for k in range(COUNT)])
-    found = margins({"at_least": {"n": n, "meet": INSIDE}}, x)
+    found = margins({"at_least": {"n": n, **INSIDE}}, x)
     assert np.array_equal(found, np.sort(each, axis=0)[COUNT - n])
     assert np.array_equal(found >= 0.0, (each >= 0.0).sum(axis=0) >= n)
     if n == 1:
         assert np.array_equal(found, margins({"any_of": INSIDE}, x))
     if n == COUNT:
         assert np.array_equal(found, margins({"all_of": INSIDE}, x))
+
+
+@pytest.mark.parametrize(
+    ("short", "full"),
+    [
+        ({"inside": "tray"}, {"inside": {"object": "ball[*]", "of": "tray"}}),
+        ({"inside": {"of": "tray"}}, {"inside": {"object": "ball[*]", "of": "tray"}}),
+        ({"upright": 0.2}, {"upright": {"object": "ball[*]", "within": 0.2}}),
+        ({"at_rest": None}, {"at_rest": {"object": "ball[*]"}}),
+        ({"not": {"rests_on": "tray"}}, {"not": {"rests_on": {"object": "ball[*]", "of": "tray"}}}),
+        (
+            {"any": [{"inside": "tray"}, {"near": {"to": [0, 0, 0], "within": 0.1}}]},
+            {"any": [{"inside": {"object": "ball[*]", "of": "tray"}},
+                     {"near": {"object": "ball[*]", "to": [0, 0, 0], "within": 0.1}}]},
+        ),
+    ],
+)  # fmt: skip
+def test_of_is_the_object_of_the_condition(short: dict[str, Any], full: dict[str, Any]) -> None:
+    (found,), (wanted,) = spec({"any_of": {"of": "ball[*]", **short}}).members, spec({"any_of": full}).members
+    assert found.model_dump(exclude={"of"}) == wanted.model_dump(exclude={"of"})
+    again = spec({"any_of": found.model_dump(exclude_none=True, exclude_unset=True)})  # the log has it in full
+    assert again.members[0] == found
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ({"at_least": {"of": "ball[*]", "inside": "tray"}}, "`at_least` needs `n`"),
+        ({"all_of": {"n": 2, "of": "ball[*]", "inside": "tray"}}, "`all_of` takes no `n`"),
+        ({"all_of": {"of": "ball[*]", "inside": {"object": "ball[1]", "of": "tray"}}}, "both `of: 'ball[*]'` and"),
+        ({"all_of": {"of": "ball[*]", "energy": {"below": 1}}}, "`energy` has no `object`"),
+        ({"all_of": {"of": "ball[*]", "near": "tray"}}, "near"),
+        ({"all_of": {"of": "ball[*]"}}, "a condition needs a name"),
+        ({"all_of": {"of": "ball[*]", "inside": "tray", "at_rest": None}}, "not both"),
+    ],
+)
+def test_what_cannot_be_over_a_selection(written: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words.replace("[", r"\[").replace("*", r"\*")):
+        spec(written)
 
 
 def test_it_combines_as_any_other_condition() -> None:
@@ -111,18 +150,21 @@ def test_without_physics_the_first_body_says_why() -> None:
 
 
 def test_its_clause() -> None:
-    written = spec({"at_least": {"n": 5, "meet": INSIDE}})
+    written = spec({"at_least": {"n": 5, **INSIDE}})
     assert condition_clause(written, ROBOT, CONDITIONS) == "for at least 5 of 'ball[*]', 'ball[*]' is inside 'tray'"
 
 
 @pytest.mark.parametrize(
     ("written", "loc", "words"),
     [
-        ({"at_least": {"n": 8, "meet": INSIDE}}, ("at_least", "n"), "more than the 7 bodies of 'ball[*]'"),
+        ({"at_least": {"n": 8, **INSIDE}}, ("at_least", "n"), "more than the 7 bodies of 'ball[*]'"),
         ({"all_of": {"at_rest": {"object": "bal[*]"}}}, ("all_of",), "'bal[*]' selects no body"),
         ({"all_of": {"at_rest": {"object": "tray[*]"}}}, ("all_of",), "'tray' is one body"),
         ({"any_of": {"at_rest": {"object": "tray"}}}, ("any_of",), "names no selection"),
-        ({"any_of": {"all_of": INSIDE}}, ("any_of",), "`all_of` inside `any_of`"),
+        ({"any_of": {"not": {"all_of": INSIDE}}}, ("any_of",), "`all_of` inside `any_of`"),
+        ({"any_of": {"of": "bal[*]", "at_rest": None}}, ("any_of", "of"), "'bal[*]' selects no body"),
+        ({"any_of": {"of": "ball", "at_rest": None}}, ("any_of", "of"), "names no selection"),
+        ({"any_of": {"of": "ball[*]", "inside": "try"}}, ("any_of", "inside", "of"), "'try' is not"),
         ({"at_rest": {"object": "ball[*]"}}, ("at_rest", "object"), "'ball[*]' is 7 bodies, expected one"),
         ({"at_rest": {"object": "ball"}}, ("at_rest", "object"), "'ball' is 7 bodies, expected one"),
         ({"all_of": {"inside": {"object": "ball[*]", "of": "try"}}}, ("all_of", "inside", "of"), "'try' is not"),

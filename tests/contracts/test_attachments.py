@@ -10,8 +10,9 @@ import pytest
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.holding import Holding
 from manipcli.model.robot import RobotModel, Tool
+from manipcli.scene.joints import SceneJoint
 from manipcli.scene.scene import Body
-from manipcli.shapes.primitives import Box
+from manipcli.shapes.primitives import Box, Geometry
 from manipcli.simulate.engine import EngineMember
 from tests.contracts.test_engines import STEP, G, Opens, body, inertial, joint, opens, robot, run, scene, with_physics
 
@@ -106,3 +107,28 @@ def test_two_bodies_are_attached_at_once(member: EngineMember, opens: Opens) -> 
     run(engine, 400)
     engine.read()
     assert [float(np.linalg.norm(wrench[:3])) for wrench in wrenches] == pytest.approx([G, 2.0 * G], rel=1e-3)
+
+
+@with_physics
+def test_a_link_of_a_hinge_hangs_at_the_tool(member: EngineMember, opens: Opens) -> None:
+    """A lever on a level hinge, held by its end: the wrench has the moment of its weight about the hinge."""
+    post = replace(body("post", Box((0.02, 0.02, 0.02)), (0.7, -0.05, 1.0)), fixed=True, mass=0.0)
+    held = replace(brick(), name="post/lever", X_WO=Transform.of(xyz=(0.7, -0.05, 1.0), rpy=(0.2, 0.1, 0.7)))
+    held = replace(held, geometries=(Geometry(Transform.of(xyz=(-0.3, 0.1, 0.0)), Box((0.04, 0.04, 0.04))),))
+    held = replace(held, X_OI=Transform.of(xyz=(-0.2, 0.07, 0.02)))
+    X_PJ, axis_O = post.X_WO.inverse() @ held.X_WO, np.array([0.0, 1.0, 0.0])
+    hinge = SceneJoint("post/hinge", "revolute", "post", "post/lever", X_PJ, axis_O, -3.0, 3.0)
+    model = crane()
+    engine = opens(member, model, replace(scene(post, held), joints=(hinge,)), modes=("brake",))
+    wrench = engine.attach("post/lever")
+    run(engine, 400)
+    X_WO, _ = engine.body_state("post/lever")
+    np.testing.assert_allclose(X_WO.R, held.X_WO.R, atol=2e-4)
+    X_WT = Transform.of(xyz=(0.0, 0.0, 1.0)) @ X_LT
+    force, torque = X_WT.R @ wrench[:3], X_WT.R @ wrench[3:]
+    axis, centre = X_WO.R @ hinge.axis, X_WO.apply(held.X_OI.p)
+    moment = axis @ (torque + np.cross(X_WT.p - X_WO.p, force))
+    assert moment == pytest.approx(axis @ np.cross(centre - X_WO.p, [0.0, 0.0, 2.0 * G]), abs=5e-3)
+    engine.detach("post/lever")
+    run(engine, 100)
+    assert abs(hinge.position(post.X_WO, engine.body_state("post/lever")[0])) > 0.01

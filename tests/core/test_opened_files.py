@@ -27,11 +27,13 @@ for name, change in (("a", "longer"), ("c", "new"), ("b", None)):
     assert files.unchanged()
     (folder / name).write_text(change) if change is not None else (folder / name).unlink()
     assert not files.unchanged(), name
-(folder / "module.py").write_text("")
 sys.path.insert(0, str(folder))
 sys.dont_write_bytecode = False
-_, files = opened_by(lambda: __import__("module"))
-assert files.unchanged() and list(folder.glob("__pycache__/module*")), "its first import compiles it"
+for name, prefix, bytecode in (("module", None, folder / "__pycache__"), ("other", str(folder / "x"), folder / "x")):
+    sys.pycache_prefix = prefix
+    (folder / f"{name}.py").write_text("")
+    _, files = opened_by(lambda: __import__(name))
+    assert files.unchanged() and list(bytecode.rglob(f"{name}*")), "its first import compiles it"
 print("well")
 """
 """In its own process: an audit hook stays until the end of its process."""

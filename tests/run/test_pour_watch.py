@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +85,23 @@ def test_the_speed_at_the_rim_is_between_those_before_and_after_it(scene: Scene)
     watch.look(states(scene, [along(0.105)], (0.0, -0.4, 0.0))[0], [])
     watch.look(states(scene, [along(0.125)], (0.0, -0.8, 0.0))[0], [])
     assert watch.text().startswith(f"'ball' left the rim{OVER} at 0.50 m/s")
+
+
+def test_of_many_the_first_and_the_last_over_the_rim_are_reported(scene: Scene) -> None:
+    cup, ball = scene.body("cup"), scene.body("ball")
+    many = replace(scene, bodies=(cup, scene.body("mug"), *(replace(ball, name=f"ball[{k}]") for k in range(3))))
+    watch = PourWatch(many, "cup", "mug", [f"ball[{k}]" for k in range(3)])
+    assert watch.with_times("3 of 3") == "3 of 3"
+    leaves = (5.25, 4.5)  # of ball[0] and ball[1]; ball[2] stays
+    for time in np.arange(4.0, 6.0, 0.25):
+        state = WorldState.room(1, len(many.movable))
+        state.time[...] = time
+        names = [body.name for body in many.movable]
+        state.body_quat_xyzw[:] = [0.0, 0.0, 0.0, 1.0]
+        state.body_position[names.index("cup")], state.body_quat_xyzw[names.index("cup")] = CUP, TIP
+        for k in range(3):
+            out = k < 2 and time >= leaves[k]
+            state.body_position[names.index(f"ball[{k}]")] = along(0.14 if out else 0.08)
+        watch.look(state, [])
+    assert watch.with_times("2 of 3") == "2 of 3; first over the rim at 4.50 s, last at 5.25 s"
+    assert watch.with_times("") == "first over the rim at 4.50 s, last at 5.25 s"

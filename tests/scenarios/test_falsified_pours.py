@@ -15,7 +15,7 @@ POUR = f"""\
 task: pour
 robot: {ROOT}/robots/arm7_hand3/robot.yaml
 controllers: {ROOT}/controllers/arm7_hand3.yaml
-simulation: {{engine: mujoco}}
+simulation: {{engine: mujoco, control_period: 2 ms}}
 replan: false
 scene:
   desk: {{box: {{size: [0.6, 1.0, 0.4]}}, pose: {{xyz: [0.85, 0, 0.2]}}, fixed: true}}

@@ -45,7 +45,11 @@ def test_the_ball_is_poured_out(name: str, tmp_path: Path, call_cli: Any) -> Non
     (tmp_path / "controllers.yaml").write_text(f"controllers:\n{arm}{hand}", encoding="utf-8")
     task = (ROOT / "tasks" / "pour.yaml").read_text(encoding="utf-8").partition("  - place:")[0]
     task += "expect:\n  - inside: {object: ball, of: tray}\n  - tracking: {group: arm, within: 0.05 rad}\n"
-    task = task.replace("../robots", str(ROOT / "robots")).replace("../controllers/arm7_hand3.yaml", "controllers.yaml")
+    task = (
+        task.replace("control_period: 1 ms", "control_period: 2 ms")
+        .replace("../robots", str(ROOT / "robots"))
+        .replace("../controllers/arm7_hand3.yaml", "controllers.yaml")
+    )
     (tmp_path / "pour.yaml").write_text(task, encoding="utf-8")
     ran = call_cli("run", tmp_path / "pour.yaml", cwd=tmp_path)
     assert ran.code == 0, ran.out + ran.err

@@ -1,4 +1,4 @@
-"""`close`: take a drawer, a door or a lid by its handle and close it.
+"""`close`: push a drawer, a door or a lid closed at its handle, or take it by the handle.
 
 - close: {object: drawer}
 """
@@ -26,10 +26,9 @@ from manipcli.plan.steps.jointed_goal import (
 
 
 class CloseSpec(HandleSpec):
-    """Take a drawer, a door or a lid by its handle, move it along the path of its joint to where it is closed, let go,
-    and withdraw.
+    """Move a drawer, a door or a lid along the path of its joint to where it is closed, and withdraw.
 
-    What is in it or on it moves along. The step is done when the joint is within 5 mm or 3 deg of where it is closed.
+    The closed hand pushes the handle; where the arm cannot follow that path, it takes the handle. What is in it or on it moves along. The step is done when the joint is within 5 mm or 3 deg of where it is closed.
     """
 
     verb: ClassVar[str] = "close"
@@ -43,7 +42,8 @@ def candidates(spec: CloseSpec, planner: Planner, state: PlanningState) -> Candi
 
 
 def clause(spec: CloseSpec, robot: RobotModel) -> str:
-    return f"close {named(spec.object)}: {taking(spec)}"
+    pushing = f"push its part {named(spec.part)} with the closed hand along the path of the joint"
+    return f"close {named(spec.object)}: {pushing}; or, where the arm cannot follow, {taking(spec)}"
 
 
 MEMBER = StepMember(

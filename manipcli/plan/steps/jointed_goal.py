@@ -34,6 +34,8 @@ WITHIN: Final = {"m": 0.005, "rad": math.radians(3.0)}
 """Tolerance of the position that a step moves a joint to."""
 LABELS: Final = {"open": "pull", "close": "push", "turn": "turn"}
 """The phase of a step in which the joint moves."""
+PLACEHOLDER: Final = "world"
+"""The parent of a joint of a file with faults, of which only the name is known."""
 ROUNDING: Final = 1e-9
 
 
@@ -61,7 +63,7 @@ class HandleSpec(Model):
 def moved_joint(scene: Scene, name: str) -> SceneJoint | None:
     """The joint of a body with a single one, or of a link, by the name of the body; None: it has none, or several."""
     own = [joint for joint in scene.joints if joint.child == name] or [*joints_of(scene.joints, name)]
-    return own[0] if len(own) == 1 else None
+    return own[0] if len(own) == 1 and own[0].parent != PLACEHOLDER else None
 
 
 def handle_of(scene: Scene, joint: SceneJoint, part: str) -> Frame | None:
@@ -132,13 +134,15 @@ def _unmovable(spec: HandleSpec, scene: Scene) -> tuple[Problem, ...]:
     name = spec.object
     own = joints_of(scene.joints, name)
     joint = moved_joint(scene, name)
+    if any(each.parent == PLACEHOLDER for each in own):
+        return ()
     if joint is None and own:
         links = ", ".join(f"`{each.child}`" for each in own)
         message = f"'{name}' has {len(own)} joints; which is meant?"
-        return (Problem(("object",), message, f"name the link: {links}", code="TASK371"),)
+        return (Problem(("object",), message, f"name the link: {links}", code="TASK370"),)
     if joint is None:
         jointed = [joint.name.rpartition(SEPARATOR)[0] for joint in scene.joints]
-        known = list(dict.fromkeys([*jointed, *(joint.child for joint in scene.joints)]))
+        known = list(dict.fromkeys([*jointed, *(each.child for each in scene.joints if each.parent != PLACEHOLDER)]))
         if name not in [body.name for body in scene.bodies]:
             return (Problem(("object",), f"'{name}' is not in the scene", did_you_mean(name, known)),)
         hint = f"bodies with joints: {', '.join(known)}" if known else "a body from a `urdf` with joints has them"
@@ -155,7 +159,7 @@ def _fingerless(robot: RobotModel) -> tuple[Problem, ...]:
     if robot.holding is None:
         return ()
     message = f"robot '{robot.name}' holds by {robot.holding.kind}: it cannot take a handle"
-    return (Problem(("object",), message, "use a robot whose hand closes by its fingers", code="TASK374"),)
+    return (Problem(("object",), message, "use a robot whose hand closes by its fingers"),)
 
 
 def beyond(joint: SceneJoint, wanted: float, limit: float, key: str, verb: str) -> tuple[Problem, ...]:
@@ -179,7 +183,7 @@ def taking(spec: HandleSpec) -> str:
 def travel(scene: Scene | None, name: str, value: float) -> str:
     """A position of the joint of an object in its unit; without a scene, in the units that it may have."""
     joint = None if scene is None else moved_joint(scene, name)
-    return f"{value:.4g} rad or m" if joint is None else amount(value, joint.unit)
+    return f"{amount(value, 'rad')} or {amount(value, 'm')}" if joint is None else amount(value, joint.unit)
 
 
 def uncommanded(spec: HandleSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:

@@ -129,7 +129,7 @@ def press(builder: MotionBuilder, label: str, compliance: Compliance) -> None:
 def relax(builder: MotionBuilder, compliance: Compliance) -> None:
     """Give the force up: the tool goes back to where it pressed from."""
     with compliant(builder, replace(compliance, force=None)):
-        builder.dwell("back off", RELAX)
+        builder.dwell("back off", RELAX, awaits=False)
 
 
 def _plan(spec: PressSpec, planner: Planner, state: PlanningState) -> StepPlan:

@@ -74,13 +74,17 @@ def _plan(spec: SlideSpec, planner: Planner, state: PlanningState) -> StepPlan:
     corners = [X_WH.p + p - first for p in rest]
     lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise([X_WH.p, *corners])]
     radii = [min(ROUND, 0.4 * a, 0.4 * b) for a, b in pairwise(lengths)]
-    poses = blended(X_WH, list(zip(corners[:-1], radii, strict=True)), Transform.of(xyz=corners[-1], R=X_WH.R))
+    X_WE = Transform.of(xyz=corners[-1], R=X_WH.R)
     assert compliance.force is not None
     moving = replace(compliance, force=replace(compliance.force, hold=None))
     with compliant(builder, moving):
-        builder.along("slide", poses, speed=spec.velocity_scaling)
+        if radii:
+            vias = list(zip(corners[:-1], radii, strict=True))
+            builder.along("slide", blended(X_WH, vias, X_WE), speed=spec.velocity_scaling)
+        else:
+            builder.straight("slide", X_WE, speed=spec.velocity_scaling)
     relax(builder, moving)
-    builder.straight("withdraw", Transform.of(xyz=-AWAY * axis) @ poses[-1], speed=spec.velocity_scaling)
+    builder.straight("withdraw", Transform.of(xyz=-AWAY * axis) @ X_WE, speed=spec.velocity_scaling)
     return builder.plan()
 
 

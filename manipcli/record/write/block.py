@@ -37,6 +37,7 @@ from manipcli.record.write.rows import (
     Times,
     controller_state_template,
     joint_state_template,
+    scene_joints_template,
     sensor_template,
     tf_template,
 )
@@ -259,8 +260,7 @@ class Block:
         if topics.TF in ids:
             found.append(_Source(topics.TF, tf_template(ids[topics.TF], frames), self._frames))
         if topics.SCENE_JOINTS in ids:
-            names = [joint.name for joint in scene.joints]
-            template = joint_state_template(ids[topics.SCENE_JOINTS], names, effort=False, velocity=False)
+            template = scene_joints_template(ids[topics.SCENE_JOINTS], scene)
             found.append(_Source(topics.SCENE_JOINTS, template, partial(self._scene_joints, scene)))
         found += [*states, *readings, *plots]
         if self._actuators.names and topics.ACTUATOR_STATES in ids:
@@ -337,7 +337,6 @@ class Block:
         return [*links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
 
     def _scene_joints(self, scene: Scene, at: Ticks) -> list[Array]:
-        """(T, k) positions of the joints of the scene."""
         states = self._states.map(lambda a: a[at])
         return [np.stack([joint_positions(scene, states, joint) for joint in scene.joints], axis=-1)]
 

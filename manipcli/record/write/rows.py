@@ -21,6 +21,7 @@ from manipcli.core.geometry import Array
 from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.encode import encode
 from manipcli.record.records import MESSAGE, MESSAGE_HEAD
+from manipcli.scene.scene import Scene
 from manipcli.spec.controllers import Interface
 
 Times = npt.NDArray[np.int64]
@@ -49,6 +50,11 @@ class Template:
     stamps: tuple[int, ...]
     runs: tuple[tuple[int, int], ...]
     codes: tuple[str, ...] = ()
+
+
+def scene_joints_template(channel: int, scene: Scene) -> Template:
+    """sensor_msgs/JointState; run: the positions of the joints of the scene."""
+    return joint_state_template(channel, [joint.name for joint in scene.joints], effort=False, velocity=False)
 
 
 def joint_state_template(channel: int, joints: Sequence[str], *, effort: bool, velocity: bool = True) -> Template:

@@ -23,6 +23,7 @@ from manipcli.simulate.engines.mujoco_joints import MovedStates
 from manipcli.simulate.engines.mujoco_library import INSTALL, installed, library, version
 from manipcli.simulate.engines.mujoco_mimics import Mimics
 from manipcli.simulate.engines.mujoco_motors import Motors
+from manipcli.simulate.engines.mujoco_sleep import Sleep, enable_sleep
 from manipcli.simulate.engines.mujoco_world import build, contact_law
 from manipcli.simulate.engines.mujoco_wrench import WrenchSensors
 from manipcli.simulate.quiet import stdout_to_stderr
@@ -65,6 +66,8 @@ class MujocoEngine:
         with stdout_to_stderr():
             try:
                 built = build(mujoco, robot, scene, settings, contact_time=own.contact_time, impratio=own.impratio)
+                if settings.sleep:
+                    enable_sleep(mujoco, built.model)
                 data = mujoco.MjData(built.model)
             except (ValueError, mujoco.FatalError) as error:
                 raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
@@ -86,13 +89,17 @@ class MujocoEngine:
             self._velocity[:] = settings.velocity
         if settings.twists is not None:
             self._bodies.move(settings.twists)
-        self._motors = Motors(model, data, robot, settings.step)
+        self._motors = Motors(model, data, robot, settings.step, islands=settings.sleep)
         self._contacts = Contacts(model, data, built.parts)
         self._wrenches = WrenchSensors(mujoco, model, data, built.links, settings.step)
         self._attachments = Attachments(mujoco, model, data, robot, scene, built.links)
         self._warnings = data.warning.number
         self._calm = self._warnings.tobytes()
         self._mimics = Mimics(data, robot)
+        self._sleep = None
+        if settings.sleep:
+            trees = [int(model.body_treeid[built.bodies[body.name]]) for body in scene.movable]
+            self._sleep = Sleep(mujoco, model, data, scene, trees, self._period)
 
     def read(self, *, velocities: bool = True) -> WorldState:
         state = self._state
@@ -104,6 +111,8 @@ class MujocoEngine:
             self._wrenches.measure()
         if self._attachments:
             self._attachments.measure()
+        elif self._sleep is not None and self._sleep.due:
+            self._sleep.look(state, self._contacts.peek())
         return state
 
     def write(self, command: JointCommand) -> None:
@@ -113,16 +122,23 @@ class MujocoEngine:
         return self._wrenches.add(self._robot.joint(joint).child)
 
     def attach(self, body: str) -> Array:
+        self._wake()
         return self._attachments.attach(body)
 
     def detach(self, body: str) -> None:
+        self._wake()
         self._attachments.detach(body)
 
     def body_state(self, body: str) -> tuple[Transform, Array]:
         return self._bodies.state_of(body)
 
     def place(self, body: str, X_WO: Transform, twist: Array) -> None:
+        self._wake()
         self._bodies.place(body, X_WO, twist)
+
+    def _wake(self) -> None:
+        if self._sleep is not None:
+            self._sleep.wake()
 
     def advance(self) -> None:
         model, data, motors = self._model, self._data, self._motors
@@ -139,6 +155,8 @@ class MujocoEngine:
                 if self._mimics:
                     self._mimics.follow()
         self._ticks += 1
+        if self._sleep is not None:
+            self._sleep.ticked()
         if self._warnings.tobytes() != self._calm:
             self._fail()
 
@@ -155,7 +173,8 @@ class MujocoEngine:
         return self._contacts.changed()
 
     def contacts(self, *, peek: bool = False) -> tuple[Contact, ...]:
-        return self._contacts.peek() if peek else self._contacts.now()
+        found = self._contacts.peek() if peek else self._contacts.now()
+        return found if self._sleep is None else self._sleep.with_kept(found)
 
     def close(self) -> None:
         """Memory is freed with the object."""

@@ -40,6 +40,7 @@ class Attachments:
         self._mujoco, self._model, self._data = mujoco, model, data
         names = [body.name for body in scene.movable] if robot.holding is not None else []
         self._welds = {name: model.neq - len(names) + k for k, name in enumerate(names)}
+        self._moved = {joint.child for joint in scene.joints}
         self._attached: dict[str, Array] = {}
         if robot.tool is not None:
             self._link, self._X_LT = links[robot.tool.link], robot.tool.X_LT
@@ -75,12 +76,20 @@ class Attachments:
             weld = self._welds[name]
             body = model.eq_obj2id[weld]
             force = np.where(equality & (data.efc_id[:count] == weld), data.efc_force[:count], 0.0)
-            generalised = np.zeros(model.nv)
-            mujoco.mj_mulJacTVec(model, data, generalised, force)
-            at = model.body_dofadr[body]
-            # Of a free joint: the force along the axes of the world, the torque about its centre along those of O.
-            f, R_WO = generalised[at : at + 3], data.xmat[body].reshape(3, 3)
-            t = R_WO @ generalised[at + 3 : at + 6] + np.cross(data.xpos[body] - X_WT.p, f)
+            R_WO = data.xmat[body].reshape(3, 3)
+            if name in self._moved:
+                # Rows of a weld, on the tool: forces in the world at the tool, halves of torques along the axes of O.
+                rows = np.zeros(6)  # before the first step there are none
+                mine = force[equality & (data.efc_id[:count] == weld)]
+                rows[: len(mine)] = mine
+                f, t = -rows[:3], -0.5 * R_WO @ rows[3:]
+            else:
+                generalised = np.zeros(model.nv)
+                mujoco.mj_mulJacTVec(model, data, generalised, force)
+                at = model.body_dofadr[body]
+                # Of a free joint: the force along the axes of the world, the torque about its centre along those of O.
+                f = generalised[at : at + 3]
+                t = R_WO @ generalised[at + 3 : at + 6] + np.cross(data.xpos[body] - X_WT.p, f)
             wrench[:3], wrench[3:] = X_WT.R.T @ f, X_WT.R.T @ t
 
     def _pose(self, body: int) -> Transform:

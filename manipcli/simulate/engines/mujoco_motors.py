@@ -35,18 +35,19 @@ class Motors:
         model, data: of MuJoCo; the joints are the first n degrees of freedom.
         robot: the robot.
         step: [s] of the physics.
+        islands: whether the solver takes islands of bodies one by one, with copies of the compliance of constraints.
 
     Attributes:
         active: whether any joint has a motor or mimics another one, so that `push` is needed.
     """
 
-    def __init__(self, model: Any, data: Any, robot: RobotModel, step: float) -> None:
+    def __init__(self, model: Any, data: Any, robot: RobotModel, step: float, *, islands: bool = False) -> None:
         n = len(robot.joint_names)
         self._data = data
         self._position, self._velocity = data.qpos[:n], data.qvel[:n]
         self._torques: Array = data.qfrc_applied[:n]
         self._friction: Array = model.dof_frictionloss[:n]
-        self._step = step
+        self._step, self._islands = step, islands
         self._gain = -math.expm1(-step / POSITION_TIME) / step
         self._limits = np.clip(motor_effort_limits(robot), LEAST_EFFORT, UNLIMITED_EFFORT)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
@@ -101,6 +102,9 @@ class Motors:
         end = rows + len(self._driven)
         data.efc_R[:end] *= compliance[:end]
         data.efc_D[:end] /= compliance[:end]
+        if self._islands and data.nisland:
+            copy = data.map_efc2iefc[:end]
+            data.iefc_R[copy], data.iefc_D[copy] = data.efc_R[:end], data.efc_D[:end]
         if end > rows:
             speed = self._target_speed
             if self._by_position.any():

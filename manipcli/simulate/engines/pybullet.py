@@ -33,9 +33,11 @@ from manipcli.simulate.engines.pybullet_joints import BASE, JointedThings, Place
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
+from manipcli.simulate.engines.pybullet_sleep import Sleep
 from manipcli.simulate.engines.pybullet_solver import iterations
 from manipcli.simulate.engines.pybullet_world import add_body, centre, close_loops, collide_only, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
+from manipcli.simulate.engines.resting import Resting
 from manipcli.simulate.engines.vectors import Vector, cross, minus, rotated
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 from manipcli.spec.base import Model
@@ -108,6 +110,15 @@ class PybulletEngine:
         self._watch = ContactWatch(self._robot)
         self._points: tuple[BulletPoint, ...] | None = None
         self._substeps = settings.substeps
+        self._sleep = self._sleeping(scene, settings) if settings.sleep else None
+
+    def _sleeping(self, scene: Scene, settings: EngineSettings) -> Sleep:
+        resting = Resting(scene, settings.step * settings.substeps)
+        bodies = {row: place[0] for row, place in enumerate(self._movable) if row not in resting.never}
+        fixed = [
+            self._places[body.name].body for body in scene.bodies if body.fixed and body.name not in resting.jointed
+        ]
+        return Sleep(self._p, self._client, resting, bodies, fixed)
 
     def _load_robot(self, robot: RobotModel, scene: Scene, settings: EngineSettings, folder: Path) -> None:
         p, client = self._p, self._client
@@ -222,6 +233,8 @@ class PybulletEngine:
         pulls = self._attachments.measure() if self._attachments else ()
         if self._wrenches:
             self._wrenches.measure(state.numbers[: 2 * len(self._joints)], self._contact_points, pulls)
+        if self._sleep is not None and self._sleep.due and not self._attachments:
+            self._sleep.look(state, self._contact_points())
         return state
 
     def write(self, command: JointCommand) -> None:
@@ -231,9 +244,11 @@ class PybulletEngine:
         return self._wrenches.add(self._model.joint(joint).child)
 
     def attach(self, body: str) -> Array:
+        self._wake()
         return self._attachments.attach(body)
 
     def detach(self, body: str) -> None:
+        self._wake()
         self._attachments.detach(body)
 
     def body_state(self, body: str) -> tuple[Transform, Array]:
@@ -248,6 +263,7 @@ class PybulletEngine:
 
     def place(self, body: str, X_WO: Transform, twist: Array) -> None:
         p, client, row = self._p, self._client, self._rows[body]
+        self._wake()
         if self._places[body].link != BASE:
             k, joint = self._scene.mover(body)
             self._things.set(k, *joint_state(self._scene, joint, self.body_state, X_WO, twist))
@@ -260,6 +276,10 @@ class PybulletEngine:
         p.resetBasePositionAndOrientation(k, position.tolist(), quat, physicsClientId=client)
         self._move_body(row, twist.tolist())
 
+    def _wake(self) -> None:
+        if self._sleep is not None:
+            self._sleep.wake()
+
     def advance(self) -> None:
         last = self._substeps - 1
         for k in range(self._substeps):
@@ -271,6 +291,8 @@ class PybulletEngine:
             self._p.stepSimulation(self._client)
             self._wrenches.moved()
         self._points = None
+        if self._sleep is not None:
+            self._sleep.ticked()
 
     def touches_changed(self) -> bool:
         return self._watch.changed(self._contact_points())
