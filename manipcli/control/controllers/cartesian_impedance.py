@@ -193,14 +193,13 @@ class CartesianImpedanceController:
         self._singular = SINGULAR**2 * np.eye(6)
         self.output = ControllerOutput.of(len(self.joints), 1, speed=self._follower.output.speed)
         self._error = self._stretch = np.zeros(6)
-        self.tool: Array = np.full(3, np.nan)  # in the world, at the last update
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))
-        self._updates = 0
+        self._updates, self._time = 0, 0.0
         self._pose: Transform | None = None
         self._held: Array | None = None
         self._shift: Array | None = None  # (3,) of the reference along its axes [m]
-        self._time = 0.0
+        self.tool: Array = np.full(3, np.nan)  # in the world, at the last update
 
     def _six(self, what: str, values: npt.ArrayLike) -> Array:
         given = np.array(values, dtype=np.float64)
@@ -281,15 +280,13 @@ class CartesianImpedanceController:
         else:
             R_WR, p_WR = self._pose.R, self._pose.p
         q[self._columns] = measured.position
-        R_WT, p_WT, jacobian = kinematics.pose_and_jacobian(q, self._link, self._offset)
-        J = jacobian[:, self._columns]
-        self.tool = p_WT
+        R_WT, self.tool, J = kinematics.pose_and_jacobian(q, self._link, self._offset)
+        J = J[:, self._columns]
         error, slip = self._error, output.velocity - measured.velocity
-        error[:3] = p_WR - p_WT
+        error[:3] = p_WR - self.tool
         if self._force is not None:
             error[:3] += self._force.update(period) * (R_WR @ self._force.axis)
-        if self._shift is not None:
-            error[:3] += R_WR @ self._shift
+        error[:3] += 0.0 if self._shift is None else R_WR @ self._shift
         error[3:] = rotation_vector(R_WR @ R_WT.T)
         along = error
         if self._turns:
