@@ -16,7 +16,7 @@ Hogan, Impedance control (1985); Seraji, Adaptive admittance control (1994).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, Protocol, TypeGuard
 
 import numpy as np
@@ -44,6 +44,8 @@ class Compliant(Controller, Protocol):
 
     tool: Array
     """(3,) [m] the origin of the compliant frame in the world, at the last update."""
+    replaces: tuple[str, ...]
+    """The controllers that were deactivated for it, and are activated again after it."""
 
     @property
     def pressing(self) -> PressingReference | None:
@@ -63,6 +65,11 @@ class Compliant(Controller, Protocol):
 def complies(controller: Controller) -> TypeGuard[Compliant]:
     """Whether it is a compliant controller of an arm."""
     return isinstance(controller, ImpedanceArm | AdmittanceArm)
+
+
+def replaced(controllers: Iterable[Controller]) -> tuple[str, ...]:
+    """The controllers that a compliant one has replaced, and that return before the next motion without compliance."""
+    return tuple(name for own in controllers if complies(own) for name in own.replaces)
 
 
 class ImpedanceArm(CartesianImpedanceController):
@@ -87,6 +94,7 @@ class ImpedanceArm(CartesianImpedanceController):
             types=[joint.type for joint in described], compat=context.compat, stop_planner=context.stop_planner,
         )  # fmt: skip
         self._tool = offset
+        self.replaces: tuple[str, ...] = ()
         self._shift = self._law.value
 
     @property
@@ -136,6 +144,7 @@ class AdmittanceArm(JointTrajectoryController):
         self._displaced = np.zeros(len(self.joints))
         self._x, self._rate = np.zeros((2, 6))
         self.tool: Array = np.full(3, np.nan)
+        self.replaces: tuple[str, ...] = ()
 
     @property
     def pressing(self) -> PressingReference | None:

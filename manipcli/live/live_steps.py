@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
+from manipcli.control.compliant_arm import complies, replaced
 from manipcli.control.roles import is_follower
 from manipcli.core.errors import InvalidInput, NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
@@ -21,6 +22,7 @@ from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Observer, Progress
 from manipcli.run.step_loop import StepLoop
 from manipcli.simulate.session import Session
+from manipcli.task.felt import felt
 from manipcli.task.lone_step import lone_plan, lone_step
 from manipcli.task.plan_steps import PlannedStep
 from manipcli.task.plan_task import Plan
@@ -180,18 +182,26 @@ class LiveSteps:
             findings = [f"{finding}; {finding.hint}" if finding.hint else str(finding) for finding in invalid.findings]
             return StepRequest("", None, end=StepEnd("invalid", "\n".join(findings)))
         request = StepRequest("", task)
-        if self._doing:
+        if uncompliant := self._uncompliant(task):
+            request.end = StepEnd("invalid", uncompliant)
+        elif self._doing:
             request.end = StepEnd("rejected", f"{self._doing} is running; cancel it, or wait for its result")
         elif moving := self._moving:
             request.end = StepEnd("rejected", f"controller '{moving}' moves; cancel its goal, or wait for its result")
         return request
 
+    def _uncompliant(self, task: Task) -> str:
+        """Why the arm cannot comply in the step of a task; "" where it can, or need not."""
+        if not felt(task.spec) or self._session.engine.ideal or any(complies(own) for own in self._session.manager.controllers):
+            return ""
+        return "the arm has no compliant controller, as no step of the session's task is compliant; add one to it"
+
     @property
     def _claims(self) -> Claims:
-        """The controllers as they are now."""
-        claims = Claims.of(self._task.controllers)
-        every = [claim.name for claim in claims.controllers]
-        return claims.switched([name for name in every if self._session.manager.is_active(name)], every)
+        """The controllers as they are now; those that a compliant one replaces return before the next motion."""
+        claims, manager = Claims.of(self._task.controllers), self._session.manager
+        every, returning = [claim.name for claim in claims.controllers], replaced(manager.controllers)
+        return claims.switched([name for name in every if manager.is_active(name) or name in returning], every)
 
     @property
     def _moving(self) -> str:

@@ -9,6 +9,7 @@ executor switches the arm to its compliant controller before such a motion, and 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -61,12 +62,14 @@ class Beyond:
         normal: (3,) unit vector in the world.
         offset: [m] the plane is n . p = offset.
         drop: [m] it also ends when the origin is this far beyond its mean of the last second; None: it does not.
+        most: [N] it also ends, before the plane, when the tool is felt to press with more than this.
         otherwise: why the step has failed if the motion ends before the plane; "": that is no failure.
     """
 
     normal: Array
     offset: float
     drop: float | None = None
+    most: float = math.inf
     otherwise: str = ""
 
 
@@ -123,5 +126,7 @@ class Complying(Protocol):
 def compliant(builder: Complying, compliance: Compliance) -> Iterator[None]:
     """Make the motions that are added inside compliant."""
     before, builder.compliance = builder.compliance, compliance
-    yield
-    builder.compliance = before
+    try:
+        yield
+    finally:
+        builder.compliance = before

@@ -39,7 +39,6 @@ class ComplianceSwitch:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._owners: tuple[str, ...] = ()
         self._mean, self._passed = math.nan, False
 
     @property
@@ -72,7 +71,8 @@ class ComplianceSwitch:
         return "" if own is None else own.missed
 
     def passed(self, motion: Motion) -> bool:
-        """Whether the motion is over because the tool is beyond its plane, or dropped; asked at every tick."""
+        """Whether the motion is over because the tool is beyond its plane, dropped, or feels too much; asked at every
+        tick."""
         until, arm = None if motion.compliance is None else motion.compliance.until, self._arm
         if until is None or arm is None:
             return False
@@ -81,7 +81,7 @@ class ComplianceSwitch:
             self._mean = along
         self._mean += (along - self._mean) * min(1.0, self._session.period / MEAN)
         self._passed = along >= until.offset or (until.drop is not None and along - self._mean >= until.drop)
-        return self._passed
+        return self._passed or float(np.linalg.norm(arm.felt[:3])) > until.most
 
     @property
     def felt(self) -> str:
@@ -112,21 +112,21 @@ class ComplianceSwitch:
         if self._session.engine.ideal:
             return trajectory  # without physics nothing yields
         if motion.compliance is None:
-            if arm is None or not self._owners or (trajectory is None and motion.switch is None):
+            if arm is None or not arm.replaces or (trajectory is None and motion.switch is None):
                 return trajectory
             if not self._manager.is_active(arm.name):  # a step has switched
-                self._owners = ()
+                arm.replaces = ()
                 return trajectory
             if trajectory is not None and not set(trajectory.names) & set(arm.joints):
                 return trajectory
-            self._switch(self._owners)
-            self._owners = ()
+            self._switch(arm.replaces)
+            arm.replaces = ()
             return self._joined(trajectory, arm, self._session.state.position)
         if arm is None:
             raise InvalidArgument("CTRL152", f"no compliant controller moves the arm for the motion '{motion.label}'")
         fresh = not self._manager.is_active(arm.name)
         if fresh:
-            self._owners = self._switch((arm.name,))
+            arm.replaces = self._switch((arm.name,))
         if motion.compliance.here:
             arm.deactivate(self._session.time)
         arm.comply(motion.compliance)

@@ -15,6 +15,7 @@ from manipcli.spec.load import load_step_text
 from manipcli.spec.located import Located
 from manipcli.spec.source.tree import child, node_at
 from manipcli.task.consistency import not_there
+from manipcli.task.felt import felt
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 from manipcli.task.vocabulary import task_spec
@@ -49,7 +50,7 @@ def lone_step(text: str, task: Task, number: int, claims: Claims) -> Task:
         name = step.verb if child(node, "id") is None else step.id
         changed = {"steps": steps, "blocks": (), "replan": task.spec.replan or True}
         alone = Located(task.spec.model_copy(update={**changed, "expect": (), "watch": ()}), file.source)
-        sensors = sensed_by_name(task.sensors, task.robot, task.scene)
+        sensors = {**felt(task.spec), **sensed_by_name(task.sensors, task.robot, task.scene)}
         errors = [
             each for each in not_there(alone, task.robot, task.scene, sensors, claims) if each.severity == "error"
         ]

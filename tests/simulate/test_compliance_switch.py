@@ -1,5 +1,6 @@
 """Controllers change without a step: trajectories begin where the arm is, and end as planned."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,8 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from manipcli.control.compliant_arm import complies
-from manipcli.plan.compliance import Compliance
+from manipcli.control.compliant_arm import complies, replaced
+from manipcli.core.errors import NotPlannable
+from manipcli.live.interfaces.controller_manager import list_controllers
+from manipcli.plan.compliance import Beyond, Compliance, compliant
 from manipcli.plan.motion import Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.run.execute import build_manager
@@ -59,6 +62,45 @@ def test_the_arm_is_switched_for_a_compliant_motion_and_back_for_the_next(sessio
     assert "arm_controller_compliant" in active(session)
     switch.before(planned(start))
     assert active(session) == before
+
+
+def test_another_executor_of_the_session_also_switches_back(session):
+    """A step of a client after one of the task; what it may plan with is what returns."""
+    start, before = session.state.position[list(session.robot.indices(ARM))], active(session)
+    ComplianceSwitch(session).before(planned(start, compliance=Compliance.of()))
+    assert replaced(session.manager.controllers) == ("arm_controller",)
+    ComplianceSwitch(session).before(planned(start))
+    assert active(session) == before
+    assert replaced(session.manager.controllers) == ()
+
+
+def test_the_controllers_of_compliant_steps_are_listed_to_clients(session):
+    robot = SimpleNamespace(manager=session.manager, task=task())
+    listed = list_controllers(robot, None, {})["controller"]
+    types = {one["name"]: one["type"] for one in listed}
+    assert types["felt_force"] == "manipcli/felt_force"
+    assert types["arm_controller_compliant"] == "manipcli/compliant_arm"
+
+
+def test_a_motion_ends_when_more_is_felt_than_it_may_press_with(session):
+    """It has then failed for the reason that it gives."""
+    switch, (arm,) = ComplianceSwitch(session), [own for own in session.manager.controllers if complies(own)]
+    until = Beyond(np.array([0.0, 0.0, 1.0]), 100.0, most=20.0, otherwise="it is stuck")
+    motion = Motion("push", None, None, 1.0, compliance=replace(Compliance.of(), until=until))
+    switch.before(motion)
+    session.manager.update(0.0, session.state)
+    arm.felt[:3] = 0.0, 12.0, 15.0
+    assert not switch.passed(motion)
+    arm.felt[:3] = 0.0, 12.0, 17.0  # 20.8 N
+    assert switch.passed(motion)
+    assert switch.result(motion) == ("", "it is stuck")
+
+
+def test_a_refused_plan_leaves_its_builder_as_it_was():
+    builder = SimpleNamespace(compliance=None)
+    with pytest.raises(NotPlannable), compliant(builder, Compliance.of()):
+        raise NotPlannable("out of reach")
+    assert builder.compliance is None
 
 
 def test_a_trajectory_begins_where_the_arm_is_and_joins_its_plan(session):

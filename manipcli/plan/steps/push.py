@@ -147,9 +147,9 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
         builder.straight("approach", _moved(X_WA, near, axis), speed=spec.velocity_scaling)
         slack = spec.force / STEADY
         stuck = f"'{spec.object}' did not go {readable(distance, 'm')}: it needs more than {readable(spec.force, 'N')}"
-        beyond = Beyond(frozen(axis), float(axis @ X_WA.p) + end, otherwise=stuck)
-        X_TC = X_WA.inverse() @ Transform.of(xyz=X_WA.p, R=np.column_stack([axis, side, UP]))
-        law = Compliance.of(along=STEADY, across=FIRM, axis="x", X_TC=replace(X_TC, p=frozen(np.zeros(3))))
+        beyond = Beyond(frozen(axis), float(axis @ X_WA.p) + end, most=spec.force, otherwise=stuck)
+        X_TC = Transform.of(R=X_WA.R.T @ np.column_stack([axis, side, UP]))
+        law = Compliance.of(along=STEADY, across=FIRM, axis="x", X_TC=X_TC)
         allowed = planner.hand_contacts(spec.object)
         with compliant(builder, replace(law, until=beyond)):
             builder.straight(
