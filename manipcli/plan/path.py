@@ -7,6 +7,7 @@ the arm stays on one branch of its inverse kinematics.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -21,6 +22,7 @@ from manipcli.plan.inverse_kinematics import ANGLE_TOLERANCE, InverseKinematics
 from manipcli.plan.pose_error import rotation_vector
 
 LINEAR_STEP = 0.005  # m between two points of a straight line
+LONGEST = 100.0  # m of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
 _STARTS = 4  # further configurations from which the end of a line is tried
@@ -44,12 +46,17 @@ def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
 
     Args:
         X_WA, X_WB: first and last pose; neighbours between them differ by at most `LINEAR_STEP` and `ANGULAR_STEP`.
+
+    Raises:
+        NotPlannable: it is longer than `LONGEST`.
     """
     distance = X_WB.p - X_WA.p
     rotation = rotation_vector(X_WA.R.T @ X_WB.R)
     whole = float(np.linalg.norm(rotation))
     axis = rotation / whole if whole > 1e-12 else np.array([0.0, 0.0, 1.0])
-    steps = max(float(np.linalg.norm(distance)) / LINEAR_STEP, whole / ANGULAR_STEP)
+    steps = max(math.hypot(*distance) / LINEAR_STEP, whole / ANGULAR_STEP)
+    if not steps < LONGEST / LINEAR_STEP:
+        raise NotPlannable(f"the straight line is {math.hypot(*distance):.3g} m long", hint=f"at most {LONGEST:g} m")
     count = max(1, int(np.ceil(steps - 1e-9)))
     between = [
         Transform(

@@ -81,7 +81,9 @@ def _sound(amount: float | str) -> float | str:
     try:
         portion = portion_of(amount)
     except UnitError as error:
-        raise problem("unit", f"{error.cause}; expected {EXPECTED}", hint="write `amount: 50 %`") from None
+        raise problem(
+            "unit", f"{error.cause.partition('; expected')[0]}; expected {EXPECTED}", hint="write `amount: 50 %`"
+        ) from None
     if portion.value <= 0.0:
         raise problem("range", f"must be above 0, not {portion.text}", hint="remove the step to pour nothing")
     if portion.unit == "share" and portion.value > 1.0:

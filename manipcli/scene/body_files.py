@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,10 @@ from manipcli.shapes.mesh import SUFFIXES
 from manipcli.shapes.primitives import Geometry, Mesh, Rgba
 from manipcli.shapes.proximity import coal_shape
 from manipcli.spec.scene import MeshCollision, MeshSpec, UrdfSpec
+
+MOST_LINKS: Final = 100
+HELD: Final = "use revolute, continuous, prismatic and fixed joints"
+"""Hint for a joint with several degrees of freedom."""
 
 
 def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
@@ -88,11 +93,21 @@ def read_urdf(spec: UrdfSpec, packages: Packages) -> Parts:
     Raises:
         NotFound: the file does not exist.
         InvalidInput: the file has errors, each with its place.
+        ValueError: it has more links than an engine can take.
     """
     path = packages.resolve(spec.file, anywhere=True)
     parts = read_parts(read_description(path, packages=packages.below(path), arguments=spec.args))
     if parts.errors:
         raise InvalidInput(parts.errors)
+    held = [
+        replace(each, severity="error", message=each.message.partition(":")[0], hint=HELD)
+        for each in parts.findings
+        if each.code == "URDF065"
+    ]
+    if held:
+        raise InvalidInput(held)
+    if len(parts.links) > MOST_LINKS:
+        raise ValueError(f"'{spec.file}' has {len(parts.links)} links, expected at most {MOST_LINKS}")
     return parts
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
@@ -181,7 +182,8 @@ class _Builder:
         except UnusableMesh as error:
             self._error("TASK222", f"body '{name}': its mesh {error.reason}", (*loc, kind, "file"), error.hint)
         except InvalidInput as error:
-            self.findings.extend(error.findings)
+            at = self.place((*loc, kind, "args"))  # a file that takes no arguments
+            self.findings.extend(each if each.place else replace(each, place=at) for each in error.findings)
         except ValueError as error:
             self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
 

@@ -95,8 +95,10 @@ class UrdfSpec(Model):
 class SpringSpec(Model):
     """A spring in a joint: its effort is -`stiffness` (position - `rest`)."""
 
-    stiffness: Annotated[JointStiffness, Field(ge=0)] = Field(description="[N m/rad or N/m], 0 or more.")
-    rest: JointValue = Field(0.0, description="Position at which it is relaxed [rad or m]. Default 0.")
+    stiffness: Annotated[JointStiffness, Field(ge=0, le=1e6)] = Field(description="[N m/rad or N/m], 0 to 1e6.")
+    rest: Annotated[JointValue, Field(ge=-1e3, le=1e3)] = Field(
+        0.0, description="Position at which it is relaxed [rad or m]. Default 0."
+    )
 
 
 class SceneJointSpec(Model):
@@ -105,11 +107,11 @@ class SceneJointSpec(Model):
     start: JointValue | None = Field(
         None, description="Position at the start [rad or m]. Default: 0, or the limit nearest to it."
     )
-    damping: Annotated[JointDamping, Field(ge=0)] | None = Field(
-        None, description="Viscous damping [N m s/rad or N s/m], 0 or more. Default: that of the file."
+    damping: Annotated[JointDamping, Field(ge=0, le=1e6)] | None = Field(
+        None, description="Viscous damping [N m s/rad or N s/m], 0 to 1e6. Default: that of the file."
     )
-    friction: Annotated[JointEffort, Field(ge=0)] | None = Field(
-        None, description="Dry friction [N m or N], 0 or more. Default: that of the file."
+    friction: Annotated[JointEffort, Field(ge=0, le=1e6)] | None = Field(
+        None, description="Dry friction [N m or N], 0 to 1e6. Default: that of the file."
     )
     spring: SpringSpec | None = Field(None, description="A spring. Default: none.")
     closed: JointValue | None = Field(

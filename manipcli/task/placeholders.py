@@ -6,9 +6,10 @@ Nothing is planned or simulated with them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+from pydantic import BaseModel
 
 from manipcli.conditions.touch import ROBOT
 from manipcli.core.geometry import Transform, frozen
@@ -27,7 +28,7 @@ def named_scene(spec: TaskSpec) -> Scene:
     box, scene = Box((1.0, 1.0, 1.0)), flat_scene(spec.scene)
     inner = [  # what may be a link, a part or a joint of a body from a file
         word
-        for word in dict.fromkeys(_words(spec.model_dump(serialize_as_any=True)))
+        for word in dict.fromkeys(_words(spec))
         if (own := scene.get(word.partition(SEPARATOR)[0])) is not None and own.urdf is not None and SEPARATOR in word
     ]
     origin = Transform.identity()
@@ -52,7 +53,7 @@ def named_scene(spec: TaskSpec) -> Scene:
 def named_robot(spec: TaskSpec) -> RobotModel:
     """A robot that accepts every name: each word of the task is a pose, a group, a joint and a link, so that only
     errors with any robot are reported."""
-    words = tuple(dict.fromkeys(_words(spec.model_dump(serialize_as_any=True))))
+    words = tuple(dict.fromkeys(_words(spec)))
     links = dict.fromkeys(name for word in words for name in (word, word.removeprefix(f"{ROBOT}/")))
     limits = JointLimits(lower=-np.inf, upper=np.inf, velocity=np.inf, effort=np.inf)
     axis, origin = frozen([0.0, 0.0, 1.0]), Transform.identity()
@@ -68,7 +69,9 @@ def named_robot(spec: TaskSpec) -> RobotModel:
 def _words(data: object) -> Iterator[str]:
     if isinstance(data, str):
         yield data
-    elif isinstance(data, dict):
+    elif isinstance(data, BaseModel):  # a part of a file may have no serializer
+        yield from _words(data.__dict__)
+    elif isinstance(data, Mapping):
         for key, value in data.items():
             yield str(key)
             yield from _words(value)

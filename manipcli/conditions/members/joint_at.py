@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from pydantic import Field, model_validator
@@ -127,8 +128,21 @@ def monitor_opened(spec: OpenedSpec | ClosedSpec, world: World) -> Monitor:
 
 
 def check_at(spec: JointAtSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """An unknown joint."""
-    return unknown_joint(context.scene, spec.joint, ("joint",))
+    """An unknown joint; a position that its limits do not allow."""
+    if found := unknown_joint(context.scene, spec.joint, ("joint",)):
+        return found
+    joint = joint_named(context.scene, spec.joint)
+    slack = tolerance(joint, spec.within)
+    for word, value, low, high in (
+        ("at", spec.at, joint.lower - slack, joint.upper + slack),
+        ("above", spec.above, -math.inf, joint.upper),
+        ("below", spec.below, joint.lower, math.inf),
+    ):
+        if value is not None and not low <= value <= high:
+            limits = f"{readable(joint.lower, joint.unit)} to {readable(joint.upper, joint.unit)}"
+            message = f"joint '{joint.name}' cannot be {word} {readable(value, joint.unit)}: its limits are {limits}"
+            return (Problem((word,), message),)
+    return ()
 
 
 def check_opened(spec: OpenedSpec | ClosedSpec, context: CheckContext) -> tuple[Problem, ...]:

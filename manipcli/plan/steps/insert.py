@@ -86,8 +86,9 @@ class InsertSpec(Model):
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
         15.0, description="Largest force of the tool along the hole [N], above 0; it slides with a fifth. Default 15 N."
     )
-    depth: Annotated[Length, Field(gt=0, le=1.0)] | None = Field(
-        None, description="How deep the end of the peg goes, from the rim [m]. Default: to the floor of the hole."
+    depth: Annotated[Length, Field(ge=0.001, le=1.0)] | None = Field(
+        None,
+        description="How deep the end of the peg goes, from the rim [m], 1 mm or more. Default: to the floor.",
     )
     search: Annotated[Length, Field(ge=0, le=0.1)] | None = Field(
         None, description="Radius of the spiral [m]; 0: none. Default: how well the hole is `known`, and 2 mm more."
@@ -197,6 +198,8 @@ def check(spec: InsertSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, .
     if spec.depth is not None and spec.depth > depth + 1e-9:
         message = f"'{hole.name}' is {readable(depth, 'm')} deep; expected a depth of at most that"
         return (Problem(("depth",), message, "leave `depth` out to go to its floor", "TASK352"),)
+    if not peg.geometries:  # a file with other errors: only its name is known
+        return ()
     entering = section(peg, spec.depth or depth)
     fitted = max((fit(entering, hole.interior, yaw) for yaw in (0.0, math.pi / 2.0)), key=lambda each: each.clearance)
     if fitted.clearance <= 0.0:

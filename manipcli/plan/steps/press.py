@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Annotated, ClassVar, Final
 
@@ -66,10 +67,9 @@ class ForceSpec(Model):
 
     @model_validator(mode="after")
     def _directed(self) -> ForceSpec:
-        if not any(self.direction):
-            raise problem(
-                "conflict", "the direction has length 0", at=("direction",), hint="straight down is [0, 0, -1]"
-            )
+        if not 1e-6 < math.hypot(*self.direction) < 1e6:
+            message = f"the direction has length {math.hypot(*self.direction):.3g}"
+            raise problem("conflict", message, at=("direction",), hint="straight down is [0, 0, -1]")
         return self
 
     @property

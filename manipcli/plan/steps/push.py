@@ -93,8 +93,9 @@ class PushSpec(Model):
         if self.direction is not None and self.by is None:
             message = f"`direction` needs `by`; `{given[0]}` sets the direction"
             raise problem("conflict", message, at=("direction",), hint="remove `direction`", key=True)
-        if self.direction is not None and not any(self.direction):
-            raise problem("conflict", "the direction has length 0", at=("direction",), hint="for example [1, 0]")
+        if self.direction is not None and not 1e-6 < math.hypot(*self.direction) < 1e6:
+            message = f"the direction has length {math.hypot(*self.direction):.3g}"
+            raise problem("conflict", message, at=("direction",), hint="for example [1, 0]")
         return self
 
 
