@@ -144,7 +144,7 @@ def _attempt(
         force: float, speed: float, across: float, deep: float, otherwise: str = "", hold: float | None = FELT
     ) -> Compliance:
         pressing = Pressing(frozen([0.0, 0.0, 1.0]), force, speed, high + depth, hold=hold, yields=True)
-        until = Beyond(frozen(down), rim + deep, DROP if otherwise else None, otherwise)
+        until = Beyond(frozen(down), rim + deep, DROP if otherwise else None, otherwise=otherwise)
         spring = Compliance.of(along=ALONG, across=across, force=pressing, X_TC=X_TC)
         return replace(spring, until=until, relative=True)
 
