@@ -25,10 +25,10 @@ import numpy.typing as npt
 
 from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, SensorRequest
-from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.force_reference import AXES, ForceReference, ForceReferenceSpec
 from manipcli.control.jog import JogTarget
 from manipcli.control.stopping import StopPlanner
+from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, Transform
