@@ -188,7 +188,8 @@ def unknown_body(
     """A problem if the scene has no (movable) body of this name; TASK365 if joints hold one that is to be `carried`."""
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
-        if not carried or not any(name in (joint.parent, joint.child) for joint in scene.joints):
+        held = any(name in (joint.parent, joint.child) for joint in scene.joints)
+        if not carried or not held or not scene.body(name).kind:  # a placeholder has no kind
             return ()
         hint = "use `open`, `close` or `turn`"
         return (Problem(loc, f"'{name}' is held by a joint and cannot be carried", hint, "TASK365"),)

@@ -46,6 +46,7 @@ PRODUCERS: Final[Mapping[str, str]] = {
     channels.MARKERS: "scene",
     channels.JOINT_STATES: "joints",
     channels.TF: "engine",
+    channels.SCENE_JOINTS: "engine",
     channels.CONTACTS: "contacts",
     channels.EVENTS: "task",
     channels.ROSOUT: "task",
@@ -237,8 +238,9 @@ class _Builder:
         """Topics and their publishers."""
         spec = self._spec
         selection = Selection(spec.record.strides(self._period), spec.record.left_out)
-        common = {channel.topic for channel in channel_table([])}
-        rows = [(channel, PRODUCERS[channel.topic]) for channel in channel_table([])]
+        always = channel_table([], scene_joints=bool(self._scene.joints))
+        common = {channel.topic for channel in always}
+        rows = [(channel, PRODUCERS[channel.topic]) for channel in always]
         for controller in self._controllers:
             mine = channel_table([recorded(controller)])
             rows += [(channel, controller.name) for channel in mine if channel.topic not in common]

@@ -34,5 +34,5 @@ def refuse_weak(planner: Planner, state: PlanningState, wrench: Array, label: st
         size, unit = float(np.linalg.norm(wrench[3:])), "N m"
     joint = planner.robot.joint(solver.joints[k])
     limit = f"joint '{joint.name}' reaches its limit of {limits[k]:.3g} {joint.effort_unit}"
-    message = f"{label}: the arm can give {share * size:.3g} {unit} there, not {size:.3g} {unit}: then {limit}"
+    message = f"{label}: the arm can give {share * size:.3g} {unit} there, not {size:.4g} {unit}: then {limit}"
     raise NotPlannable(message, hint="lower the friction or the spring of the joint, or use a stronger arm")

@@ -7,7 +7,8 @@ it. It leads by the force that moves the joint over its stiffness along the path
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
 
@@ -16,6 +17,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.units import readable
+from manipcli.model.grasp import friction_coefficient
 from manipcli.plan.arm_force import refuse_weak
 from manipcli.plan.candidates import Candidate
 from manipcli.plan.compliance import Compliance, compliant
@@ -41,6 +43,10 @@ MOST: Final = 40
 """Maximum number of grasp frames that the arm reaches and that are tried."""
 TURNING: Final = 150.0
 """[N m/rad] Stiffness about the axis of a hinge that the hand is on."""
+RESERVE: Final = 0.7
+"""Share of the friction between fingers and handle that a plan uses."""
+HOOKED: Final = 0.7
+"""Cosine between path and closing direction above which a finger is behind the handle."""
 LEAD: Final = 0.02
 """[rad or m] The hand leads by this at most."""
 CREEP: Final = 1e-3
@@ -60,6 +66,7 @@ class Handling:
         posture, open: poses of the hand, closed and open.
         force: [N] with which each finger presses.
         speed: share of the limits.
+        weak: the refusals of ways in which hand or arm cannot give the force; None: one way has the force.
     """
 
     joint: SceneJoint
@@ -72,6 +79,25 @@ class Handling:
     open: str
     force: float
     speed: float
+    weak: list[NotPlannable | None] = field(default_factory=list)
+
+    def explain(self, refusal: NotPlannable) -> NotPlannable:
+        """The refusal of all ways; by the force, if none has it."""
+        weak = [each for each in self.weak if each is not None]
+        if not weak or len(weak) < len(self.weak):
+            return refusal
+        what = refusal.cause.partition(",")[0]
+        return refusal.but(cause=f"{what}: {weak[0].cause}", hint=weak[0].hint)
+
+    @contextmanager
+    def forced(self) -> Iterator[None]:
+        """Keeps a refusal inside for `explain`."""
+        try:
+            yield
+        except NotPlannable as refusal:
+            self.weak.append(refusal)
+            raise
+        self.weak.append(None)
 
 
 def ways(handling: Handling, planner: Planner, state: PlanningState) -> Iterator[Candidate]:
@@ -93,6 +119,7 @@ def ways(handling: Handling, planner: Planner, state: PlanningState) -> Iterator
             back = frame.X_WT @ Transform.of(xyz=(0.0, 0.0, -distance))
             builder.reach("reach", back, speed=1.0, hand=handling.open)
         builder.straight("approach", frame.X_WT, speed=handling.speed)
+        refuse_force(handling, planner, builder.now, gripped=True)
         builder.close(handling.posture, force=handling.force, must_hold=True, body=joint.child)
         follow(handling, planner, builder)
         builder.open(handling.open, must_arrive=True)
@@ -131,10 +158,9 @@ def follow(handling: Handling, planner: Planner, builder: MotionBuilder) -> None
     here = position_of(planner, state, joint)
     sense = float(np.sign(goal.position - here))
     twist = tool_twist(planner, state, joint, X_WT)
-    efforts = [needed(joint, q, CREEP * sense) for q in (here, goal.position)]
-    refuse_weak(planner, state, wrench_of(twist, max(efforts, key=abs)), handling.label)
     law, stiffness = compliance(twist, X_WT)
-    beyond = goal.position + max(-LEAD, min(LEAD, efforts[-1] / stiffness))
+    lead = needed(joint, goal.position, CREEP * sense) / stiffness
+    beyond = goal.position + max(-LEAD, min(LEAD, lead))
     with compliant(builder, law):
         try:
             builder.along(handling.label, along(planner, state, joint, beyond, X_WT), speed=handling.speed)
@@ -142,6 +168,28 @@ def follow(handling: Handling, planner: Planner, builder: MotionBuilder) -> None
             if refusal.reason == "line":
                 raise refusal.but(hint=f"move '{joint.parent}' nearer, or move its joint less far") from refusal
             raise
+
+
+def refuse_force(handling: Handling, planner: Planner, state: PlanningState, *, gripped: bool) -> None:
+    """Check that the arm can move the joint from here, and that the fingers hold the handle.
+
+    Raises:
+        NotPlannable: the arm is too weak; or two fingers, `gripped` and none of them behind the handle, hold less by
+            Coulomb's law than the joint needs.
+    """
+    joint, X_WT = handling.joint, planner.tool_pose(state)
+    here = position_of(planner, state, joint)
+    sense = float(np.sign(handling.goal.position - here))
+    effort = max((needed(joint, q, CREEP * sense) for q in (here, handling.goal.position)), key=abs)
+    wrench = wrench_of(tool_twist(planner, state, joint, X_WT), effort)
+    size = float(np.linalg.norm(wrench[:3]))
+    held = RESERVE * 2.0 * friction_coefficient(planner.robot, planner.scene.body(joint.child)) * handling.force
+    hooked = abs(float(X_WT.R[:, 1] @ wrench[:3])) >= HOOKED * size
+    with handling.forced():
+        refuse_weak(planner, state, wrench, handling.label)
+        if gripped and size > held and not hooked:
+            message = f"{handling.label}: two fingers hold {held:.3g} N by friction, the joint needs {size:.4g} N"
+            raise NotPlannable(message, hint="press more, `force: ...`, or take a handle that fits behind a finger")
 
 
 def compliance(twist: Array, X_WT: Transform) -> tuple[Compliance, float]:

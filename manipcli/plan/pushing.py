@@ -22,7 +22,7 @@ from manipcli.plan.candidates import Candidate
 from manipcli.plan.jointed import LEVER, position_of, tool_twist
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
-from manipcli.plan.operating import FEW, Handling, follow, withdrawn
+from manipcli.plan.operating import FEW, Handling, follow, refuse_force, withdrawn
 from manipcli.plan.path import linear_path
 from manipcli.plan.planner import Planner
 from manipcli.plan.pose_error import pointed
@@ -61,6 +61,7 @@ def pushes(handling: Handling, planner: Planner, state: PlanningState) -> Iterat
         X_LW = planner.kinematics.forward(builder.now.position, link).inverse()
         pushed = Carried(joint.child, link, X_LW @ planner.body_pose(builder.now, joint.child))
         builder.adopt(builder, replace(builder.now, carried=pushed))
+        refuse_force(handling, planner, builder.now, gripped=False)
         follow(handling, planner, builder)
         builder.adopt(builder, replace(builder.now, carried=None))
         return withdrawn(handling, planner, builder)

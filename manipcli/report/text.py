@@ -5,6 +5,7 @@ Every mark is followed by a word with the same meaning; the console adds colour.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from manipcli.core.errors import Diagnostic
@@ -180,13 +181,25 @@ def _summary(verdict: Verdict) -> str:
 
 
 def steps_table(steps: Sequence[StepOutcome], blocks: Sequence[BlockOutcome] = ()) -> str:
-    """A row for each step and block; what is in a block is indented."""
+    """A row for each step and block; what is in a block is indented. What done steps report is in a last column."""
+    ones = list(nested(steps, blocks))
+    results = [_result(one) if isinstance(one, StepOutcome) and one.outcome == "done" else "" for _, one in ones]
     rows = [
-        (_marked(one), "  " * depth + one.id, _verb(one), _seconds(one.started), _seconds(one.ended), planned)
-        for depth, one in nested(steps, blocks)
+        (_marked(one), "  " * depth + one.id, _verb(one), _seconds(one.started), _seconds(one.ended), planned, result)
+        for (depth, one), result in zip(ones, results, strict=True)
         for planned in (_seconds(one.planned_duration if isinstance(one, StepOutcome) else None),)
     ]
-    return table(("step", "id", "verb", "started", "ended", "planned"), rows, right=("started", "ended", "planned"))
+    headers = ("step", "id", "verb", "started", "ended", "planned", "result")
+    count = len(headers) if any(results) else len(headers) - 1
+    return table(headers[:count], [row[:count] for row in rows], right=("started", "ended", "planned"))
+
+
+_OF_FINGERS = re.compile(r"(finger of '[^']*': [^;]*(; |$))+(at t = \S+ s(; |$))?")
+
+
+def _result(step: StepOutcome) -> str:
+    """What a step reports, without what stopped each finger."""
+    return _OF_FINGERS.sub("", step.text).removesuffix("; ")
 
 
 def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:

@@ -53,10 +53,14 @@ def settle(task: Task, session: Session) -> None:
     for k, body in enumerate(task.true.scene.movable):
         shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))
         speed = float(np.linalg.norm(state.body_linear[k]))
+        joint = next((joint for joint in task.true.scene.joints if joint.child == body.name), None)
+        if joint is not None:  # the origin of a link is on its hinge
+            X_WO = Transform.of(xyz=state.body_position[k], quat_xyzw=state.body_quat_xyzw[k])
+            shift = float(np.linalg.norm(X_WO.apply(body.centre) - body.X_WO.apply(body.centre)))
+            speed = float(np.linalg.norm(state.body_linear[k] + np.cross(state.body_angular[k], X_WO.R @ body.centre)))
         if k in heaped:
             _check_heaped(task, body, heaped[k], state)
         elif not shift < SETTLED_SHIFT:
-            joint = next((joint for joint in task.true.scene.joints if joint.child == body.name), None)
             why = "it overlaps another body, has no support, or was hit"
             if joint is not None:
                 why = f"its weight, its spring or a contact moves joint '{joint.name}'; choose another `start`"

@@ -126,7 +126,8 @@ class _Builder:
                     self._add_shape(one, "urdf", None if made.joints else made.shapes[name])
                 return
             self.moved_by |= {joint.child: joint for joint in made.joints}
-            self.parts |= {frame.name: frame for frame in made.frames}
+            own = [f"{name}{SEPARATOR}{part}" for part in spec.parts or ()]
+            self.parts |= {frame.name: frame for frame in made.frames if frame.name not in own}
             if not faults:
                 for body, shape in made.shapes.items():
                     self._add_shape(body, "urdf", shape)

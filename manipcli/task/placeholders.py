@@ -42,8 +42,10 @@ def named_scene(spec: TaskSpec) -> Scene:
     parts = (f"{name}{SEPARATOR}{part}" for name, body in scene.items() for part in body.parts or ())
     frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in (*spec.frames, *parts, *inner))
     axis, files = frozen([0.0, 0.0, 1.0]), [name for name, body in scene.items() if body.urdf is not None]
-    jointed = [*inner, *(f"{name}{SEPARATOR}" for name in files)]
-    joints = tuple(SceneJoint(name, "continuous", "world", name, origin, axis, -math.inf, math.inf) for name in jointed)
+    joints = tuple(
+        SceneJoint(name, "continuous", "world", name.removesuffix(SEPARATOR), origin, axis, -math.inf, math.inf)
+        for name in (*inner, *(f"{name}{SEPARATOR}" for name in files))
+    )
     return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]), joints=joints)
 
 

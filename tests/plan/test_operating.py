@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
@@ -14,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from manipcli.control.controllers.gripper import GripperSpec
 from manipcli.core.errors import InvalidInput, NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.grasp import friction_coefficient
 from manipcli.model.motor_limits import EffortLimits
 from manipcli.plan.aboard import aboard
 from manipcli.plan.arm_force import refuse_weak
@@ -21,7 +23,7 @@ from manipcli.plan.hand import closing_speed
 from manipcli.plan.handle_frames import handle_frames
 from manipcli.plan.jointed import along, moved_to, needed, position_of, tool_twist, wrench_of
 from manipcli.plan.motion import JointGoal, PlanningState
-from manipcli.plan.operating import ALONG, compliance
+from manipcli.plan.operating import ALONG, RESERVE, Handling, compliance, refuse_force
 from manipcli.plan.planner import Planner
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.jointed_goal import moved_joint
@@ -199,6 +201,31 @@ def test_the_force_that_the_arm_can_give_is_where_a_joint_meets_its_limit() -> N
     refuse_weak(planner, state, np.append(0.999 * most * direction, np.zeros(3)), "pull")
     with pytest.raises(NotPlannable, match=r"pull: the arm can give [\d.]+ N there, not [\d.]+ N: then joint 'panda_"):
         refuse_weak(planner, state, np.append(1.001 * most * direction, np.zeros(3)), "pull")
+
+
+@pytest.mark.parametrize("roll", [0.0, 90.0])
+def test_two_fingers_hold_by_friction_what_no_finger_is_behind(roll: float) -> None:
+    """By Coulomb's law, with the reserve; a finger behind the handle holds more. The wrist turns y across the path."""
+    planner, moving = planner_of(task()), joint("drawer")
+    q = np.array(start(task()).position)
+    q[planner.robot.joint_names.index("panda_joint7")] -= np.radians(roll)
+    state = start(task()).moved(frozen(q))
+    along_y = abs(planner.tool_pose(state).R[0, 1])  # the drawer moves along x
+    mu = friction_coefficient(planner.robot, planner.scene.body(moving.child))
+    goal = JointGoal(moving.name, 0.15, 1.0, 0.005)
+    frame = planner.scene.frame("drawer/handle")
+    assert frame is not None
+    assert min(along_y, 1.0 - along_y) < 0.2
+    for factor in (0.99, 1.01):
+        force = moving.friction / (2.0 * mu * RESERVE) / factor
+        pulled = Handling(moving, frame, goal, "pull", (0.1, 0.1), (0.1, 0.1), "closed", "open", force, 0.3)
+        slips = factor > 1.0 and along_y < 0.5
+        with pytest.raises(NotPlannable, match="two fingers hold") if slips else nullcontext():
+            refuse_force(pulled, planner, state, gripped=True)
+        own = pulled.explain(NotPlannable("cannot open 'drawer', all 9 candidates failed: it is far"))
+        assert own.cause.startswith(
+            "cannot open 'drawer': pull: two fingers hold" if slips else "cannot open 'drawer', all"
+        )
 
 
 @pytest.mark.parametrize(

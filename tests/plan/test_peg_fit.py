@@ -31,7 +31,7 @@ scene:
   round: {{cylinder: {{radius: 10 mm, height: 8 cm}}, mass: 0.1, rests_on: floor, at: [0.5, 0]}}
   square: {{box: {{size: [3 cm, 2 cm, 8 cm]}}, mass: 0.1, rests_on: floor, at: [0.5, 0.3]}}
   peg: {{urdf: {{file: {ROOT}/tasks/objects/peg.urdf}}, rests_on: floor, at: [0.5, 0.5]}}
-  socket: {{cup: {{radius: 30 mm, height: 50 mm, wall: 19.5 mm, segments: 12}}, rests_on: floor, at: [1, 0]}}
+  socket: {{cup: {{radius: 30 mm, height: 50 mm, wall: 19.5 mm, segments: 12}}, mass: 1, rests_on: floor, at: [1, 0]}}
   frame: {{tray: {{size: [8 cm, 6 cm, 4 cm], wall: 2 cm}}, fixed: true, rests_on: floor, at: [0.5, 0.9]}}
 """
 

@@ -52,6 +52,19 @@ def test_quantities_are_in_customary_units(value: float, unit: str, text: str) -
     assert quantity(value, unit) == text
 
 
+def test_what_a_done_step_reports_is_in_the_table_without_its_fingers() -> None:
+    fingers = "finger of 'left': contact at 8 N (requested 8 N); finger of 'right': reached its target; at t = 0.100 s"
+    pick = replace(PASSED.steps[0], text=fingers)
+    assert "result" not in render_verdict(replace(PASSED, steps=(pick,)), "runs/pour.mcap")
+    press = StepOutcome("press_1", "press", "done", 6.1, 8.0, 2.0, f"{fingers}; felt 9.9 N in the mean, 10 N at most")
+    text = render_verdict(replace(PASSED, steps=(pick, press)), "runs/pour.mcap")
+    assert [line.split("  ")[-1].strip() for line in text.splitlines()[:3]] == [
+        "result",
+        "5.90 s",
+        "felt 9.9 N in the mean, 10 N at most",
+    ]
+
+
 def test_a_pass_says_how_much_there_was_to_spare() -> None:
     text = render_verdict(PASSED, "runs/pour.mcap")
     assert "passes with 4.1 mm to spare (tightest at 17.32 s)" in text

@@ -10,10 +10,12 @@ import pytest
 
 from manipcli.core.errors import InvalidInput
 from manipcli.description.packages import Packages
+from manipcli.model.joint_units import misread_units
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.joint_inertia import moved_inertia
 from manipcli.scene.scene import Scene
 from manipcli.scene.scene_file import scene_from_json, scene_to_json
+from manipcli.spec.load import load_task_text
 from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import task_spec
 
@@ -132,3 +134,33 @@ def test_what_does_not_go_with_joints_is_refused(bodies: dict[str, Any], code: s
         scene(**bodies)
     assert code in {found.code for found in caught.value.findings}
     assert any(words in found.message for found in caught.value.findings), caught.value.findings
+
+
+def test_units_that_do_not_fit_a_joint_are_refused() -> None:
+    """Of a hinge: lengths, forces and stiffnesses of a slide; and the other way round; also in conditions."""
+    text = """task: t
+robot: r
+controllers: c
+scene:
+  cabinet: {urdf: {file: cabinet.urdf}, fixed: true, pose: {}, joints: {slide: {start: 5 deg, closed: 1 cm}}}
+  door:
+    urdf: {file: door.urdf}
+    fixed: true
+    pose: {xyz: [2, 0, 0]}
+    joints: {hinge: {start: 5 deg, friction: 2 N, spring: {stiffness: 2 N/m, rest: 1 deg}}}
+steps: [{wait: 1 s}]
+expect:
+  - joint_at: {joint: door/hinge, at: 5 cm, within: 1 deg}
+  - opened: {object: cabinet, by: 5 deg}
+  - near: {object: cabinet/drawer, to: start, within: 1 cm}
+"""
+    task = load_task_text(text, "t.yaml", model=task_spec())
+    made = build_scene(task.spec, packages=Packages(OBJECTS / "task.yaml"))
+    found = [*misread_units(task.spec, task.source, (), (), made.joints)]
+    assert [(one.place.line if one.place else 0, one.message.partition(": ")[0]) for one in found] == [
+        (5, "scene.cabinet.joints.slide.start"),
+        (10, "scene.door.joints.hinge.friction"),
+        (10, "scene.door.joints.hinge.spring.stiffness"),
+        (13, "expect[0].joint_at.at"),
+        (14, "expect[1].opened.by"),
+    ]

@@ -1,6 +1,7 @@
 """Every mistake of a task is told at once, each at its own place, and a mistake hides no other."""
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -390,6 +391,8 @@ def test_nothing_is_made_up_where_the_robot_cannot_be_built(tmp_path: Path, file
     text = re.sub(r"(?m)^controllers: ", f"controllers: {file.parent}/", text)
     path = tmp_path / "task.yaml"
     path.write_text(text)
+    if (file.parent / "objects").exists():
+        shutil.copytree(file.parent / "objects", tmp_path / "objects")
     with pytest.raises(InvalidInput) as invalid:
         load_task(path)
     assert [one.code for one in invalid.value.findings] == ["TASK231"]

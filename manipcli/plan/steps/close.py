@@ -28,8 +28,8 @@ from manipcli.plan.steps.jointed_goal import (
 class CloseSpec(HandleSpec):
     """Move a drawer, a door or a lid along the path of its joint to where it is closed, and withdraw.
 
-    The closed hand pushes the handle; where the arm cannot follow that path, it takes the handle. What is in it or on
-    it moves along. The step is done when the joint is within 5 mm or 3 deg of where it is closed.
+    The closed hand pushes the handle; where the arm cannot follow that path, it takes the handle. What is in the link
+    or on it moves along. The step is done when the joint is within 5 mm or 3 deg of where it is closed.
     """
 
     verb: ClassVar[str] = "close"

@@ -107,7 +107,7 @@ def by_hand(
     planner.free_start(state)
     what = f"cannot {spec.verb} '{spec.object}'"
     options = itertools.chain(pushes(handling, planner, state) if push else (), ways(handling, planner, state))
-    return Candidates(options, what=what, decides="branch")
+    return Candidates(options, what=what, decides="branch", explain=handling.explain)
 
 
 def opening(joint: SceneJoint) -> float:
