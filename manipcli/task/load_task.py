@@ -16,6 +16,7 @@ from manipcli.spec.load import load_task as load_task_file
 from manipcli.task.believed_scene import believing
 from manipcli.task.changed_files import Files, bound
 from manipcli.task.consistency import consistent
+from manipcli.task.designs import Design
 from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample
 from manipcli.task.second_chances import every_finding
@@ -34,12 +35,14 @@ class FileOptions(TypedDict, total=False):
         seed: replaces the seed of the task.
         package_path: additional folders to search for packages.
         allow_outside: allow files outside packages and outside the folders of the files that name them.
+        design: the design of the samples, `sobol:256`; "": random ones.
     """
 
     overrides: Sequence[str]
     seed: int | None
     package_path: Sequence[Path]
     allow_outside: bool
+    design: str
 
 
 class LoadOptions(FileOptions, total=False):
@@ -82,6 +85,7 @@ class WrittenTask:
             self.varied,
             number,
             self.path,
+            design=Design.read(self.options.get("design", "")),
             overrides=self.options.get("overrides", ()),
             package_path=self.options.get("package_path", ()),
             allow_outside=self.options.get("allow_outside", False),
@@ -110,6 +114,7 @@ def load_written(path: Path, **options: Unpack[FileOptions]) -> WrittenTask:
             valid.
     """
     try:
+        Design.read(options.get("design", ""))
         return WrittenTask(*_as_written(path, **options), path, options)
     except InvalidInput as first:
         raise every_finding(path, first, **options) from None
@@ -122,6 +127,7 @@ def _as_written(
     seed: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
+    design: str = "",
 ) -> tuple[Task, tuple[Varied, ...]]:
     """The task as written, and the quantities of `vary:`.
 

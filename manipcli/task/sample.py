@@ -25,10 +25,11 @@ from manipcli.spec.task import TaskSpec
 from manipcli.task.believed_scene import believed_scene
 from manipcli.task.changed_files import Changes, Files
 from manipcli.task.consistency import refused_by_engine
+from manipcli.task.designs import Design, draw
 from manipcli.task.named_file import named_file
 from manipcli.task.sensor_checks import refuse, sensor_findings
 from manipcli.task.task import GroundTruth, Task, all_sensors
-from manipcli.task.vary import SENSORS, Varied, draw
+from manipcli.task.vary import SENSORS, Varied
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
 SceneOf = Callable[[Located[TaskSpec]], Scene]
@@ -40,6 +41,7 @@ def draw_sample(
     number: int,
     path: Path,
     *,
+    design: Design = Design(),  # noqa: B008 (frozen)
     overrides: Sequence[str] = (),
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
@@ -51,6 +53,7 @@ def draw_sample(
         varied: the quantities of its `vary:`.
         number: index of the sample, from 0.
         path: the task file.
+        design: the design that has this sample.
         overrides, package_path, allow_outside: the options with which the task was loaded.
 
     Raises:
@@ -64,7 +67,12 @@ def draw_sample(
         raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
     robot_path = named_file(task.file, path, "robot")
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    drawn = _but_for(draw(varied, task.spec.simulation.seed, number), varied, read_overrides(overrides))
+    try:
+        point = draw(varied, task.spec.simulation.seed, number, design)
+    except IndexError as error:
+        message = f"there is no sample {number}: {error}"
+        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))]) from None
+    drawn = _but_for(point, varied, read_overrides(overrides))
     return sampled(
         task,
         varied,
