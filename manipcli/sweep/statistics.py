@@ -156,7 +156,7 @@ def binomial_tail(most: int, count: int) -> float:
 
 
 def two_sided(less: int, more: int) -> float:
-    """p of a sign test, exact: `less` and `more` of the pairs changed in each direction. McNemar's test for verdicts."""
+    """p of a sign test, exact, from the number of pairs that changed in each direction; of verdicts: McNemar's test."""
     return min(1.0, 2.0 * binomial_tail(min(less, more), less + more))
 
 

@@ -9,6 +9,7 @@ from typing import TypedDict, Unpack
 
 from manipcli.core.errors import InvalidInput
 from manipcli.description.packages import Packages
+from manipcli.judge.drawn import Drawn
 from manipcli.model.build_robot import build_robot
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.load import load_controllers, load_robot
@@ -18,7 +19,7 @@ from manipcli.task.changed_files import Files, bound
 from manipcli.task.consistency import consistent
 from manipcli.task.designs import Design
 from manipcli.task.named_file import named_file
-from manipcli.task.sample import draw_sample
+from manipcli.task.sample import draw_sample, drawn_sample
 from manipcli.task.second_chances import every_finding
 from manipcli.task.sensor_checks import refuse, sensed, sensor_findings
 from manipcli.task.task import Task
@@ -72,6 +73,20 @@ class WrittenTask:
     path: Path
     options: FileOptions
 
+    @property
+    def design(self) -> Design:
+        """The design of its samples."""
+        return Design.read(self.options.get("design", ""))
+
+    def drawn(self, number: int) -> Drawn:
+        """The values of a sample.
+
+        Raises:
+            InvalidInput: the sample does not exist.
+        """
+        overrides = self.options.get("overrides", ())
+        return drawn_sample(self.task, self.varied, number, design=self.design, overrides=overrides)
+
     def sample(self, number: int | None) -> Task:
         """A sample; None for the task as written.
 
@@ -85,7 +100,7 @@ class WrittenTask:
             self.varied,
             number,
             self.path,
-            design=Design.read(self.options.get("design", "")),
+            design=self.design,
             overrides=self.options.get("overrides", ()),
             package_path=self.options.get("package_path", ()),
             allow_outside=self.options.get("allow_outside", False),

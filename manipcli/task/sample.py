@@ -59,20 +59,9 @@ def draw_sample(
     Raises:
         InvalidInput: the sample does not exist, or a drawn value is refused.
     """
-    if number < 0:
-        message = f"there is no sample {number}: samples count from 0"
-        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
-    if not varied:
-        message = f"there is no sample {number}: task '{task.name}' has no `vary:`"
-        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
+    drawn = drawn_sample(task, varied, number, design=design, overrides=overrides)
     robot_path = named_file(task.file, path, "robot")
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    try:
-        point = draw(varied, task.spec.simulation.seed, number, design)
-    except IndexError as error:
-        message = f"there is no sample {number}: {error}"
-        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))]) from None
-    drawn = _but_for(point, varied, read_overrides(overrides))
     return sampled(
         task,
         varied,
@@ -86,6 +75,25 @@ def draw_sample(
         )[0],
         scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages),
     )
+
+
+def drawn_sample(
+    task: Task, varied: Sequence[Varied], number: int, *, design: Design, overrides: Sequence[str] = ()
+) -> Drawn:
+    """The values of a sample; the arguments are those of `draw_sample`.
+
+    Raises:
+        InvalidInput: the sample does not exist.
+    """
+    cause = "samples count from 0" if number < 0 else "" if varied else f"task '{task.name}' has no `vary:`"
+    try:
+        point = draw(varied, task.spec.simulation.seed, number, design) if not cause else None
+    except IndexError as error:
+        point, cause = None, str(error)
+    if point is None:
+        message = f"there is no sample {number}: {cause}"
+        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
+    return _but_for(point, varied, read_overrides(overrides))
 
 
 def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: RobotOf, scene_of: SceneOf) -> Task:
