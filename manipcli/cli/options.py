@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -68,6 +70,14 @@ def check_design(design: str, sample: int | None) -> None:
     if design and sample is None:
         message = f"--design {design} needs --sample N"
         raise InvalidInput([Diagnostic("USE180", message, hint="name the sample, or run all with `manipcli sweep`")])
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    else:
+        return os.cpu_count() or 1
 
 
 def seconds(word: str) -> float:

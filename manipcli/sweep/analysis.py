@@ -35,10 +35,17 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """How much a number matters for the smallest margin; None where that cannot be computed."""
+    """How much a number matters; None where that cannot be computed.
+
+    Attributes:
+        correlation: with the smallest margin.
+        passing: with whether the sample passed.
+        indices: of the smallest margin, for `saltelli`.
+    """
 
     column: Column
     correlation: Correlation | None
+    passing: Correlation | None
     indices: Indices | None
 
     @property
@@ -46,7 +53,12 @@ class Influence:
         """To sort by."""
         if self.indices is not None:
             return self.indices.whole.value
-        return abs(self.correlation.rho) if self.correlation is not None else -1.0
+        return max((abs(found.rho) for found in (self.correlation, self.passing) if found is not None), default=-1.0)
+
+    @property
+    def matters(self) -> bool:
+        """Whether more than chance."""
+        return any(found is not None and found.matters for found in (self.correlation, self.passing))
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +117,7 @@ class Analysis:
         varied = [k for k in range(len(self.columns)) if len({values[k] for values in self.values.values()}) > 1]
         indices = self._indices
         found = [
-            Influence(self.columns[k], self._correlation(k, of=len(varied)), indices.get(self.columns[k].dimension))
+            Influence(self.columns[k], *self._correlations(k, of=len(varied)), indices.get(self.columns[k].dimension))
             for k in varied
         ]
         return tuple(sorted(found, key=lambda influence: -influence.size))
@@ -119,8 +131,9 @@ class Analysis:
         """Number of samples by outcome."""
         return Counter(result.outcome for result in self.sweep.results)
 
-    def _correlation(self, k: int, *, of: int) -> Correlation | None:
-        """Of column k, over the independent samples: A and B of `saltelli`, and where `oat` changes this number."""
+    def _correlations(self, k: int, *, of: int) -> tuple[Correlation | None, Correlation | None]:
+        """Of column k with smallest margin and passing, over the independent samples: A and B of `saltelli`; those in
+        which `oat` changes this number."""
         used: Sequence[SampleResult] = self.sweep.results
         word = self.sweep.sampling.design.word
         if word == "saltelli":
@@ -129,7 +142,8 @@ class Analysis:
             nominal = self.columns[k].nominal
             used = [result for result in used if self.values[result.number][k] != nominal]
         x = [self.values[result.number][k] for result in used]
-        return rank_correlation(x, [result.smallest for result in used], of=of)
+        results = ([result.smallest for result in used], [float(result.passed) for result in used])
+        return rank_correlation(x, results[0], of=of), rank_correlation(x, results[1], of=of)
 
     @cached_property
     def _indices(self) -> dict[int, Indices]:

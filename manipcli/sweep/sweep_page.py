@@ -102,6 +102,7 @@ def _plots(analysis: Analysis) -> Markup | None:
 def _influences(analysis: Analysis) -> Markup | None:
     if not analysis.influences:
         return None
+    headers: tuple[str, ...]
     if analysis.influences[0].indices is not None:
         about = (
             "Share of the variance of the smallest margin (within ±1 tolerance) that a number explains alone, and with "
@@ -110,33 +111,28 @@ def _influences(analysis: Analysis) -> Markup | None:
         headers = ("number", "nominal", "first-order", "95 % interval", "total", "95 % interval ")
     else:
         about = (
-            "Rank correlation of each number with the smallest margin. Samples in which a step failed rank below all "
-            "others. Where no number matters, the largest exceeds the bound in 5 % of sweeps."
+            "Rank correlation of each number with the smallest margin, and with whether the sample passed. Where a "
+            "step failed, the sample ranks below all others. Where no number matters, one exceeds the bound in 5 % of "
+            "sweeps."
         )
-        headers = ("number", "nominal", "correlation", "", "by chance up to", "")
+        headers = ("number", "nominal", "with margin", "", "with passing", " ", "by chance up to", "  ")
     rows = [_influence_row(one) for one in analysis.influences]
-    numbers = ("nominal", "first-order", "total", "correlation", "by chance up to")
+    numbers = ("nominal", "first-order", "total", "with margin", "with passing", "by chance up to")
     return element("section", heading("influence", "What matters", about), table(headers, rows, numbers=numbers))
 
 
 def _influence_row(one: Influence) -> tuple[str, ...]:
     head = (element("code", one.column.name), f"{one.column.nominal:.4g}")
+    cells: list[str] = []
     if one.indices is not None:
-        cells: list[str] = []
         for index in (one.indices.first, one.indices.whole):
             low, high = index.interval
             cells += [f"{index.value:.2f}", f"{low:.2f} to {high:.2f}"]
         return (*head, *cells)
-    found = one.correlation
-    if found is None:
-        return (*head, "–", "", "", "")
-    return (
-        *head,
-        f"{found.rho:+.2f}",
-        _bar(found.rho, found.bound),
-        f"{found.bound:.2f}",
-        "matters" if found.matters else "",
-    )
+    for found in (one.correlation, one.passing):
+        cells += ["–", ""] if found is None else [f"{found.rho:+.2f}", _bar(found.rho, found.bound)]
+    bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "–")
+    return (*head, *cells, bound, "matters" if one.matters else "")
 
 
 def _bar(rho: float, bound: float) -> Markup:
@@ -203,12 +199,12 @@ def _histogram(values: Sequence[float]) -> Markup:
 def _failures(analysis: Analysis) -> Markup:
     parts: list[str | None] = []
     if analysis.failures:
-        rows = [
+        ways = [
             (str(way), str(len(way.samples)), listed(map(str, way.samples), most=NAMED)) for way in analysis.failures
         ]
         parts += [
             heading("failures", "Ways of failing"),
-            table(("failure", "samples", "which"), rows, numbers=("samples",)),
+            table(("failure", "samples", "which"), ways, numbers=("samples",)),
         ]
     rows: list[tuple[str, ...]] = [
         (
@@ -258,7 +254,9 @@ def _data(analysis: Analysis, folder: Path) -> dict[str, object]:
                 "link": link(log, folder) if log.exists() else "",
             }
         )
+    passing = [abs(found.rho) if (found := one.passing) is not None else -1.0 for one in analysis.influences]
+    strongest = sorted(range(len(columns)), key=lambda k: -passing[k])[:2]
     names = [{"name": "smallest margin, in tolerances", "unit": ""}]
     names += [{"name": spread.name, "unit": spread.unit} for spread in telling]
     numbers = [{"name": column.name, "nominal": column.nominal} for column in columns]
-    return {"numbers": numbers, "margins": names, "samples": samples}
+    return {"numbers": numbers, "margins": names, "samples": samples, "map": strongest}

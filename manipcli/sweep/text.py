@@ -94,22 +94,20 @@ def _margins(analysis: Analysis) -> str:
 
 def _influences(analysis: Analysis) -> str:
     """What matters for the smallest margin."""
-    first = analysis.influences[0]
-    if first.indices is not None:
+    headers: tuple[str, ...]
+    if analysis.influences[0].indices is not None:
         headers = ("number", "first-order index", "95 % interval", "total index", "95 % interval ")
         rows = [(one.column.name, *_index_cells(one)) for one in analysis.influences]
         return table(headers, rows, right=headers[1:])
-    headers = ("number", "nominal", "correlation", "", "by chance up to")
+    headers = ("rank correlation", "nominal", "with margin", "with passing", "by chance up to", "")
     rows = []
     for one in analysis.influences:
-        found = one.correlation
-        if found is None:
-            rows.append((one.column.name, f"{one.column.nominal:.4g}", "-", "", ""))
-            continue
-        bar = "█" * round(abs(found.rho) * _BAR) if found.matters else ""
-        rho = f"{found.rho:+.2f}".replace("-", "−")
-        rows.append((one.column.name, f"{one.column.nominal:.4g}", rho, bar, f"{found.bound:.2f}"))
-    return table(headers, rows, right=("nominal", "correlation", "by chance up to"))
+        cells = ["-" if found is None else f"{found.rho:+.2f}" for found in (one.correlation, one.passing)]
+        bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "-")
+        nominal = f"{one.column.nominal:.4g}"
+        bar = "█" * round(one.size * _BAR) if one.matters else ""
+        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells, bound)), bar))
+    return table(headers, rows, right=headers[1:5])
 
 
 def _index_cells(influence: Influence) -> tuple[str, ...]:
@@ -168,6 +166,7 @@ def _number_object(influence: Influence) -> Mapping[str, object]:
         "name": influence.column.name,
         "nominal": influence.column.nominal,
         "correlation": found.rho if found is not None else None,
+        "correlation_with_passing": influence.passing.rho if influence.passing is not None else None,
         "bound": found.bound if found is not None else None,
         "first_order": None if indices is None else {"value": indices.first.value, "interval": indices.first.interval},
         "total": None if indices is None else {"value": indices.whole.value, "interval": indices.whole.interval},

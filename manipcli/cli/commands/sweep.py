@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, cores, seconds
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
@@ -97,7 +97,6 @@ def sweep(
         raise InvalidInput([Diagnostic("USE189", message, hint="run one sweep for each task")])
     with Interrupts():
         from manipcli.batch.job import Settings, limit
-        from manipcli.cli.commands.test import _cores
         from manipcli.sweep.analysis import Analysis
         from manipcli.sweep.journal import Journal, identity
         from manipcli.sweep.local import SweepStopped, local_backend
@@ -126,7 +125,7 @@ def sweep(
         )
         sampling = Sampling(paths[0], settings)
         count = count if sampling.total is None else sampling.total
-        backend = local_backend(sampling.job, at_once=workers or _cores(), keep=keep)
+        backend = local_backend(sampling.job, at_once=workers or cores(), keep=keep)
         path = sampling.job(0).log.with_name(f"{paths[0].stem}.jsonl")
         lines = _Lines(quiet=quiet)
         with Journal(path, identity(sampling.written), resume=resume, force=force) as journal:

@@ -110,8 +110,8 @@
 
   if (!data.numbers.length) return;
   fill("margin", data.margins, 0);
-  fill("first", data.numbers, 0);
-  fill("second", data.numbers, Math.min(1, data.numbers.length - 1));
+  fill("first", data.numbers, data.map[0]);
+  fill("second", data.numbers, data.map[data.map.length - 1]);
   byId("sample").textContent = "Click a sample.";
   redraw();
 })();
