@@ -176,18 +176,21 @@ def _refuse_changed(path: Path, before: Identity, now: Identity) -> None:
     Raises:
         InvalidInput: they differ; says in what.
     """
-    if not before:  # nothing was written before it was killed
-        return
-    changes = []
+    if before and (found := changes(before, now)):
+        message = f"the task has changed since '{path}': {found}"
+        raise InvalidInput([Diagnostic("USE182", message, hint="undo the change, or start over without --resume")])
+
+
+def changes(before: Identity, now: Identity) -> str:
+    """What differs between two identities: the first few, in words; "" if nothing does."""
+    found = []
     for key in dict.fromkeys((*before, *now)):
         if before.get(key) == now.get(key):
             continue
         if key == "description" or key.startswith("mesh "):
-            changes.append(f"{escape(key)} has another content")
+            found.append(f"{escape(key)} has another content")
             continue
         a, b = (shorten(escape(value[key]), width=30) if key in value else "absent" for value in (before, now))
-        changes.append(f"{escape(key)} was {a}, is {b}")
-    if changes:
-        more = f", and {len(changes) - MOST_NAMED} more" if len(changes) > MOST_NAMED else ""
-        message = f"the task has changed since '{path}': {'; '.join(changes[:MOST_NAMED])}{more}"
-        raise InvalidInput([Diagnostic("USE182", message, hint="undo the change, or start over without --resume")])
+        found.append(f"{escape(key)} was {a}, is {b}")
+    more = f", and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+    return f"{'; '.join(found[:MOST_NAMED])}{more}"

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final, Literal, Protocol
 
+from manipcli.batch.forks import ForkPool
 from manipcli.batch.job import Beat, Job
 from manipcli.batch.process import run_jobs
 from manipcli.core.errors import Diagnostic, ManipcliError
@@ -48,9 +49,14 @@ class Backend(Protocol):
 
 
 def local_backend(
-    job_of: Callable[[int], Job], *, at_once: int, keep: Kept = "none", command: tuple[str, ...] = ()
+    job_of: Callable[[int], Job],
+    *,
+    at_once: int,
+    keep: Kept = "none",
+    command: tuple[str, ...] = (),
+    pool: ForkPool | None = None,
 ) -> Backend:
-    """Runs samples in `at_once` parallel processes; `command`: see `run_jobs`."""
+    """Runs samples in `at_once` parallel processes; `command`, `pool`: see `run_jobs`."""
 
     def run(numbers: Iterable[int], *, beat: Callable[[], None]) -> Generator[SampleResult, None, None]:
         attempts = Counter[int]()
@@ -59,7 +65,7 @@ def local_backend(
         def observe(job: Job, heard: Beat) -> None:
             beat()
 
-        with closing(run_jobs(jobs, at_once=at_once, observer=observe, command=command)) as reports:
+        with closing(run_jobs(jobs, at_once=at_once, observer=observe, command=command, pool=pool)) as reports:
             for report in reports:
                 number = report.case.sample
                 assert number is not None

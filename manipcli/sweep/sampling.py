@@ -40,7 +40,8 @@ class Sampling:
         Raises:
             InvalidInput: a file is invalid, or the task has no `vary:`.
         """
-        self.written: WrittenTask = load_written(path, **Job(read_case(path), path, settings).loading.options)
+        self._path, self._settings = path, settings
+        self.written: WrittenTask = self.again()
         if not self.written.varied:
             message = f"task '{self.written.task.name}' has no `vary:`, so that all samples are the same"
             hint = "add it: `vary: {scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}}`"
@@ -48,7 +49,14 @@ class Sampling:
         self.design: Design = self.written.design
         self.total = self.design.total(self.written.varied)
         self._case = read_case(path, shown=shown_path(path))
-        self._path, self._settings = path, settings
+
+    def again(self) -> WrittenTask:
+        """The task, loaded from its files now.
+
+        Raises:
+            InvalidInput: a file is invalid.
+        """
+        return load_written(self._path, **Job(read_case(self._path), self._path, self._settings).loading.options)
 
     @property
     def task(self) -> str:
@@ -61,15 +69,17 @@ class Sampling:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """The numbers that are drawn, in the order of the file, without those set by an override."""
-        columns, dimension = [], 0
+        """The numbers with more than one value, in the order of the file, without those set by an override."""
+        columns: list[Column] = []
+        dimension = 0
         drawn = {path for path, _ in self.written.drawn(0).values} if self.design.word != "oat" else None
         for quantity in self.written.varied:
             for k, nominal in enumerate(quantity.nominal):
                 own = dimension if quantity.law.together else dimension + k
                 name = f"{quantity.path}.{k}" if quantity.vector else quantity.path
                 column = Column(name, quantity.path, k if quantity.vector else None, float(nominal), own)
-                columns += [column] if drawn is None or quantity.path in drawn else []
+                if quantity.values(k) > 1 and (drawn is None or quantity.path in drawn):
+                    columns.append(column)
             dimension += quantity.dimensions
         return tuple(columns)
 

@@ -96,8 +96,7 @@ def test_neither_order_nor_interruptions_change_a_byte_of_the_csv(sampling: Samp
     assert len(last.ran) == 40 - (0 + 7 + 1 + 11)
     rows = whole.splitlines()
     assert [int(row.partition(",")[0]) for row in rows[1:]] == [*range(40)]
-    xyz = ",".join(f"scene.block.pose.xyz.{k}" for k in range(3))
-    assert rows[0].endswith(f"smallest_margin,margin near [m],{xyz},scene.block.friction")
+    assert rows[0].endswith("smallest_margin,margin near [m],scene.block.pose.xyz.0,scene.block.friction")
     assert float(rows[18].split(",")[-1]) == dict(sampling.written.drawn(17).values)["scene.block.friction"]
 
 
@@ -269,7 +268,7 @@ def test_the_command_sweeps_and_a_sample_alone_has_the_same_log(call_cli: RunCli
         (x, *_) = dict(drawn.values)["scene.block.pose.xyz"]  # type: ignore[misc]
         assert row.split(",")[1] == ("passed" if x < 0.61 else "failed")
         assert float(row.split(",")[6]) == pytest.approx(0.61 - x)
-        assert row.split(",")[-4] == repr(x)
+        assert row.split(",")[-2] == repr(x)
     assert call_cli("sweep", "a.csv", "a.csv", cwd=tmp_path).code == 0
 
 

@@ -15,8 +15,11 @@ from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
+    from manipcli.batch.job import Settings
     from manipcli.sweep.analysis import Analysis
+    from manipcli.sweep.local import Backend
     from manipcli.sweep.results import SampleResult
+    from manipcli.sweep.sampling import Sampling
     from manipcli.sweep.sweep import Progress
 
 Keep = Literal["none", "failed", "all"]
@@ -44,6 +47,10 @@ def sweep(
     workers: Annotated[
         int | None,
         typer.Option("-n", "--workers", metavar="W", min=1, help="Parallel runs [default: number of cores]."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Run on the workers of this Dask scheduler."),
     ] = None,
     until: Annotated[
         str,
@@ -125,7 +132,10 @@ def sweep(
         )
         sampling = Sampling(paths[0], settings)
         count = count if sampling.total is None else sampling.total
-        backend = local_backend(sampling.job, at_once=workers or cores(), keep=keep)
+        if scheduler is None:
+            backend = local_backend(sampling.job, at_once=workers or cores(), keep=keep)
+        else:
+            backend = _cluster(sampling, paths[0], settings, scheduler, count=count, keep=keep)
         path = sampling.job(0).log.with_name(f"{paths[0].stem}.jsonl")
         lines = _Lines(quiet=quiet)
         with Journal(path, identity(sampling.written), resume=resume, force=force) as journal:
@@ -148,6 +158,19 @@ def sweep(
         console.result(_text(analysis))
     _write(analysis, csv, html)
     return ExitCode.PASSED if swept.rate.share >= needed else ExitCode.FAILED
+
+
+def _cluster(sampling: Sampling, path: Path, settings: Settings, scheduler: str, *, count: int, keep: Keep) -> Backend:
+    """
+    Raises:
+        InvalidInput: dask.distributed is not installed.
+    """
+    try:
+        from manipcli.sweep.cluster import cluster_backend
+    except ImportError as error:
+        hint = "pip install 'manipcli[sweep]'"
+        raise InvalidInput([Diagnostic("USE190", f"--scheduler needs dask.distributed: {error}", hint=hint)]) from None
+    return cluster_backend(sampling, path, settings, scheduler, count=count, keep=keep)
 
 
 def _compare(a: Path, b: Path, *, alpha: float, margins: bool, format_: str) -> ExitCode:
