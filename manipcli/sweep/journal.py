@@ -28,6 +28,7 @@ SYNC_PERIOD: Final = 2.0
 """[s] of wall time between two writes to the disk itself."""
 MOST_NAMED: Final = 4
 """Number of changes shown of a changed task."""
+URDF: Final = "URDF of the robot"
 Identity = Mapping[str, str]
 
 
@@ -40,7 +41,7 @@ def identity(written: WrittenTask) -> dict[str, str]:
         "manipcli": __version__,
         f"version of {engine.name}": engine.version(),
         "design": str(written.design),
-        "description": hashlib.sha256(task.robot.urdf.encode()).hexdigest(),
+        URDF: hashlib.sha256(task.robot.urdf.encode()).hexdigest(),
     }
     for uri, path in mesh_files(task).items():
         found[f"mesh {uri}"] = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -187,7 +188,7 @@ def changes(before: Identity, now: Identity) -> str:
     for key in dict.fromkeys((*before, *now)):
         if before.get(key) == now.get(key):
             continue
-        if key == "description" or key.startswith("mesh "):
+        if key == URDF or key.startswith("mesh "):
             found.append(f"{escape(key)} has another content")
             continue
         a, b = (shorten(escape(value[key]), width=30) if key in value else "absent" for value in (before, now))

@@ -42,9 +42,10 @@ def test_a_task_loads_to_the_same_from_its_bundle(tmp_path: Path) -> None:
     robots = [path for path, _ in read.stamps if "robots" in path.parts]
     assert robots
     assert all(path.is_relative_to(tmp_path / "worker") for path in robots)
+    assert len(identity(written)["URDF of the robot"]) == 64
     there.write_text(TASK.replace("0.1]", "0.2]"))
     other = Sampling(there, Settings(package_path=packages)).written
-    assert "vary.simulation.settle.uniform was [0, 0.1], is [0, 0.2]" in changes(identity(written), identity(other))
+    assert "vary.simulation.settle.uniform was [0.0, 0.1], is [0.0, 0.2]" in changes(identity(written), identity(other))
 
 
 def test_an_absolute_path_cannot_travel(tmp_path: Path) -> None:
