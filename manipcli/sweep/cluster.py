@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable
@@ -121,11 +122,29 @@ class _Cluster:
         """
         self._pending: dict[Future, int] = {}
         self._changed = Event()
+        deadline = time.monotonic() + CONNECTING
+        while True:
+            try:
+                return self._connected_once(max(1.0, deadline - time.monotonic()))
+            except OSError as error:  # also where the connection is lost meanwhile
+                if time.monotonic() < deadline:
+                    self._beat()
+                    time.sleep(PERIOD)
+                    continue
+                message = f"there is no scheduler at '{escape(self._address)}': {escape(str(error))}"
+                raise InvalidInput([Diagnostic("USE191", message, hint="start one with `dask scheduler`")]) from None
+
+    def _connected_once(self, timeout: float) -> Client:
+        """
+        Raises:
+            InvalidInput: a worker has another version.
+            OSError: there is no scheduler, or the connection was lost.
+        """
         try:
-            client = Client(self._address, timeout=CONNECTING, set_as_default=False)
-        except (OSError, ValueError) as error:
-            message = f"there is no scheduler at '{escape(self._address)}': {escape(str(error))}"
-            raise InvalidInput([Diagnostic("USE191", message, hint="start one with `dask scheduler`")]) from None
+            client = Client(self._address, timeout=timeout, set_as_default=False)
+        except ValueError as error:
+            message = f"'{escape(self._address)}' is not the address of a scheduler: {escape(str(error))}"
+            raise InvalidInput([Diagnostic("USE191", message, hint="write tcp://HOST:PORT")]) from None
         for worker, version in client.run(eval, _VERSION, on_error="return").items():
             if version != __version__:
                 client.close()
