@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -24,11 +25,18 @@ vary: {simulation.settle: {uniform: [0, 0.1]}}
 """
 
 
+def surround(project: Path, shared: Path) -> None:
+    """A project with links to robots and controllers; copies, of which every file is read by everybody."""
+    (project / "tasks").mkdir(parents=True)
+    shutil.copytree(ROOT / "robots" / "arm7_hand3", shared / "robots" / "arm7_hand3")
+    shutil.copytree(ROOT / "controllers", shared / "controllers")
+    for name in ("robots", "controllers"):
+        (project / name).symlink_to(shared / name)
+
+
 def test_a_task_loads_to_the_same_from_its_bundle(tmp_path: Path) -> None:
     project = tmp_path / "project"
-    (project / "tasks").mkdir(parents=True)
-    for name in ("robots", "controllers"):
-        (project / name).symlink_to(ROOT / name)
+    surround(project, tmp_path / "shared")
     task = project / "tasks" / "held.yaml"
     task.write_text(TASK)
     written, opened = opened_by(lambda: Sampling(task, Settings()).written)
