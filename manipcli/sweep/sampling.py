@@ -74,19 +74,20 @@ class Sampling:
         dimension = 0
         drawn = {path for path, _ in self.written.drawn(0).values} if self.design.word != "oat" else None
         for quantity in self.written.varied:
+            free = [k for k in range(quantity.dimensions) if self.design.has(quantity, k)]
             for k, nominal in enumerate(quantity.nominal):
-                own = dimension if quantity.law.together else dimension + k
+                own = dimension if quantity.law.together else dimension + len([j for j in free if j < k])
                 name = f"{quantity.path}.{k}" if quantity.vector else quantity.path
                 column = Column(name, quantity.path, k if quantity.vector else None, float(nominal), own)
-                if quantity.values(k) > 1 and (drawn is None or quantity.path in drawn):
+                if (quantity.values(k) > 1 or self.design.word == "oat") and (drawn is None or quantity.path in drawn):
                     columns.append(column)
-            dimension += quantity.dimensions
+            dimension += len(free)
         return tuple(columns)
 
     @property
     def dimensions(self) -> int:
         """Number of dimensions of the design."""
-        return sum(quantity.dimensions for quantity in self.written.varied)
+        return sum(self.design.has(quantity, k) for quantity in self.written.varied for k in range(quantity.dimensions))
 
     def values(self, number: int) -> tuple[float, ...]:
         """The value of each column in a sample, in SI."""

@@ -65,13 +65,18 @@ class Design:
             hint = "write --design random" if word == "random" else f"write the number of points: {word}:256"
         raise InvalidInput([Diagnostic("USE180", f"'{escape(text)}' is not a design", hint=hint)])
 
+    def has(self, quantity: Varied, k: int) -> bool:
+        """Whether component k of a quantity is a dimension: one with a single value is not, except for `oat`, which
+        compares it with the value in the file."""
+        return self.word in ("random", "oat") or quantity.values(k) > 1
+
     def total(self, varied: Sequence[Varied]) -> int | None:
         """Number of samples; None for `random`, which has no end.
 
         Raises:
             InvalidInput: the design has no such N.
         """
-        dimensions = _dimensions(varied)
+        dimensions = _dimensions(self, varied)
         match self.word:
             case "random":
                 return None
@@ -111,10 +116,13 @@ def draw(varied: Sequence[Varied], seed: int, sample: int, design: Design = Desi
         InvalidInput: the design has no such N.
         IndexError: the design has no such sample.
     """
-    point = _random(varied, seed, sample) if design.word == "random" else _point(design, tuple(varied), seed, sample)
-    values, rest = [], point
+    if design.word == "random":
+        point = iter(_random(varied, seed, sample))
+    else:
+        point = iter(_point(design, tuple(varied), seed, sample))
+    values = []
     for quantity in varied:
-        own, rest = rest[: quantity.dimensions], rest[quantity.dimensions :]
+        own = [next(point) if design.has(quantity, k) else 0.5 for k in range(quantity.dimensions)]
         if any(u is not None for u in own):
             values.append((quantity.path, quantity.value(own)))
     return Drawn(sample, tuple(values), "" if design.word == "random" else str(design))
@@ -134,7 +142,7 @@ def _random(varied: Sequence[Varied], seed: int, sample: int) -> Coordinates:
 
 
 def _point(design: Design, varied: tuple[Varied, ...], seed: int, sample: int) -> Coordinates:
-    dimensions = _dimensions(varied)
+    dimensions = _dimensions(design, varied)
     total = design.total(varied)
     if total is not None and sample >= total:
         raise IndexError(f"design '{design}' has samples 0 to {total - 1}")
@@ -158,13 +166,14 @@ def _point(design: Design, varied: tuple[Varied, ...], seed: int, sample: int) -
     return _sobol(dimensions, seed, sample)[0]
 
 
-def _dimensions(varied: Sequence[Varied]) -> tuple[_Dimension, ...]:
+def _dimensions(design: Design, varied: Sequence[Varied]) -> tuple[_Dimension, ...]:
     return tuple(
         _Dimension(
             quantity.path, k, quantity.values(k), ends=quantity.law.word == "uniform" and math.isinf(quantity.values(k))
         )
         for quantity in varied
         for k in range(quantity.dimensions)
+        if design.has(quantity, k)
     )
 
 

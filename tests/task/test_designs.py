@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -95,6 +96,14 @@ def test_saltelli_has_a_b_and_a_with_each_column_of_b() -> None:
         mixed[:, j] = b[:, j]
         assert np.allclose(points[:, 2 + j], mixed, atol=1e-12)
     assert qmc.discrepancy(np.hstack([a, b])) < 0.5 * qmc.discrepancy(np.random.default_rng(0).random((32, 6)))
+
+
+def test_a_number_with_one_value_is_not_a_dimension() -> None:
+    fixed = replace(AT, path="scene.cup.pose.xyz", law=Law("uniform", ((-0.02, 0.0), (0.02, 0.0)), False))
+    assert Design("saltelli", 8).total([fixed, MASS]) == 8 * (2 + 2)
+    found = values([fixed, MASS], "sobol:8")
+    assert {at[1] for row in found if isinstance(at := row["scene.cup.pose.xyz"], tuple)} == {0.0}
+    assert len({row["scene.cup.mass"] for row in found}) == 8
 
 
 def test_a_sample_is_the_same_alone_and_says_its_design() -> None:
