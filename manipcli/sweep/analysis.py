@@ -162,12 +162,12 @@ class Analysis:
 
 def _spread(name: str, margins: Sequence[Margin]) -> Spread:
     evaluated = [margin for margin in margins if margin.value is not None]
-    values = [margin.value for margin in evaluated if margin.value is not None]
+    values = [value for margin in evaluated if (value := margin.finite) is not None]
     return Spread(
         name,
         evaluated[0].unit if evaluated else "",
         sum(not margin.missed for margin in evaluated),
         len(evaluated),
         quantiles(values) if values else (),
-        any(margin.telling for margin in margins),
+        bool(values) and any(margin.telling for margin in margins),
     )

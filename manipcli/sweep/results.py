@@ -27,6 +27,11 @@ class Margin:
     missed: bool
 
     @property
+    def finite(self) -> float | None:
+        """`value`; None also where it is infinite."""
+        return self.value if self.value is not None and math.isfinite(self.value) else None
+
+    @property
     def telling(self) -> bool:
         """Whether it says more than that the expectation is met."""
         return self.relative is not None and (self.missed or abs(self.value or 0.0) > EDGE)

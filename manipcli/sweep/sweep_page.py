@@ -159,10 +159,10 @@ def _margins(analysis: Analysis) -> Markup | None:
 
 def _margin_row(analysis: Analysis, spread: Spread) -> tuple[str, ...]:
     found = [
-        margin.value
+        value
         for result in analysis.sweep.results
         for margin in result.margins
-        if margin.name == spread.name and margin.value is not None
+        if margin.name == spread.name and (value := margin.finite) is not None
     ]
     shown = (
         [readable(spread.quantiles[k], spread.unit).replace("-", "−") for k in _SHOWN] if spread.telling else ["–"] * 5
@@ -239,7 +239,7 @@ def _data(analysis: Analysis, folder: Path) -> dict[str, object]:
     telling = [spread for spread in analysis.spreads if spread.telling]
     samples = []
     for result in analysis.sweep.results:
-        by_name = {margin.name: margin.value for margin in result.margins}
+        by_name = {margin.name: margin.finite for margin in result.margins}
         log = analysis.sweep.sampling.job(result.number).log
         samples.append(
             {

@@ -182,7 +182,7 @@ def _sample_object(analysis: Analysis, result: SampleResult) -> Mapping[str, obj
         "expectation": result.broken,
         "cause": result.cause,
         "smallest_margin": smallest if math.isfinite(smallest) else None,
-        "margins": {margin.name: margin.value for margin in result.margins},
+        "margins": {margin.name: margin.finite for margin in result.margins},
         "values": dict(zip((column.name for column in analysis.columns), analysis.values[result.number], strict=True)),
         "command": analysis.sweep.sampling.job(result.number).command(),
     }
