@@ -154,6 +154,11 @@ class ComplianceSwitch:
 
         return hold
 
+    def relax(self) -> None:
+        """Give up the force with which the arm presses, if it does: the arm stays compliant at its reference."""
+        if self._arm is not None:
+            self._arm.relax()
+
     def _switch(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The controllers that were deactivated."""
         done = self._manager.carry_out(Switch(to=names), time=self._session.time)
