@@ -25,12 +25,13 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, between, named
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
+from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import Beyond, Compliance, Pressing, compliant
-from manipcli.plan.contact_line import approach_speed, effective_mass, refuse_too_strong
+from manipcli.plan.contact_line import approach_speed, effective_mass
 from manipcli.plan.motion import Insertion, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.peg_fit import Fit, best_yaws, deep, fit, section, upright
