@@ -73,8 +73,8 @@ class ComplianceSwitch:
     def passed(self, motion: Motion) -> bool:
         """Whether the motion is over because the tool is beyond its plane, dropped, or feels too much; asked at every
         tick."""
-        until, arm = None if motion.compliance is None else motion.compliance.until, self._arm
-        if until is None or arm is None:
+        until = None if motion.compliance is None else motion.compliance.until
+        if until is None or (arm := self._arm) is None:
             return False
         along = float(until.normal @ arm.tool)
         if math.isnan(self._mean):
