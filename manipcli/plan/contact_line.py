@@ -77,7 +77,12 @@ def hover(
         NotPlannable: the tool cannot be there, or its line does not meet the body.
     """
     R = pointed(planner.tool_pose(builder.now).R, axis)
-    builder.reach("above", Transform.of(xyz=point - FAR * axis, R=R), speed=speed, free=True, leaving="spin")
+    try:
+        builder.reach("above", Transform.of(xyz=point - FAR * axis, R=R), speed=speed, free=True, leaving="spin")
+    except NotPlannable as refusal:
+        if refusal.reason not in ("reach", "orientation"):
+            raise
+        raise refusal.but(hint=f"move '{body}' nearer, or press in another `direction`") from refusal
     X_WA = planner.tool_pose(builder.now)
     travel = travel_to(planner, builder.now, body, X_WA, axis, left=left, most=FAR + SEEN / 2.0)
     if travel > 0.0:

@@ -87,3 +87,11 @@ def test_the_tool_stops_at_the_gap_with_its_axis_along_the_force():
     np.testing.assert_allclose(X_WH.R[:, 2], DOWN, atol=2e-3)
     np.testing.assert_allclose(X_WH.p[:2], point[:2], atol=2e-4)
     np.testing.assert_allclose(gap(planner, builder.now, "button"), 0.005, atol=3e-4)
+
+
+def test_a_point_out_of_reach_is_refused_with_what_the_step_has():
+    planner, state = scene()
+    builder = MotionBuilder(planner, state, verb="press")
+    with pytest.raises(NotPlannable) as caught:
+        hover(builder, planner, "button", np.array([1.1, 0.0, 0.3]), DOWN, speed=0.5)
+    assert caught.value.hint == "move 'button' nearer, or press in another `direction`"
