@@ -4,8 +4,8 @@
     - push: {object: box, onto: mat, force: 20 N}
 
 The hand goes behind the body, in line with its middle and flat on its face, and on in the direction. The arm is a
-spring along it, so that the force never exceeds `force`: the reference goes further than the body, by force / stiffness, and
-the motion ends as soon as the tool has gone the distance.
+spring along it, so that the force never exceeds `force`: the reference goes further than the body, by force /
+stiffness, and the motion ends as soon as the tool has gone the distance.
 """
 
 from __future__ import annotations
