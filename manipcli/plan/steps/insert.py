@@ -48,11 +48,11 @@ from manipcli.spec.quantity import Force, Length
 
 SUNK: Final = 0.006
 """[m] A hand that is this much lower than at the rim has found the hole: more than the peg slips in it."""
-DROP: Final = 0.0015
+DROP: Final = 0.001
 """[m] A peg that drops by this while it slides has found the hole."""
 SEARCHING: Final = 0.2
 """Share of the force with which the peg is pressed on while it slides."""
-FIRM: Final = 3000.0
+FIRM: Final = 1500.0
 """[N/m] Stiffness across the hole while it slides: friction holds it back by less than a millimetre."""
 SOFT: Final = 400.0
 """[N/m] Stiffness across the hole on the way down."""
@@ -197,6 +197,8 @@ def check(spec: InsertSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, .
     if spec.depth is not None and spec.depth > depth + 1e-9:
         message = f"'{hole.name}' is {readable(depth, 'm')} deep; expected a depth of at most that"
         return (Problem(("depth",), message, "leave `depth` out to go to its floor", "TASK352"),)
+    if not peg.geometries:
+        return ()  # its description is wrong, which is another finding
     entering = section(peg, spec.depth or depth)
     fitted = max((fit(entering, hole.interior, yaw) for yaw in (0.0, math.pi / 2.0)), key=lambda each: each.clearance)
     if fitted.clearance <= 0.0:
