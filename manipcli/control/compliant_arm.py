@@ -23,8 +23,8 @@ import numpy as np
 
 from manipcli.control.compliant_shift import CompliantShift
 from manipcli.control.controller import BuildContext, Controller, ControllerOutput, JointState
-from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceController
 from manipcli.control.felt_force import FeltForce
+from manipcli.control.impedance_controller import CartesianImpedanceController
 from manipcli.control.pressing import PressingReference
 from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle

@@ -44,13 +44,14 @@ def every_finding(
     seed: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
+    design: str = "",
 ) -> InvalidInput:
     """All errors of a task and of the files it names, in the order of files and lines.
 
     Args:
         path: the task file.
         first: the error that stopped loading.
-        overrides, seed, package_path, allow_outside: the options with which it was loaded.
+        overrides, seed, package_path, allow_outside, design: the options with which it was loaded.
     """
     errors = _Errors()
     model = task_spec()

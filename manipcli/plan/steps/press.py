@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -25,7 +25,7 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember, single
-from manipcli.plan.steps.move import RENAMED, VelocityScaling
+from manipcli.plan.steps.move import VelocityScaling
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.names import FrameName
@@ -43,8 +43,6 @@ RELAX: Final = 0.4
 
 class ForceSpec(Model):
     """Keys of steps that press with a force."""
-
-    renamed: ClassVar = RENAMED
 
     object: FrameName = Field(description="The body, or a part of one (`panel/button`).")
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(description="Of the tool on it [N], above 0.")
