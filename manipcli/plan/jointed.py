@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, cross
-from manipcli.plan.motion import PlanningState
+from manipcli.core.prose import amount
+from manipcli.plan.motion import JointGoal, PlanningState
 from manipcli.plan.path import ANGULAR_STEP, LINEAR_STEP
 from manipcli.plan.planner import Planner
 from manipcli.plan.prediction import put
@@ -62,9 +63,41 @@ def tool_twist(planner: Planner, state: PlanningState, joint: SceneJoint, X_WT: 
     return np.concatenate((cross(axis, X_WT.p - X_WJ.p), axis))
 
 
-def needed(joint: SceneJoint, position: float, speed: float) -> float:
-    """[N m or N] The effort that moves a joint through a position at a constant `speed`: friction, spring, damper."""
-    return float(np.sign(speed)) * joint.friction - joint.passive_effort(position, speed)
+def weight(planner: Planner, state: PlanningState, joint: SceneJoint, position: float) -> float:
+    """[N m or N] The effort at a joint, at a position, by the weight of its link and of what is in it or on it."""
+    moved = moved_to(planner, state, joint, position)
+    effort = 0.0
+    for name in (joint.child, *planner.aboard(state, joint.child)):
+        body = planner.scene.body(name)
+        middle = planner.body_pose(moved, name) @ body.X_OI
+        effort += body.mass * float(planner.scene.gravity @ tool_twist(planner, moved, joint, middle)[:3])
+    return effort
+
+
+def needed(joint: SceneJoint, position: float, speed: float, weight: float = 0.0) -> float:
+    """[N m or N] The effort that moves a joint at a constant `speed`, besides an effort by weight, at a position."""
+    return float(np.sign(speed)) * joint.friction - joint.passive_effort(position, speed) - weight
+
+
+def does_not_stay(planner: Planner, state: PlanningState, joint: SceneJoint, goal: JointGoal) -> str:
+    """Why a joint leaves a goal when the hand lets go: spring and weight exceed its friction; "" where it stays."""
+
+    def drive(position: float) -> float:
+        return joint.passive_effort(position) + weight(planner, state, joint, position)
+
+    there = drive(goal.position)
+    sense = float(np.sign(there))
+    off = goal.position + sense * goal.within
+    if sense == goal.side or not joint.lower < off < joint.upper:
+        return ""
+    if min(sense * there, sense * drive(off)) <= joint.friction:
+        return ""
+    cause = "spring" if sense * joint.passive_effort(goal.position) > joint.friction else "weight"
+    at, unit = amount(goal.position, joint.unit), joint.effort_unit
+    return (
+        f"'{joint.name}' does not stay at {at} when the hand lets go: its {cause} moves it with "
+        f"{amount(abs(there), unit)}, its friction holds {amount(joint.friction, unit)}"
+    )
 
 
 def wrench_of(twist: Array, effort: float) -> Array:

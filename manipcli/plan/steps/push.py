@@ -3,9 +3,9 @@
     - push: {object: box, by: 10 cm, direction: [0, 1]}
     - push: {object: box, onto: mat, force: 20 N}
 
-The hand goes behind the body, in line with its middle, and on in the direction. The arm is a spring along it, so that
-the force never exceeds `force`: the reference goes further than the body, by force / stiffness, and the motion ends as
-soon as the tool has gone the distance.
+The hand goes behind the body, in line with its middle and flat on its face, and on in the direction. The arm is a
+spring along it, so that the force never exceeds `force`: the reference goes further than the body, by force /
+stiffness, and the motion ends as soon as the tool has gone the distance.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, named, point
 from manipcli.core.units import readable
+from manipcli.model.grasp import friction_coefficient
 from manipcli.model.robot import RobotModel
 from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.candidates import Candidate, Candidates
@@ -57,13 +58,20 @@ BACK: Final = 0.03
 """[m] By which the hand backs off."""
 ALONG_WAY: Final = 4
 """Places on the way at which the body is examined."""
+FLAT: Final = ("box", "tray")
+"""Shapes with flat faces."""
+LEVEL: Final = 0.1
+"""Largest vertical part of the unit normal of a face that the hand lies on."""
+RESERVE: Final = 0.8
+"""Share of the friction between hand and face that a plan uses."""
 UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 class PushSpec(Model):
     """Slide a body over what it stands on, straight, with the closed hand behind it.
 
-    Exactly one of `by`, `to` and `onto` says how far. The body keeps its rotation. The arm yields along the push, so
+    Exactly one of `by`, `to` and `onto` says how far. The body keeps its rotation: the hand is flat on the face of a
+    box, and a push further off this face than friction allows is refused. The arm yields along the push, so
     that it never presses with more than `force`; no controllers file is needed for it.
 
     It is done when the body is measured to be within 1 cm and 10 deg of its goal; it fails if the body needs more than
@@ -129,6 +137,7 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
     if distance < 1e-3:
         raise NotPlannable(f"'{spec.object}' is there already: the way is {readable(distance, 'm')}")
     axis = shift / distance
+    normal = facing(spec, planner, state, axis)
     _refuse_obstructed(spec, planner, state, shift)
     body, X_WO = planner.scene.body(spec.object), planner.body_pose(state, spec.object)
     middle = X_WO.apply(body.centre)
@@ -137,9 +146,9 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
 
     def attempt(share: float, turn: float) -> StepPlan:
         start = middle - (outline + BEHIND) * axis + (2.0 * share - 1.0) * half[2] * UP
-        side = np.cross(UP, axis)
+        side, along_face = np.cross(UP, axis), np.cross(UP, normal)
         c, s = math.cos(turn), math.sin(turn)
-        y = c * side + s * axis  # of the tool: the fingers are broad along it
+        y = c * along_face + s * normal  # of the tool: the fingers are broad along it
         R = np.column_stack([np.cross(y, -UP), y, -UP])
         builder = MotionBuilder(planner, state, verb="push")
         builder.reach("behind", Transform.of(xyz=start, R=R), speed=spec.velocity_scaling, hand=spec.posture, free=True)
@@ -177,6 +186,28 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
         for share, turn in ways
     ]
     return Candidates(options, what=f"cannot push '{spec.object}'")
+
+
+def facing(spec: PushSpec, planner: Planner, state: PlanningState, axis: Array) -> Array:
+    """(3,) horizontal unit vector into the face that the hand lies flat on; of other shapes than boxes the direction.
+
+    Raises:
+        NotPlannable: the direction is outside the cone of friction about it: the hand would slide along the face, and
+            the body rotate.
+    """
+    body = planner.scene.body(spec.object)
+    if body.kind not in FLAT:
+        return axis
+    columns = planner.body_pose(state, spec.object).R.T
+    normals = [sign * column for column in columns if abs(column[2]) < LEVEL for sign in (1.0, -1.0)]
+    normal = max(normals, key=lambda each: float(each @ axis), default=axis)
+    cone = math.atan(RESERVE * friction_coefficient(planner.robot, body))
+    off = math.acos(min(1.0, float(normal @ axis)))
+    if off > cone:
+        message = f"'{spec.object}' would rotate: the push is {readable(off, 'rad')} off its face"
+        limit = f"friction keeps the hand on the face up to {readable(cone, 'rad')}"
+        raise NotPlannable(f"{message}, {limit}", hint="push it along its faces, in two steps")
+    return np.array([normal[0], normal[1], 0.0]) / math.hypot(normal[0], normal[1])
 
 
 def _carried(planner: Planner, state: PlanningState, name: str, X_WO: Transform) -> dict[str, Transform]:
