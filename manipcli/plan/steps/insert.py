@@ -89,8 +89,8 @@ class InsertSpec(Model):
     into: ContainerName = Field(description="The container whose hollow is the hole.")
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
         15.0,
-        description="Force of the tool along the hole [N], above 0; it slides with a fifth. Impacts may exceed it for a "
-        "moment; the most that was felt is reported. Default 15 N.",
+        description="Force of the tool along the hole [N], above 0; it slides with a fifth. Impacts may exceed it for "
+        "a moment; the most that was felt is reported. Default 15 N.",
     )
     depth: Annotated[Length, Field(gt=0, le=1.0)] | None = Field(
         None, description="How deep the end of the peg goes, from the rim [m]. Default: to the floor of the hole."
