@@ -61,6 +61,10 @@ class Compliant(Controller, Protocol):
         """Obey this compliance from the next update on, without a step in the force."""
         ...
 
+    def relax(self) -> None:
+        """Give up its force from the next update on, without a step."""
+        ...
+
 
 def complies(controller: Controller) -> TypeGuard[Compliant]:
     """Whether it is a compliant controller of an arm."""
@@ -115,6 +119,10 @@ class ImpedanceArm(CartesianImpedanceController):
             self._updates = 0
             self._offset = self._tool if compliance.X_TC is None else self._tool @ compliance.X_TC
 
+    def relax(self) -> None:
+        """Give up its force from the next update on, without a step."""
+        self._law.relax()
+
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""
         super().deactivate(time, reason)
@@ -160,6 +168,10 @@ class AdmittanceArm(JointTrajectoryController):
         """Obey this compliance from the next update on; what is felt at the activation is felt as zero."""
         if self._law.obey(compliance):
             self._frame = self._tool if compliance.X_TC is None else self._tool @ compliance.X_TC
+
+    def relax(self) -> None:
+        """Give up its force from the next update on, without a step."""
+        self._law.relax()
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""

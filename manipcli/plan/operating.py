@@ -189,7 +189,7 @@ def refuse_force(handling: Handling, planner: Planner, state: PlanningState, *, 
     held = RESERVE * 2.0 * friction_coefficient(planner.robot, planner.scene.body(joint.child)) * handling.force
     hooked = abs(float(X_WT.R[:, 1] @ wrench[:3])) >= HOOKED * size
     with handling.forced():
-        refuse_weak(planner, state, wrench, handling.label)
+        refuse_weak(planner, state.position, wrench, handling.label)
         if gripped and size > held and not hooked:
             message = f"{handling.label}: two fingers hold {held:.3g} N by friction, the joint needs {size:.4g} N"
             raise NotPlannable(message, hint="press more, `force: ...`, or take a handle that fits behind a finger")

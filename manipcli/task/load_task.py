@@ -23,6 +23,7 @@ from manipcli.task.named_file import named_file
 from manipcli.task.sample import draw_sample, drawn_sample
 from manipcli.task.second_chances import every_finding
 from manipcli.task.sensor_checks import refuse, sensed, sensor_findings
+from manipcli.task.spring_checks import spring_findings
 from manipcli.task.task import Task
 from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
@@ -168,6 +169,7 @@ def _as_written(
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
     warnings = consistent(file, controllers_file, robot, scene, sensed(file, robot_file, robot, scene))
     refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
+    refuse([*spring_findings(file, scene)])
     complying = (*compliance_findings(file, robot_file, controllers_file, robot),)
     refuse([finding for finding in complying if finding.severity == "error"])
     varied = bound(Files(file, robot_file, controllers_file))

@@ -222,9 +222,9 @@ def test_the_force_that_the_arm_can_give_is_where_a_joint_meets_its_limit() -> N
     most = min(
         (limit - np.sign(w) * g) / abs(w) for w, g, limit in zip(work, gravity, limits, strict=True) if abs(w) > 1e-6
     )
-    refuse_weak(planner, state, np.append(0.999 * most * direction, np.zeros(3)), "pull")
+    refuse_weak(planner, state.position, np.append(0.999 * most * direction, np.zeros(3)), "pull")
     with pytest.raises(NotPlannable, match=r"pull: the arm can give [\d.]+ N there, not [\d.]+ N: then joint 'panda_"):
-        refuse_weak(planner, state, np.append(1.001 * most * direction, np.zeros(3)), "pull")
+        refuse_weak(planner, state.position, np.append(1.001 * most * direction, np.zeros(3)), "pull")
 
 
 @pytest.mark.parametrize("roll", [0.0, 90.0])

@@ -17,10 +17,11 @@ from manipcli.conditions.frames import carrier, unknown_frame
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, named, point
 from manipcli.model.robot import RobotModel
+from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import SOFT, Compliance, Pressing, compliant
-from manipcli.plan.contact_line import CLOSE, HOVER, approach_speed, effective_mass, hover, refuse_too_strong
+from manipcli.plan.contact_line import CLOSE, HOVER, approach_speed, effective_mass, hover
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner

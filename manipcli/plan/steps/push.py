@@ -26,11 +26,12 @@ from manipcli.core.prose import amount, named, point
 from manipcli.core.units import readable
 from manipcli.model.grasp import friction_coefficient
 from manipcli.model.robot import RobotModel
+from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import FIRM, Beyond, Compliance, compliant
-from manipcli.plan.contact_line import HOVER, gap, refuse_too_strong
+from manipcli.plan.contact_line import HOVER, ahead, travel_to
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -48,6 +49,8 @@ BEHIND: Final = 0.06
 """[m] Gap between the body's outline and the tool, from which the hand comes straight on."""
 HEIGHTS: Final = (0.5, 0.35, 0.7, 0.9)
 """Of the tool above the bottom of the body, as shares of its height."""
+FARTHEST: Final = 0.38
+"""[m] From there on it does not look for the body any more."""
 STEADY: Final = 2000.0
 """[N/m] Stiffness along the push."""
 PACE: Final = 0.1
@@ -158,9 +161,9 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
         builder.reach("behind", Transform.of(xyz=start, R=R), speed=spec.velocity_scaling, hand=spec.posture, free=True)
         refuse_too_strong(planner, builder.now.position, axis, spec.force)
         X_WA = planner.tool_pose(builder.now)
-        near = _advance(planner, builder.now, spec.object, X_WA, axis)
+        near = travel_to(planner, builder.now, spec.object, X_WA, axis, left=HOVER, most=FARTHEST)
         end = near + distance + HOVER
-        builder.straight("approach", _moved(X_WA, near, axis), speed=spec.velocity_scaling)
+        builder.straight("approach", ahead(X_WA, near, axis), speed=spec.velocity_scaling)
         slack = spec.force / STEADY
         stuck = f"'{spec.object}' did not go {readable(distance, 'm')}: it needs more than {readable(spec.force, 'N')}"
         beyond = Beyond(frozen(axis), float(axis @ X_WA.p) + end, most=spec.force, otherwise=stuck)
@@ -169,12 +172,12 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
         allowed = planner.hand_contacts(spec.object)
         with compliant(builder, replace(law, until=beyond)):
             builder.straight(
-                "push", _moved(X_WA, end + slack, axis), speed=PACE * spec.velocity_scaling, allowed=allowed
+                "push", ahead(X_WA, end + slack, axis), speed=PACE * spec.velocity_scaling, allowed=allowed
             )
         moved = Transform.of(xyz=shift) @ X_WO
         with compliant(builder, replace(law, relative=True)):
             builder.straight(
-                "back off", _moved(X_WA, end - BACK, axis), speed=spec.velocity_scaling / 2.0, allowed=allowed
+                "back off", ahead(X_WA, end - BACK, axis), speed=spec.velocity_scaling / 2.0, allowed=allowed
             )
         planned = builder.plan()
         motions = tuple(replace(motion, awaits=False) for motion in planned.motions)
@@ -212,31 +215,6 @@ def facing(spec: PushSpec, planner: Planner, state: PlanningState, axis: Array) 
         limit = f"friction keeps the hand on the face up to {readable(cone, 'rad')}"
         raise NotPlannable(f"{message}, {limit}", hint="push it along its faces, in two steps")
     return np.array([normal[0], normal[1], 0.0]) / math.hypot(normal[0], normal[1])
-
-
-def _advance(planner: Planner, state: PlanningState, body: str, X_WA: Transform, axis: Array) -> float:
-    """[m] from X_WA along the axis to a gap of `HOVER`.
-
-    Raises:
-        NotPlannable: the hand does not meet the body on its line.
-    """
-    travel, near = 0.0, gap(planner, state, body)
-    for _ in range(12):
-        if near - HOVER < 1e-4:
-            return travel
-        travel += near - HOVER
-        if travel > 3.0 * BEHIND + 0.2:
-            break
-        q = planner.solver.solve(_moved(X_WA, travel, axis), state.position, planner.rng)
-        state = state.moved(q)
-        near = gap(planner, state, body)
-    else:
-        return travel
-    raise NotPlannable(f"the hand does not meet '{body}' on its line")
-
-
-def _moved(X: Transform, distance: float, axis: Array) -> Transform:
-    return Transform.of(xyz=distance * axis) @ X
 
 
 def _carried(planner: Planner, state: PlanningState, name: str, X_WO: Transform) -> dict[str, Transform]:
