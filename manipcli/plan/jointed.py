@@ -21,6 +21,9 @@ from manipcli.scene.joints import SceneJoint
 
 LEVER: Final = 0.01
 """[m] A tool nearer to the axis of a hinge turns it by a torque, not by a force."""
+PLACES: Final = 101
+"""Positions at which a joint is examined for whether it stays."""
+HALVINGS: Final = 30
 
 
 def position_of(planner: Planner, state: PlanningState, joint: SceneJoint) -> float:
@@ -94,10 +97,38 @@ def does_not_stay(planner: Planner, state: PlanningState, joint: SceneJoint, goa
         return ""
     cause = "spring" if sense * joint.passive_effort(goal.position) > joint.friction else "weight"
     at, unit = amount(goal.position, joint.unit), joint.effort_unit
+    on = stays_from(planner, state, joint, goal)
+    held = f"; it stays from {amount(on, joint.unit)} on" if on is not None else ""
     return (
         f"'{joint.name}' does not stay at {at} when the hand lets go: its {cause} moves it with "
-        f"{amount(abs(there), unit)}, its friction holds {amount(joint.friction, unit)}"
+        f"{amount(abs(there), unit)}, its friction holds {amount(joint.friction, unit)}{held}"
     )
+
+
+def stays_from(planner: Planner, state: PlanningState, joint: SceneJoint, goal: JointGoal) -> float | None:
+    """[rad or m] The next position beyond a goal, on its side, at which the joint stays or moves on; None for none.
+
+    The weight has the effort a cos q + b sin q on a hinge, and a constant one on a slide.
+    """
+    a = weight(planner, state, joint, 0.0)
+    b = 0.0 if joint.slides else weight(planner, state, joint, np.pi / 2.0)
+
+    def back(q: float) -> float:
+        by_weight = a if joint.slides else a * np.cos(q) + b * np.sin(q)
+        return float(-goal.side * (joint.passive_effort(q) + by_weight)) - joint.friction
+
+    end = joint.upper if goal.side > 0.0 else joint.lower
+    if not goal.side or not np.isfinite(end):
+        return None
+    places = np.linspace(goal.position, end, PLACES)
+    k = next((k for k, q in enumerate(places) if back(q) <= 0.0), None)
+    if k is None:
+        return None
+    falls, stays = float(places[max(k - 1, 0)]), float(places[k])
+    for _ in range(HALVINGS):
+        middle = (falls + stays) / 2.0
+        falls, stays = (falls, middle) if back(middle) <= 0.0 else (middle, stays)
+    return stays
 
 
 def wrench_of(twist: Array, effort: float) -> Array:

@@ -22,7 +22,17 @@ from manipcli.plan.aboard import aboard
 from manipcli.plan.arm_force import refuse_weak
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.handle_frames import handle_frames
-from manipcli.plan.jointed import along, does_not_stay, moved_to, needed, position_of, tool_twist, weight, wrench_of
+from manipcli.plan.jointed import (
+    along,
+    does_not_stay,
+    moved_to,
+    needed,
+    position_of,
+    stays_from,
+    tool_twist,
+    weight,
+    wrench_of,
+)
 from manipcli.plan.motion import JointGoal, PlanningState
 from manipcli.plan.operating import ALONG, RESERVE, Handling, compliance, refuse_force
 from manipcli.plan.planner import Planner
@@ -142,6 +152,11 @@ def test_a_lid_falls_back_where_its_friction_does_not_hold_its_weight() -> None:
         assert needed(lid, q, 1e-9, effort(q)) == pytest.approx(lid.friction - effort(q))
     half = JointGoal(lid.name, 1.0, 1.0, 0.05)
     assert "its weight moves it with" in does_not_stay(planner, state, lid, half)
+    holds = stays_from(planner, state, lid, half)
+    assert holds is not None and effort(holds) == pytest.approx(-lid.friction)  # friction holds it there
+    assert f"it stays from {np.degrees(holds):.4g} deg on" in does_not_stay(planner, state, lid, half)
+    sprung = replace(lid, stiffness=2.0)
+    assert stays_from(planner, state, sprung, half) is None
     firm = replace(lid, friction=1.01 * abs(effort(0.95)))
     assert not does_not_stay(planner, state, firm, half)
     assert not does_not_stay(planner, state, lid, replace(half, position=1.8))  # beyond the vertical it falls open

@@ -1,7 +1,7 @@
 """`push`: slide a body over what it stands on, with the closed hand behind it.
 
     - push: {object: box, by: 10 cm, direction: [0, 1]}
-    - push: {object: box, onto: mat, force: 20 N}
+    - push: {object: box, onto: mark, force: 20 N}
 
 The hand goes behind the body, in line with its middle and flat on its face, and on in the direction. The arm is a
 spring along it, so that the force never exceeds `force`: the reference goes further than the body, by force /
@@ -36,6 +36,7 @@ from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.prediction import put
+from manipcli.plan.sliding import LEVEL, refuse_step_up, refuse_too_heavy, step_up
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.unknown_names import unknown_posture
@@ -60,7 +61,7 @@ ALONG_WAY: Final = 4
 """Places on the way at which the body is examined."""
 FLAT: Final = ("box", "tray")
 """Shapes with flat faces."""
-LEVEL: Final = 0.1
+UPRIGHT: Final = 0.1
 """Largest vertical part of the unit normal of a face that the hand lies on."""
 RESERVE: Final = 0.8
 """Share of the friction between hand and face that a plan uses."""
@@ -72,7 +73,8 @@ class PushSpec(Model):
 
     Exactly one of `by`, `to` and `onto` says how far. The body keeps its rotation: the hand is flat on the face of a
     box, and a push further off this face than friction allows is refused. The arm yields along the push, so
-    that it never presses with more than `force`; no controllers file is needed for it.
+    that it never presses with more than `force`; no controllers file is needed for it. A push that friction under the
+    body stops, mu m g, is refused.
 
     It is done when the body is measured to be within 1 cm and 10 deg of its goal; it fails if the body needs more than
     `force`.
@@ -86,7 +88,9 @@ class PushSpec(Model):
         None, description="With `by`: in the world, [x, y] of any length. Default: away from the base of the robot."
     )
     to: tuple[Length, Length] | None = Field(None, description="Where its frame goes, [x, y] in the world [m].")
-    onto: BodyName | None = Field(None, description="The body over whose middle it goes, as a mat.")
+    onto: BodyName | None = Field(
+        None, description="The body over whose middle it goes; its top is level with what the body stands on."
+    )
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
         30.0, description="Largest force of the hand on it [N], above 0. Default 30 N."
     )
@@ -137,6 +141,9 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
     if distance < 1e-3:
         raise NotPlannable(f"'{spec.object}' is there already: the way is {readable(distance, 'm')}")
     axis = shift / distance
+    if spec.onto is not None:
+        refuse_step_up(planner, state, spec.object, spec.onto)
+    refuse_too_heavy(planner, state, spec.object, axis, spec.force)
     normal = facing(spec, planner, state, axis)
     _refuse_obstructed(spec, planner, state, shift)
     body, X_WO = planner.scene.body(spec.object), planner.body_pose(state, spec.object)
@@ -199,7 +206,7 @@ def facing(spec: PushSpec, planner: Planner, state: PlanningState, axis: Array) 
     if body.kind not in FLAT:
         return axis
     columns = planner.body_pose(state, spec.object).R.T
-    normals = [sign * column for column in columns if abs(column[2]) < LEVEL for sign in (1.0, -1.0)]
+    normals = [sign * column for column in columns if abs(column[2]) < UPRIGHT for sign in (1.0, -1.0)]
     normal = max(normals, key=lambda each: float(each @ axis), default=axis)
     cone = math.atan(RESERVE * friction_coefficient(planner.robot, body))
     off = math.acos(min(1.0, float(normal @ axis)))
@@ -220,7 +227,8 @@ def _carried(planner: Planner, state: PlanningState, name: str, X_WO: Transform)
 def _refuse_obstructed(spec: PushSpec, planner: Planner, state: PlanningState, shift: Array) -> None:
     """
     Raises:
-        NotPlannable: the body would meet another on its way, which it does not touch now.
+        NotPlannable: the body would meet another on its way, which it does not touch now; over what is level with its
+            support it slides.
     """
     X_WO = planner.body_pose(state, spec.object)
     free = {name for pair in planner.touching(state, spec.object) for name in pair}
@@ -229,7 +237,7 @@ def _refuse_obstructed(spec: PushSpec, planner: Planner, state: PlanningState, s
         there = put(planner, state, {spec.object: Transform.of(xyz=k / ALONG_WAY * shift) @ X_WO})
         for pair in sorted(planner.touching(there, spec.object)):
             other = next((name for name in pair if name not in free), None)
-            if other is not None:
+            if other is not None and step_up(planner, state, spec.object, other) > LEVEL:
                 hint = f"move '{other}' away, or push it less far"
                 raise NotPlannable(f"'{other}' is in the way of '{spec.object}'", hint=hint, parts=frozenset((other,)))
 
