@@ -45,6 +45,7 @@ class Settings:
         pictures: draw runs that did not pass.
         baseline: compare a run of a task as written with its baseline.
         engines: run each task in these engines and compare the runs; empty: in its own engine.
+        design: the design of the samples, `sobol:256`; "": random ones.
         check_step: run each task also at half the physics step, and compare the runs.
         silence: stop a run without progress for this time [s]; `inf` for never.
         timeout: stop a run that takes longer [s]; `inf` for never.
@@ -54,6 +55,7 @@ class Settings:
     seed: int | None = None
     package_path: tuple[Path, ...] = ()
     allow_outside: bool = False
+    design: str = ""
     folder: Path = FOLDER
     pages: Path | None = None
     keep_logs: bool = False
@@ -74,6 +76,7 @@ class Loading:
     seed: int | None = None
     package_path: tuple[Path, ...] = ()
     allow_outside: bool = False
+    design: str = ""
 
     @property
     def options(self) -> FileOptions:
@@ -82,6 +85,7 @@ class Loading:
             "seed": self.seed,
             "package_path": self.package_path,
             "allow_outside": self.allow_outside,
+            "design": self.design,
         }
 
 
@@ -96,7 +100,14 @@ class Job:
     @property
     def loading(self) -> Loading:
         settings = self.settings
-        return Loading(self.path, settings.overrides, settings.seed, settings.package_path, settings.allow_outside)
+        return Loading(
+            self.path,
+            settings.overrides,
+            settings.seed,
+            settings.package_path,
+            settings.allow_outside,
+            settings.design,
+        )
 
     @property
     def log(self) -> Path:
@@ -140,6 +151,7 @@ class Job:
         words = ["manipcli", verb, f"./{file}" if file.startswith("-") else file]
         words += [] if settings.seed is None else ["--seed", str(settings.seed)]
         words += [] if self.case.sample is None else ["--sample", str(self.case.sample)]
+        words += ["--design", settings.design] if settings.design else []
         for override in settings.overrides:
             words += ["--set", override]
         words += self._variant_words()

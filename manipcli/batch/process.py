@@ -77,14 +77,14 @@ def run_jobs(
     An exception (an interrupt) and `close` kill what is running and remove its files.
 
     Args:
-        jobs: the runs, in the order in which they start.
+        jobs: the runs, in the order in which they start; the caller may change a deque between two reports.
         at_once: number of parallel runs.
         observer: callback for each start and each heartbeat.
         command: another program instead of `batch/child.py`, started as a new process.
         server: another program instead of `batch/fork_server.py`.
         pool: an open one, of whoever starts runs one at a time; it stays open.
     """
-    waiting = deque(jobs)
+    waiting = jobs if isinstance(jobs, deque) else deque(jobs)
     running: list[Process] = []
     own = None if pool is not None else ForkPool([] if command and not server else waiting, command=server)
     pool = pool or own

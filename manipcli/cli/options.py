@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -37,6 +39,12 @@ Sample = Annotated[
         "--sample", metavar="N", min=0, help="Use sample N of the task's `vary:` [default: the task as written]."
     ),
 ]
+Design = Annotated[
+    str,
+    typer.Option(
+        "--design", metavar="NAME:N", help="Take --sample from this design of N points, sobol:256 [default: random]."
+    ),
+]
 PackagePath = Annotated[
     list[Path] | None,
     typer.Option("--package-path", metavar="DIR", help="Search DIR for packages, too; repeatable."),
@@ -52,6 +60,24 @@ PagePort = Annotated[
     ),
 ]
 OpenPage = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
+
+
+def check_design(design: str, sample: int | None) -> None:
+    """
+    Raises:
+        InvalidInput: a design without a sample.
+    """
+    if design and sample is None:
+        message = f"--design {design} needs --sample N"
+        raise InvalidInput([Diagnostic("USE180", message, hint="name the sample, or run all with `manipcli sweep`")])
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    else:
+        return os.cpu_count() or 1
 
 
 def seconds(word: str) -> float:

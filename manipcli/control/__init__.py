@@ -2,7 +2,6 @@
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalRejected, GoalResult, GripperGoal
 from manipcli.control.controller import Controller, ControllerOutput, JointState
-from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceController
 from manipcli.control.controllers.computed_torque import ComputedTorqueController
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.controllers.forward_command import ForwardCommandController
@@ -10,6 +9,7 @@ from manipcli.control.controllers.gripper import GripperController
 from manipcli.control.controllers.joint_state_broadcaster import JointStateBroadcaster
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.controllers.pid import PidController
+from manipcli.control.impedance_controller import CartesianImpedanceController
 from manipcli.control.limit_laws import limit_acceleration, limit_effort, limit_position, limit_velocity
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager

@@ -23,8 +23,8 @@ import numpy as np
 
 from manipcli.control.compliant_shift import CompliantShift
 from manipcli.control.controller import BuildContext, Controller, ControllerOutput, JointState
-from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceController
 from manipcli.control.felt_force import FeltForce
+from manipcli.control.impedance_controller import CartesianImpedanceController
 from manipcli.control.pressing import PressingReference
 from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
@@ -59,6 +59,10 @@ class Compliant(Controller, Protocol):
 
     def comply(self, compliance: Compliance) -> None:
         """Obey this compliance from the next update on, without a step in the force."""
+        ...
+
+    def relax(self) -> None:
+        """Give up its force from the next update on, without a step."""
         ...
 
 
@@ -115,6 +119,10 @@ class ImpedanceArm(CartesianImpedanceController):
             self._updates = 0
             self._offset = self._tool if compliance.X_TC is None else self._tool @ compliance.X_TC
 
+    def relax(self) -> None:
+        """Give up its force from the next update on, without a step."""
+        self._law.relax()
+
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""
         super().deactivate(time, reason)
@@ -160,6 +168,10 @@ class AdmittanceArm(JointTrajectoryController):
         """Obey this compliance from the next update on; what is felt at the activation is felt as zero."""
         if self._law.obey(compliance):
             self._frame = self._tool if compliance.X_TC is None else self._tool @ compliance.X_TC
+
+    def relax(self) -> None:
+        """Give up its force from the next update on, without a step."""
+        self._law.relax()
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Abort its goal and reset its state; the next update re-activates it."""

@@ -6,6 +6,8 @@ without a new force it is given up smoothly.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from manipcli.control.felt_force import FeltForce
@@ -60,6 +62,11 @@ class CompliantShift:
         elif self.value.any():
             self._relaxing = Relaxing(self.value.copy())
         return True
+
+    def relax(self) -> None:
+        """Give up the force, smoothly; without one nothing changes."""
+        if self.pressing is not None:
+            self.obey(replace(self.compliance, force=None))
 
     def wrench(self) -> Array:
         """(6,) what the tool exerts, in the axes of the compliant frame [N, N m]."""

@@ -5,6 +5,9 @@ With the felt force p along the axis and the stiffness k of the spring, the shif
     s' = speed                              before contact,
     s' = 2 pi bandwidth (target - p) / k    in contact; at most `speed` where what is touched may give way.
 
+While the force first rises, s' is also at most speed (k + K) / k. K is the stiffness of what is touched, the force over
+the distance by which it gave way: a button moves at `speed` at most, and so meets its end stop.
+
 In contact with something stiff p' = k s', so that p tends to the target as exp(-2 pi bandwidth t) and never exceeds it.
 Contact begins above `TOUCH` of the target, at least `LEAST` [N], and is lost below half of that: the reference then
 advances at `speed` again, from where the spring is relaxed, so that nothing is wound up. Integral control of the force
@@ -59,6 +62,8 @@ class PressingReference:
         self.shift, self.contact, self.touching = shift, contact, contact is not None
         self.peak = self.held = self.steady = self.mean = 0.0
         self._since = 0.0
+        self._met: tuple[float, float] | None = None
+        """Tool [m] and force [N] at the first contact; None once the force has reached the target."""
         self._rate = math.tau * pressing.bandwidth / stiffness
         self._began = max(LEAST, TOUCH * pressing.target)
 
@@ -107,7 +112,7 @@ class PressingReference:
         self.peak = max(self.peak, felt)
         touching = felt >= (0.5 * self._began if self.touching else self._began)
         if touching and self.contact is None:
-            self.contact = self.shift
+            self.contact, self._met = self.shift, (self.shift - stretch, felt)
         if self.touching and not touching:
             self.shift -= max(0.0, stretch)
         self.touching = touching
@@ -115,12 +120,16 @@ class PressingReference:
         step = self._rate * error if touching else pressing.speed
         if pressing.yields:
             step = min(step, pressing.speed)
+        if self._met is not None and (given := self.shift - stretch - self._met[0]) >= 0.0:
+            body = max(0.0, felt - self._met[1]) / given if given else 0.0
+            step = min(step, pressing.speed * (1.0 + body / self.stiffness))
         if step < 0.0 or not self.missed:
             self.shift += step * period
         if self.contact is not None:
             self._since += period
             self.mean += (felt - self.mean) * period / self._since
         if abs(error) <= TOLERANCE * pressing.target:
+            self._met = None
             self.held += period
             self.steady += (felt - self.steady) * period / self.held
         else:

@@ -192,7 +192,8 @@ class LiveSteps:
 
     def _uncompliant(self, task: Task) -> str:
         """Why the arm cannot comply in the step of a task; "" where it can, or need not."""
-        if not felt(task.spec) or self._session.engine.ideal or any(complies(own) for own in self._session.manager.controllers):
+        controllers = self._session.manager.controllers
+        if not felt(task.spec) or self._session.engine.ideal or any(map(complies, controllers)):
             return ""
         return "the arm has no compliant controller, as no step of the session's task is compliant; add one to it"
 

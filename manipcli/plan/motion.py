@@ -266,3 +266,8 @@ class StepPlan:
     def duration(self) -> float:
         """Planned duration [s]."""
         return sum(motion.duration for motion in self.motions)
+
+    @property
+    def depends_on_state(self) -> bool:
+        """Whether it has motions that are planned from the state."""
+        return any(part is not None for own in self.motions for part in (own.trajectory, own.grip, own.looks))

@@ -23,7 +23,7 @@ from manipcli.plan.candidates import Candidate
 from manipcli.plan.compliance import Compliance, compliant
 from manipcli.plan.grasp_frames import GraspFrame
 from manipcli.plan.handle_frames import handle_frames
-from manipcli.plan.jointed import LEVER, along, moved_to, needed, position_of, tool_twist, wrench_of
+from manipcli.plan.jointed import LEVER, along, moved_to, needed, position_of, tool_twist, weight, wrench_of
 from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
@@ -159,7 +159,7 @@ def follow(handling: Handling, planner: Planner, builder: MotionBuilder) -> None
     sense = float(np.sign(goal.position - here))
     twist = tool_twist(planner, state, joint, X_WT)
     law, stiffness = compliance(twist, X_WT)
-    lead = needed(joint, goal.position, CREEP * sense) / stiffness
+    lead = needed(joint, goal.position, CREEP * sense, weight(planner, state, joint, goal.position)) / stiffness
     beyond = goal.position + max(-LEAD, min(LEAD, lead))
     with compliant(builder, law):
         try:
@@ -180,13 +180,16 @@ def refuse_force(handling: Handling, planner: Planner, state: PlanningState, *, 
     joint, X_WT = handling.joint, planner.tool_pose(state)
     here = position_of(planner, state, joint)
     sense = float(np.sign(handling.goal.position - here))
-    effort = max((needed(joint, q, CREEP * sense) for q in (here, handling.goal.position)), key=abs)
+    efforts = (
+        needed(joint, q, CREEP * sense, weight(planner, state, joint, q)) for q in (here, handling.goal.position)
+    )
+    effort = max(efforts, key=abs)
     wrench = wrench_of(tool_twist(planner, state, joint, X_WT), effort)
     size = float(np.linalg.norm(wrench[:3]))
     held = RESERVE * 2.0 * friction_coefficient(planner.robot, planner.scene.body(joint.child)) * handling.force
     hooked = abs(float(X_WT.R[:, 1] @ wrench[:3])) >= HOOKED * size
     with handling.forced():
-        refuse_weak(planner, state, wrench, handling.label)
+        refuse_weak(planner, state.position, wrench, handling.label)
         if gripped and size > held and not hooked:
             message = f"{handling.label}: two fingers hold {held:.3g} N by friction, the joint needs {size:.4g} N"
             raise NotPlannable(message, hint="press more, `force: ...`, or take a handle that fits behind a finger")

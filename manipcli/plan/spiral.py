@@ -16,7 +16,7 @@ from manipcli.core.geometry import Array
 
 SHARE: Final = 1.4
 """Pitch per clearance; less than 2, as friction bends the path."""
-SPEED: Final = 0.01
+SPEED: Final = 0.007
 """[m/s] On the spiral."""
 TURNING: Final = 9.0
 """[rad/s] At most: near the middle it is slower."""

@@ -20,8 +20,9 @@ from manipcli.simulate.executor import DONE, Executor, Lane, MotionEnd
 
 Situation = Callable[[PlanningState], PlanningState]
 """Measures the state, from the one that is believed."""
-ROUNDS: Final = 5
-"""How often the cup is tilted once more."""
+AHEAD: Final = (0.3, 0.15, 0.05, 0.0)
+"""[s] What will leave within this counts as well, per tilt. A tilt is reversed in 0.3 s; what rolls leaves meanwhile,
+what slides may jam and stay. So each tilt counts on less, and the last only on what has left."""
 FAST: Final = 0.9
 """Share of the velocity limits of the way back."""
 CORNERS: Final = 24
@@ -29,7 +30,7 @@ CORNERS: Final = 24
 
 
 class Dosing:
-    """Ends the tilt of a pour early, and repeats it where less has left than it seemed.
+    """Ends the tilt of a pour early, and later in each further tilt where less has left than it seemed.
 
     Args:
         planner: of the task.
@@ -42,7 +43,7 @@ class Dosing:
         self._planner, self._plan, self._watch, self._situation = planner, plan, watch, situation
         self._contents = [planner.scene.body(name) for name in plan.poured]
         self._pouring = [motion for motion in plan.motions if motion.pours]
-        self._stopped = False
+        self._stopped, self._ahead = False, AHEAD[0]
 
     @classmethod
     def of(cls, planner: Planner, plan: StepPlan, watch: PourWatch | None, situation: Situation) -> Dosing | None:
@@ -59,8 +60,8 @@ class Dosing:
         if motion.pours:
             return (yield from self._pour(motion, executor, deadline))
         end = yield from self._back(motion, executor, deadline)
-        for _ in range(ROUNDS if self._stopped else 0):
-            if end.outcome != "done" or self._reached(self._watch.left):
+        for self._ahead in AHEAD[1:]:
+            if not self._stopped or end.outcome != "done" or self._reached(self._watch.left):
                 break
             self._stopped = False
             for pouring in self._pouring:
@@ -71,7 +72,7 @@ class Dosing:
         return end
 
     def _pour(self, motion: Motion, executor: Executor, deadline: float | None) -> Lane[MotionEnd]:
-        """The motion, until as much has left the cup or cannot be kept in it any more; then nothing."""
+        """The motion, until as much has left the cup or is about to; then nothing."""
         if self._stopped:
             return DONE
         lane = executor.running(motion, until=None, deadline=deadline)
@@ -79,7 +80,7 @@ class Dosing:
             next(lane)
             while True:
                 state = yield
-                self._stopped = self._reached(self._watch.leaving)
+                self._stopped = self._reached(self._watch.leaving(self._ahead))
                 if self._stopped:
                     lane.close()
                     yield from executor.come_to_rest()

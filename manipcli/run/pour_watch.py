@@ -17,8 +17,6 @@ from manipcli.plan.flight import room
 from manipcli.scene.scene import Scene
 from manipcli.spec.counted import selections
 
-REACTION: Final = 0.3
-"""[s] Time in which a tilt is stopped and reversed."""
 SHOWN: Final = 3
 """Bodies that a text describes one by one."""
 
@@ -102,12 +100,9 @@ class PourWatch:
         """What has left the cup."""
         return tuple(name for name, one in self._bodies.items() if one.left is not None)
 
-    @property
-    def leaving(self) -> tuple[str, ...]:
-        """What has left the cup, or is so near to its rim and so fast that it cannot be kept in it."""
-        return tuple(
-            name for name, one in self._bodies.items() if one.left is not None or one.below < REACTION * one.out
-        )
+    def leaving(self, within: float) -> tuple[str, ...]:
+        """What has left the cup, or will within that time [s] at its velocity."""
+        return tuple(name for name, one in self._bodies.items() if one.left is not None or one.below < within * one.out)
 
     def with_times(self, text: str) -> str:
         """The text of a pour that is done; for bodies of a `count` also when the first and last left the cup."""

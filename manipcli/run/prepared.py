@@ -7,10 +7,12 @@ sample whose known objects are those of the task as written has its plan; no lis
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Unpack
 
+from manipcli.core.errors import InvalidInput
 from manipcli.core.opened_files import OpenedFiles, opened_by
 from manipcli.run.libraries import load_libraries
 from manipcli.task.load_task import FileOptions, LoadOptions, WrittenTask, load_task, load_written
@@ -63,6 +65,9 @@ def prepare(path: Path, **options: Unpack[FileOptions]) -> Prepared:
     def prepared() -> tuple[WrittenTask, Plan | None]:
         written = load_written(path, **options)
         load_libraries(written.task)
+        if options.get("design") and written.varied:
+            with suppress(InvalidInput):
+                written.sample(0)  # its libraries and tables
         every_one = not written.varied or written.task.scene is written.task.true.scene  # beliefs differ by sample
         shared = every_one and all(quantity.only_world for quantity in written.varied)
         return written, plan_task(written.task) if shared else None

@@ -265,9 +265,9 @@ def _texts(value: Plain | tuple[object, ...] | object) -> set[str]:
 
 def mm(length: float) -> str:
     """A length [m] in millimetres."""
-    return f"{1000.0 * length:.1f} mm"
+    return f"{1000.0 * length:z.1f} mm"
 
 
 def deg(angle: float) -> str:
     """An angle [rad] in degrees."""
-    return f"{math.degrees(angle):.1f} deg"
+    return f"{math.degrees(angle):z.1f} deg"

@@ -152,7 +152,7 @@ class StepAttempt:
             now = replace(now, carried=None)  # a retried grasp may start with the hand closed on its object
         differences = self._measured.differences(planned_start, now, step)
         forced = retry or self.failed or self._off_plan(step, planned_start)
-        replanned = forced or (self._replans and bool(differences) and _moves(planned))
+        replanned = forced or (self._replans and bool(differences) and planned.plan.depends_on_state)
         if replanned:
             try:
                 with self._replanning:
@@ -394,10 +394,3 @@ class StepAttempt:
         self._recorder.event(
             self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
         )
-
-
-def _moves(planned: PlannedStep) -> bool:
-    """Whether a step has motions that depend on the state."""
-    return any(
-        one is not None for motion in planned.plan.motions for one in (motion.trajectory, motion.grip, motion.looks)
-    )

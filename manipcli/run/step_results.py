@@ -98,9 +98,9 @@ def not_moved(planner: Planner, plan: StepPlan, now: PlanningState) -> str:
 
 
 def _joint(planner: Planner, goal: JointGoal, now: PlanningState) -> tuple[SceneJoint, float]:
-    """The joint that a step moves, and its position."""
+    """The joint that a step moves, and its position; of one without limits, on the revolution nearest to the goal."""
     joint = next(joint for joint in planner.scene.joints if joint.name == goal.name)
-    return joint, position_of(planner, now, joint)
+    return joint, goal.position + float(joint.apart(position_of(planner, now, joint), goal.position))
 
 
 def _travel(value: float, joint: SceneJoint) -> str:

@@ -115,6 +115,10 @@ def _refused(name: str, spec: BodySpec, parts: Parts) -> Iterator[Fault]:
         if each.moves and each.mimic is not None:
             message = f"joint '{escape(each.name)}' of body '{name}' mimics another one, which a body cannot do"
             yield Fault("TASK364", message, ("urdf",), "remove <mimic>, or let one joint move both links")
+        if each.type == "revolute" and math.tau < np.ptp(each.limits.range) < math.inf:
+            message = f"joint '{escape(each.name)}' of body '{name}' turns by more than one revolution"
+            hint = "make it `continuous`, or narrow its limits: its angle is known up to whole revolutions"
+            yield Fault("TASK364", message, ("urdf",), hint)
     for word in (*(link.name for link in parts.links), *moving):
         if SEPARATOR in word or "[" in word:
             message = f"the name '{escape(word)}' in the file of body '{name}' contains '/' or '['"

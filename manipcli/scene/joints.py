@@ -104,6 +104,13 @@ class SceneJoint:
         middle = self._middle
         return np.asarray(middle + np.remainder(angle - middle + math.pi, math.tau) - math.pi)
 
+    def apart(self, position: float | Array, target: float) -> Array:
+        """`position` (...) - `target` [rad or m]; of a `continuous` joint within half a revolution."""
+        difference = np.asarray(position - target)
+        if self.type != "continuous":
+            return difference
+        return np.asarray(np.remainder(difference + math.pi, math.tau) - math.pi)
+
     @property
     def _middle(self) -> float:
         return 0.5 * (self.lower + self.upper) if math.isfinite(self.upper - self.lower) else self.start

@@ -73,8 +73,8 @@ class ComplianceSwitch:
     def passed(self, motion: Motion) -> bool:
         """Whether the motion is over because the tool is beyond its plane, dropped, or feels too much; asked at every
         tick."""
-        until, arm = None if motion.compliance is None else motion.compliance.until, self._arm
-        if until is None or arm is None:
+        until = None if motion.compliance is None else motion.compliance.until
+        if until is None or (arm := self._arm) is None:
             return False
         along = float(until.normal @ arm.tool)
         if math.isnan(self._mean):
@@ -153,6 +153,11 @@ class ComplianceSwitch:
             return f"; it stays and presses with {force:.3g} N"
 
         return hold
+
+    def relax(self) -> None:
+        """Give up the force with which the arm presses, if it does: the arm stays compliant at its reference."""
+        if self._arm is not None:
+            self._arm.relax()
 
     def _switch(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The controllers that were deactivated."""

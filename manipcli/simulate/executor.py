@@ -236,8 +236,12 @@ class Executor:
             self._tick()
 
     def stop(self) -> None:
-        """Cancel goals, let the joints stop within their limits, and hold still until they rest; alarms are ignored."""
+        """Cancel goals, let the joints stop within their limits, and hold still until they rest; alarms are ignored.
+
+        A force with which the arm presses is given up.
+        """
         self._cancel()
+        self._compliance.relax()
         if self._beside is not None:
             self._beside._cancel()
         for _ in range(self._ticks(REST)):

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array
 from manipcli.spec.base import Model
 
 NotNegative = Annotated[float, Field(ge=0)]
@@ -30,6 +28,7 @@ class PostureSpec(Model):
     )
 
 
-def six(spec: TaskSpaceSpec) -> Array:
+def six(spec: TaskSpaceSpec) -> tuple[float, ...]:
     """(6,) Values along x, y, z, then about them."""
-    return np.concatenate([np.broadcast_to(part, (3,)) for part in (spec.translation, spec.rotation)])
+    parts = (spec.translation, spec.rotation)
+    return tuple(float(value) for part in parts for value in (part if isinstance(part, tuple) else (part,) * 3))

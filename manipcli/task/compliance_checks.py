@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from manipcli.conditions.sensed import FELT
 from manipcli.control.compliant_build import compliant_joints
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
@@ -17,7 +18,7 @@ from manipcli.spec.task import TaskSpec
 from manipcli.task.felt import wrist_sensor
 from manipcli.task.task import all_sensors
 
-NO_ARM, NOT_FELT, RIGID = 340, 341, 342
+NO_ARM, NOT_FELT, RIGID, TAKEN = 340, 341, 342, 343
 """Numbers of the codes of the findings."""
 STIFF_DRIVES = "pybullet"
 """The engine in which a position drive reaches its position with any force that its effort limit allows."""
@@ -36,6 +37,10 @@ def compliance_findings(
         return
     verb = spec.steps[at].verb
     loc = ("steps", at, verb)
+    for what, names in (("controller", controllers.spec.controllers), ("sensor", all_sensors(robot_file.spec, spec))):
+        if FELT in names:
+            message = f"the {what} '{FELT}' has the name of the force that the arm feels in `{verb}`"
+            yield task.source.finding(TAKEN, loc, message, hint=f"rename the {what}")
     arm = compliant_joints(controllers.spec, robot)
     if arm is None:
         message = f"`{verb}` needs a controller that follows trajectories of all joints from the base to the tool"

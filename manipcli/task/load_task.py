@@ -9,6 +9,7 @@ from typing import TypedDict, Unpack
 
 from manipcli.core.errors import InvalidInput
 from manipcli.description.packages import Packages
+from manipcli.judge.drawn import Drawn
 from manipcli.model.build_robot import build_robot
 from manipcli.scene.build_scene import build_scene
 from manipcli.spec.load import load_controllers, load_robot
@@ -17,10 +18,12 @@ from manipcli.task.believed_scene import believing
 from manipcli.task.changed_files import Files, bound
 from manipcli.task.compliance_checks import compliance_findings
 from manipcli.task.consistency import consistent
+from manipcli.task.designs import Design
 from manipcli.task.named_file import named_file
-from manipcli.task.sample import draw_sample
+from manipcli.task.sample import draw_sample, drawn_sample
 from manipcli.task.second_chances import every_finding
 from manipcli.task.sensor_checks import refuse, sensed, sensor_findings
+from manipcli.task.spring_checks import spring_findings
 from manipcli.task.task import Task
 from manipcli.task.task_files import finder
 from manipcli.task.vary import Varied
@@ -35,12 +38,14 @@ class FileOptions(TypedDict, total=False):
         seed: replaces the seed of the task.
         package_path: additional folders to search for packages.
         allow_outside: allow files outside packages and outside the folders of the files that name them.
+        design: the design of the samples, `sobol:256`; "": random ones.
     """
 
     overrides: Sequence[str]
     seed: int | None
     package_path: Sequence[Path]
     allow_outside: bool
+    design: str
 
 
 class LoadOptions(FileOptions, total=False):
@@ -70,6 +75,20 @@ class WrittenTask:
     path: Path
     options: FileOptions
 
+    @property
+    def design(self) -> Design:
+        """The design of its samples."""
+        return Design.read(self.options.get("design", ""))
+
+    def drawn(self, number: int) -> Drawn:
+        """The values of a sample.
+
+        Raises:
+            InvalidInput: the sample does not exist.
+        """
+        overrides = self.options.get("overrides", ())
+        return drawn_sample(self.task, self.varied, number, design=self.design, overrides=overrides)
+
     def sample(self, number: int | None) -> Task:
         """A sample; None for the task as written.
 
@@ -83,6 +102,7 @@ class WrittenTask:
             self.varied,
             number,
             self.path,
+            design=self.design,
             overrides=self.options.get("overrides", ()),
             package_path=self.options.get("package_path", ()),
             allow_outside=self.options.get("allow_outside", False),
@@ -111,6 +131,7 @@ def load_written(path: Path, **options: Unpack[FileOptions]) -> WrittenTask:
             valid.
     """
     try:
+        Design.read(options.get("design", ""))
         return WrittenTask(*_as_written(path, **options), path, options)
     except InvalidInput as first:
         raise every_finding(path, first, **options) from None
@@ -123,6 +144,7 @@ def _as_written(
     seed: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
+    design: str = "",
 ) -> tuple[Task, tuple[Varied, ...]]:
     """The task as written, and the quantities of `vary:`.
 
@@ -147,6 +169,7 @@ def _as_written(
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
     warnings = consistent(file, controllers_file, robot, scene, sensed(file, robot_file, robot, scene))
     refuse(sensor_findings(file, robot_file, controllers_file, robot, scene))
+    refuse([*spring_findings(file, scene)])
     complying = (*compliance_findings(file, robot_file, controllers_file, robot),)
     refuse([finding for finding in complying if finding.severity == "error"])
     varied = bound(Files(file, robot_file, controllers_file))

@@ -25,10 +25,11 @@ from manipcli.spec.task import TaskSpec
 from manipcli.task.believed_scene import believed_scene
 from manipcli.task.changed_files import Changes, Files
 from manipcli.task.consistency import refused_by_engine
+from manipcli.task.designs import Design, draw
 from manipcli.task.named_file import named_file
 from manipcli.task.sensor_checks import refuse, sensor_findings
 from manipcli.task.task import GroundTruth, Task, all_sensors
-from manipcli.task.vary import SENSORS, Varied, draw
+from manipcli.task.vary import SENSORS, Varied
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
 SceneOf = Callable[[Located[TaskSpec]], Scene]
@@ -40,6 +41,7 @@ def draw_sample(
     number: int,
     path: Path,
     *,
+    design: Design = Design(),  # noqa: B008 (frozen)
     overrides: Sequence[str] = (),
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
@@ -51,20 +53,15 @@ def draw_sample(
         varied: the quantities of its `vary:`.
         number: index of the sample, from 0.
         path: the task file.
+        design: the design that has this sample.
         overrides, package_path, allow_outside: the options with which the task was loaded.
 
     Raises:
         InvalidInput: the sample does not exist, or a drawn value is refused.
     """
-    if number < 0:
-        message = f"there is no sample {number}: samples count from 0"
-        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
-    if not varied:
-        message = f"there is no sample {number}: task '{task.name}' has no `vary:`"
-        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
+    drawn = drawn_sample(task, varied, number, design=design, overrides=overrides)
     robot_path = named_file(task.file, path, "robot")
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    drawn = _but_for(draw(varied, task.spec.simulation.seed, number), varied, read_overrides(overrides))
     return sampled(
         task,
         varied,
@@ -78,6 +75,25 @@ def draw_sample(
         )[0],
         scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages),
     )
+
+
+def drawn_sample(
+    task: Task, varied: Sequence[Varied], number: int, *, design: Design, overrides: Sequence[str] = ()
+) -> Drawn:
+    """The values of a sample; the arguments are those of `draw_sample`.
+
+    Raises:
+        InvalidInput: the sample does not exist.
+    """
+    cause = "samples count from 0" if number < 0 else "" if varied else f"task '{task.name}' has no `vary:`"
+    try:
+        point = draw(varied, task.spec.simulation.seed, number, design) if not cause else None
+    except IndexError as error:
+        point, cause = None, str(error)
+    if point is None:
+        message = f"there is no sample {number}: {cause}"
+        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
+    return _but_for(point, varied, read_overrides(overrides))
 
 
 def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: RobotOf, scene_of: SceneOf) -> Task:

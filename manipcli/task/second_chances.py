@@ -29,6 +29,7 @@ from manipcli.task.consistency import disagreements, not_there
 from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
 from manipcli.task.sensor_checks import robot_sensor_findings, sensed, sensor_findings
+from manipcli.task.spring_checks import spring_findings
 from manipcli.task.task_files import finder
 from manipcli.task.vary import bind
 from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
@@ -44,13 +45,14 @@ def every_finding(
     seed: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
+    design: str = "",
 ) -> InvalidInput:
     """All errors of a task and of the files it names, in the order of files and lines.
 
     Args:
         path: the task file.
         first: the error that stopped loading.
-        overrides, seed, package_path, allow_outside: the options with which it was loaded.
+        overrides, seed, package_path, allow_outside, design: the options with which it was loaded.
     """
     errors = _Errors()
     model = task_spec()
@@ -79,6 +81,8 @@ def every_finding(
         errors.found += sensor_findings(partial, robot.file, partial_controllers, robot.model, known_scene)
     else:
         errors.found += not_there(partial, named_robot(partial.spec), known_scene, None)
+    if task is not None and scene is not None:
+        errors.found += spring_findings(task, scene)
     if task is not None and robot.file is not None and controllers_file is not None:
         if robot.model is not None and not errors.found:
             errors.found += compliance_findings(task, robot.file, controllers_file, robot.model)

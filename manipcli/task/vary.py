@@ -4,7 +4,8 @@ A sample is a pure function of seed, sample number and path: the uniform deviate
 
     u = (first 52 bits of SHA-256("seed/sample/path/k") + 1/2) / 2^52
 
-so that draws are independent of other paths and of library versions. From it `uniform` is a + (b - a) u,
+so that draws are independent of other paths and of library versions; other designs (`task/designs.py`) choose u
+otherwise. From it `uniform` is a + (b - a) u,
 `normal` the quantile of F(least) + (F(most) - F(least)) u, where F is its distribution and least and most
 are the field's bounds, `choice` item floor(n u).
 """
@@ -23,7 +24,7 @@ from pydantic import BaseModel
 from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
-from manipcli.judge.drawn import Drawn, Number
+from manipcli.judge.drawn import Number
 from manipcli.spec.block_fields import bounds_of, children, unit_of
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import quantity_of
@@ -104,11 +105,24 @@ class Varied:
         return False
 
     @property
-    def axes(self) -> tuple[int, ...]:
-        """Number of items of each of its grids."""
-        return (
-            (len(self.law.rows),) * (1 if self.law.together else len(self.nominal)) if self.law.word == "grid" else ()
-        )
+    def dimensions(self) -> int:
+        """How many numbers are drawn: one per component, or one in all where items are lists."""
+        return 1 if self.law.together else len(self.nominal)
+
+    def values(self, k: int) -> float:
+        """How many values component k can have; `inf` for a continuous one."""
+        match self.law.word:
+            case "choice" | "grid":
+                return len(self.law.rows)
+            case "uniform":
+                least, most = self.law.rows[0][k], self.law.rows[1][k]
+                return 1 if least == most else most - least + 1.0 if self._steps else math.inf
+        return math.inf
+
+    @property
+    def _steps(self) -> bool:
+        """Whether a `uniform` has whole numbers only."""
+        return self.whole and self.how != "scale"
 
     def ends(self, inside: float = 0.0) -> tuple[Number, ...]:
         """The ends of `uniform`, moved inward by the share `inside`; the items of `choice`, `grid`; () for `normal`."""
@@ -120,9 +134,11 @@ class Varied:
             rows = tuple(tuple((1.0 - u) * a + u * b for a, b in zip(*rows, strict=True)) for u in shares)
         return tuple(self._written(row) for row in rows)
 
-    def value(self, seed: int, sample: int, items: Sequence[int]) -> Number:
-        """The drawn value; `items`: index of the item of each of its grids."""
-        return self._written([self._component(k, seed, sample, items) for k in range(len(self.nominal))])
+    def value(self, point: Sequence[float | None]) -> Number:
+        """The value at a coordinate in [0, 1] per dimension; None: the amount of the value in the file."""
+        return self._written(
+            [self._component(k, point[0 if self.law.together else k]) for k in range(len(self.nominal))]
+        )
 
     def _written(self, drawn: Sequence[float]) -> Number:
         """The value for the file, from the drawn components."""
@@ -133,43 +149,27 @@ class Varied:
         values = [round(number) if self.whole else number for number in drawn]
         return tuple(values) if self.vector else values[0]
 
-    def _component(self, k: int, seed: int, sample: int, items: Sequence[int]) -> float:
-        rows, which = self.law.rows, 0 if self.law.together else k
-        u = deviate(seed, sample, self.path, which)
+    def _component(self, k: int, u: float | None) -> float:
+        rows = self.law.rows
+        if u is None:
+            return {"offset": 0.0, "scale": 1.0}.get(self.how, self.nominal[k])
         match self.law.word:
             case "uniform":
                 least, most = rows[0][k], rows[1][k]
-                if self.whole and self.how != "scale":
-                    return least + math.floor(u * (most - least + 1.0))
+                if self._steps:
+                    return min(least + math.floor(u * (most - least + 1.0)), most)
                 return least + (most - least) * u
             case "normal":
                 law = NormalDist(rows[0][k], rows[1][k])
                 low, high = map(law.cdf, self.law.between[k])
                 return law.inv_cdf(min(low + (high - low) * u, math.nextafter(1.0, 0.0)))
-            case "choice":
-                return rows[math.floor(u * len(rows))][k]
-        return rows[items[which]][k]
+        return rows[min(math.floor(u * len(rows)), len(rows) - 1)][k]
 
 
 def deviate(seed: int, sample: int, path: str, component: int) -> float:
     """The deterministic uniform deviate in (0, 1) of a component; see the module."""
     digest = sha256(f"{seed}/{sample}/{path}/{component}".encode()).digest()
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2.0**52
-
-
-def draw(varied: Sequence[Varied], seed: int, sample: int) -> Drawn:
-    """Draws sample `sample` of all quantities, in their order."""
-    rest = sample
-    items: list[int] = []
-    for size in reversed([size for quantity in varied for size in quantity.axes]):
-        rest, item = divmod(rest, size)
-        items.insert(0, item)
-    values: list[tuple[str, Number]] = []
-    for quantity in varied:
-        own = len(quantity.axes)
-        values.append((quantity.path, quantity.value(seed, sample, items[:own])))
-        items = items[own:]
-    return Drawn(sample, tuple(values))
 
 
 @dataclass(frozen=True, slots=True)

@@ -226,8 +226,8 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
 
     pipeline.run_task = run_task
     words = (
-        "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --set a.b=1 --set c=x=y --package-path p "
-        "--from a --state b.mcap --until c"
+        "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --design lhs:9 --set a.b=1 --set c=x=y "
+        "--package-path p --from a --state b.mcap --until c"
     )
     assert main([*words.split(), "--allow-outside", "-q"]) == 0
     del given["progress"]
@@ -238,6 +238,7 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
         "embed_meshes": True,
         "seed": 3,
         "sample": 7,
+        "design": "lhs:9",
         "overrides": ("a.b=1", "c=x=y"),
         "package_path": (Path("p"),),
         "allow_outside": True,

@@ -10,8 +10,8 @@ import pytest
 from manipcli import pipeline
 from manipcli.control.action import GoalRejected
 from manipcli.control.controller import JointState
-from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceController
 from manipcli.control.controllers.computed_torque import ComputedTorqueController
+from manipcli.control.impedance_controller import CartesianImpedanceController
 from manipcli.control.jog import JogLaw
 from manipcli.control.jog_targets import JointTarget, TaskVelocity, ToolTarget
 from manipcli.control.roles import Follower, is_jogged

@@ -8,13 +8,12 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.model.motor_limits import EffortLimits
+from manipcli.plan.arm_force import refuse_too_strong, strongest
 from manipcli.plan.contact_line import (
     approach_speed,
     effective_mass,
     gap,
     hover,
-    refuse_too_strong,
-    strongest_force,
 )
 from manipcli.plan.motion import PlanningState
 from manipcli.plan.motion_builder import MotionBuilder
@@ -64,16 +63,16 @@ def test_the_effective_mass_is_that_of_the_energy_of_an_impulse():
 def test_the_strongest_force_brings_one_joint_to_its_limit_and_no_other_beyond():
     """By virtual work: the effort at rest is g + F dz/dq."""
     planner, state = scene()
-    most = strongest_force(planner, state.position, DOWN)
+    most = strongest(planner, state.position, np.append(DOWN, np.zeros(3)))
     k = list(planner.solver.columns)
     limits = EffortLimits.of(planner.robot).least[k]
-    effort = np.array(planner.kinematics.gravity(state.position))[k] + most.force * leverage(planner, state.position)
+    effort = np.array(planner.kinematics.gravity(state.position))[k] + most.share * leverage(planner, state.position)
     share = np.abs(effort) / limits
     np.testing.assert_allclose(share.max(), 1.0, rtol=1e-6)
     assert planner.solver.joints[int(np.argmax(share))] == most.joint
-    refuse_too_strong(planner, state.position, DOWN, 0.99 * most.force)
+    refuse_too_strong(planner, state.position, DOWN, 0.99 * most.share)
     with pytest.raises(NotPlannable, match=rf"'{most.joint}' reaches its limit of {most.effort:g} N m"):
-        refuse_too_strong(planner, state.position, DOWN, 1.01 * most.force)
+        refuse_too_strong(planner, state.position, DOWN, 1.01 * most.share)
 
 
 def test_an_impact_of_one_period_has_the_force():
@@ -88,3 +87,11 @@ def test_the_tool_stops_at_the_gap_with_its_axis_along_the_force():
     np.testing.assert_allclose(X_WH.R[:, 2], DOWN, atol=2e-3)
     np.testing.assert_allclose(X_WH.p[:2], point[:2], atol=2e-4)
     np.testing.assert_allclose(gap(planner, builder.now, "button"), 0.005, atol=3e-4)
+
+
+def test_a_point_out_of_reach_is_refused_with_what_the_step_has():
+    planner, state = scene()
+    builder = MotionBuilder(planner, state, verb="press")
+    with pytest.raises(NotPlannable) as caught:
+        hover(builder, planner, "button", np.array([1.1, 0.0, 0.3]), DOWN, speed=0.5)
+    assert caught.value.hint == "move 'button' nearer, or press in another `direction`"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +22,17 @@ from manipcli.plan.aboard import aboard
 from manipcli.plan.arm_force import refuse_weak
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.handle_frames import handle_frames
-from manipcli.plan.jointed import along, moved_to, needed, position_of, tool_twist, wrench_of
+from manipcli.plan.jointed import (
+    along,
+    does_not_stay,
+    moved_to,
+    needed,
+    position_of,
+    stays_from,
+    tool_twist,
+    weight,
+    wrench_of,
+)
 from manipcli.plan.motion import JointGoal, PlanningState
 from manipcli.plan.operating import ALONG, RESERVE, Handling, compliance, refuse_force
 from manipcli.plan.planner import Planner
@@ -124,6 +135,34 @@ def test_a_joint_needs_what_resists_it() -> None:
     assert needed(own, 0.3, -0.2) == pytest.approx(-1.5 - 4.0 * 0.2 + 50.0 * (0.3 - 0.1))
 
 
+def test_a_lid_falls_back_where_its_friction_does_not_hold_its_weight() -> None:
+    """Its weight has the effort m g (x cos q + z sin q) with the centre of mass at (x, z) from the hinge."""
+    file = f"{ROOT}/tasks/objects/lidded_box.urdf"
+    box = f"  box: {{urdf: {{file: {file}}}, rests_on: desk, at: [0.6, 0.1], fixed: true}}\n"
+    loaded = _loaded(HEAD + box + "steps:\n  - wait: 1 s\n")
+    planner, state, lid = planner_of(loaded), start(loaded), moved_joint(loaded.scene, "box")
+    assert lid is not None
+
+    def effort(q: float) -> float:
+        x, z = 0.3 * -0.1018 + 0.05 * -0.17, 0.3 * 0.003428 + 0.05 * 0.04
+        return 9.81 * (x * float(np.cos(q)) + z * float(np.sin(q)))
+
+    for q in (0.0, 1.0, 1.8):
+        assert weight(planner, state, lid, q) == pytest.approx(effort(q))
+        assert needed(lid, q, 1e-9, effort(q)) == pytest.approx(lid.friction - effort(q))
+    half = JointGoal(lid.name, 1.0, 1.0, 0.05)
+    assert "its weight moves it with" in does_not_stay(planner, state, lid, half)
+    holds = stays_from(planner, state, lid, half)
+    assert holds is not None and effort(holds) == pytest.approx(-lid.friction)  # friction holds it there
+    assert f"it stays from {np.degrees(holds):.4g} deg on" in does_not_stay(planner, state, lid, half)
+    sprung = replace(lid, stiffness=2.0)
+    assert stays_from(planner, state, sprung, half) is None
+    firm = replace(lid, friction=1.01 * abs(effort(0.95)))
+    assert not does_not_stay(planner, state, firm, half)
+    assert not does_not_stay(planner, state, lid, replace(half, position=1.8))  # beyond the vertical it falls open
+    assert not does_not_stay(planner, state, lid, JointGoal(lid.name, 0.0, 0.0, 0.05))  # its end stop holds it
+
+
 def test_the_arm_is_stiff_along_the_path_and_soft_across_it() -> None:
     planner, state, moving = planner_of(task()), start(task()), joint("door")
     twist = tool_twist(planner, state, moving, TOOL)
@@ -198,9 +237,9 @@ def test_the_force_that_the_arm_can_give_is_where_a_joint_meets_its_limit() -> N
     most = min(
         (limit - np.sign(w) * g) / abs(w) for w, g, limit in zip(work, gravity, limits, strict=True) if abs(w) > 1e-6
     )
-    refuse_weak(planner, state, np.append(0.999 * most * direction, np.zeros(3)), "pull")
+    refuse_weak(planner, state.position, np.append(0.999 * most * direction, np.zeros(3)), "pull")
     with pytest.raises(NotPlannable, match=r"pull: the arm can give [\d.]+ N there, not [\d.]+ N: then joint 'panda_"):
-        refuse_weak(planner, state, np.append(1.001 * most * direction, np.zeros(3)), "pull")
+        refuse_weak(planner, state.position, np.append(1.001 * most * direction, np.zeros(3)), "pull")
 
 
 @pytest.mark.parametrize("roll", [0.0, 90.0])

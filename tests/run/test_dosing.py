@@ -5,11 +5,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from manipcli.plan.motion import Motion, StepPlan
 from manipcli.plan.portion import Portion
-from manipcli.run.dosing import ROUNDS, Dosing
+from manipcli.run.dosing import AHEAD, Dosing
 from manipcli.simulate.executor import DONE, Lane, MotionEnd
 
 NAMES = tuple(f"ball[{k}]" for k in range(6))
@@ -17,26 +18,37 @@ TILT, BACK = Motion("tilt", None, None, 1.0, pours=True), Motion("tilt back", No
 
 
 class Cup:
-    """The watch and the executor: per tick of the tilt one more body is about to leave; some of these fall back."""
+    """The watch and the executor: in each tilt the bodies that are in it would leave one every 0.1 s.
 
-    def __init__(self, falls_back: int) -> None:
-        self.leaving: tuple[str, ...] = ()
+    Args:
+        jams: what has not left when the tilt stops stays; else what was counted on leaves all the same.
+        stuck: that many never leave.
+    """
+
+    def __init__(self, *, jams: bool, stuck: int = 0) -> None:
         self.left: tuple[str, ...] = ()
         self.done: list[str] = []
-        self._falls_back = falls_back
+        self._jams, self._stuck = jams, stuck
+        self._time, self._within = 0.0, 0.0
+
+    def leaving(self, within: float) -> tuple[str, ...]:
+        self._within = within
+        return self._out(self._time + within)
+
+    def _out(self, time: float) -> tuple[str, ...]:
+        return NAMES[: min(len(self.left) + int(time / 0.1 + 1e-6), len(NAMES) - self._stuck)]
 
     def running(self, motion: Motion, *, until: object, deadline: object) -> Lane[MotionEnd]:
         self.done.append(motion.label)
         if not motion.pours:
             yield
             return DONE
+        self._time = 0.0
         try:
-            for _ in range(10):
+            for self._time in np.arange(0.0, 1.0, 0.01):
                 yield
-                self.leaving = NAMES[: len(self.leaving) + 1]
         finally:
-            self.leaving = NAMES[: max(len(self.left), len(self.leaving) - self._falls_back)]
-            self.left, self._falls_back = self.leaving, self._falls_back - 1
+            self.left = self._out(self._time + (0.0 if self._jams else self._within))
         return DONE
 
     def come_to_rest(self) -> Lane[None]:
@@ -57,23 +69,27 @@ def poured(cup: Cup, amount: int) -> None:
                 lane.send(cast(Any, None))
 
 
-def test_it_tilts_back_as_soon_as_as_much_is_leaving() -> None:
-    cup = Cup(falls_back=0)
-    poured(cup, 4)
-    assert cup.left == NAMES[:4]
+@pytest.mark.parametrize("amount", range(1, 7))
+def test_what_is_about_to_leave_counts(amount: int) -> None:
+    """Where it does leave, one tilt is enough; up to three leave while it is reversed."""
+    cup = Cup(jams=False)
+    poured(cup, amount)
+    assert len(cup.left) == max(amount, 3)
     assert cup.done == ["tilt", "tilt back"]
 
 
-def test_where_some_fall_back_it_tilts_once_more() -> None:
-    """Of four that were leaving two fall back, then one, then none."""
-    cup = Cup(falls_back=2)
-    poured(cup, 4)
-    assert cup.left == NAMES[:4]
-    assert cup.done == ["tilt", "tilt back"] * 3
+@pytest.mark.parametrize("amount", range(1, 7))
+def test_what_jams_is_poured_after_all(amount: int) -> None:
+    """Nothing that was counted on leaves, and nothing more than the amount."""
+    cup = Cup(jams=True)
+    poured(cup, amount)
+    assert len(cup.left) == amount
+    assert 1 < len(cup.done) // 2 <= len(AHEAD)
 
 
-def test_it_gives_up_after_some_rounds() -> None:
-    cup = Cup(falls_back=100)
+def test_a_whole_tilt_is_not_repeated() -> None:
+    """Of six bodies three leave at most: after the whole tilt no other one gets more."""
+    cup = Cup(jams=True, stuck=3)
     poured(cup, 4)
-    assert cup.left == ()
-    assert cup.done == ["tilt", "tilt back"] * (1 + ROUNDS)
+    assert len(cup.left) == 3
+    assert cup.done == ["tilt", "tilt back"]

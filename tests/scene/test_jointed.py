@@ -117,6 +117,17 @@ def test_a_xacro_file_takes_arguments(tmp_path: Path) -> None:
     assert made.joints[0].upper == 0.02
 
 
+def test_a_valve_of_several_revolutions_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "valve.urdf").write_text((OBJECTS / "dial.urdf").read_text().replace('upper="4.712"', 'upper="6.3"'))
+    data = {"task": "t", "robot": "r", "controllers": "c", "steps": [{"wait": "1 s"}]}
+    valve = {"urdf": {"file": "valve.urdf"}, "fixed": True, "pose": {}}
+    spec = task_spec().model_validate(data | {"scene": {"valve": valve}})
+    with pytest.raises(InvalidInput) as caught:
+        build_scene(spec, packages=Packages(tmp_path / "task.yaml"))
+    (finding,) = caught.value.findings
+    assert finding.code == "TASK364" and "more than one revolution" in finding.message
+
+
 @pytest.mark.parametrize(
     ("bodies", "code", "words"),
     [

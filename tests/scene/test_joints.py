@@ -38,6 +38,16 @@ def test_an_endless_joint_is_near_its_start() -> None:
     assert one.position(PARENT, one.child_pose(PARENT, 10.5 + 2 * math.pi)) == pytest.approx(10.5, abs=1e-12)
 
 
+def test_the_distance_to_a_goal_is_the_shorter_way_round_of_an_endless_joint_only() -> None:
+    """A dial that was turned by 270 deg is measured at -90 deg."""
+    endless, door = joint("continuous", -math.inf, math.inf), joint("revolute", 0.0, 4.8)
+    q = endless.position(PARENT, endless.child_pose(PARENT, math.radians(270)))
+    assert math.degrees(q) == pytest.approx(-90)
+    assert endless.apart(q, math.radians(270)) == pytest.approx(0.0, abs=1e-12)
+    assert math.degrees(endless.apart(q, math.radians(265))) == pytest.approx(5)
+    assert math.degrees(door.apart(0.0, math.radians(270))) == pytest.approx(-270)
+
+
 def test_a_hinge_keeps_the_points_of_its_axis_and_a_slide_the_orientation() -> None:
     hinge, slide = joint("revolute"), joint("prismatic")
     on_axis = np.outer([-0.3, 0.0, 0.7], AXIS)

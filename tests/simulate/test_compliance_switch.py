@@ -11,7 +11,7 @@ import pytest
 from manipcli.control.compliant_arm import complies, replaced
 from manipcli.core.errors import NotPlannable
 from manipcli.live.interfaces.controller_manager import list_controllers
-from manipcli.plan.compliance import Beyond, Compliance, compliant
+from manipcli.plan.compliance import Beyond, Compliance, Pressing, compliant
 from manipcli.plan.motion import Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.run.execute import build_manager
@@ -94,6 +94,26 @@ def test_a_motion_ends_when_more_is_felt_than_it_may_press_with(session):
     arm.felt[:3] = 0.0, 12.0, 17.0  # 20.8 N
     assert switch.passed(motion)
     assert switch.result(motion) == ("", "it is stuck")
+
+
+def test_a_stop_gives_up_the_force(session):
+    """A canceled press does not go on to look for its contact, and its reference returns without a step."""
+    switch, (arm,) = ComplianceSwitch(session), [own for own in session.manager.controllers if complies(own)]
+    force = Pressing(np.array([0.0, 0.0, 1.0]), 10.0, speed=0.05, reach=0.1)
+    switch.before(Motion("press", None, None, 1.0, compliance=Compliance.of(force=force)))
+
+    def shifts(ticks):
+        for k in range(ticks):
+            session.manager.update(k * PERIOD, session.state)
+            yield arm.pressing.shift if arm.pressing is not None else arm._shift[2]
+
+    before = list(shifts(400))[-1]
+    assert before > 0.01
+    switch.relax()
+    after = [before, *shifts(400)]
+    assert arm.pressing is None
+    assert after[-1] == pytest.approx(0.0, abs=1e-12)
+    assert np.abs(np.diff(after)).max() < 2.0 * before / 0.3 * PERIOD  # 1.875 is that of a minimum jerk
 
 
 def test_a_refused_plan_leaves_its_builder_as_it_was():

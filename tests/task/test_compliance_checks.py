@@ -37,6 +37,7 @@ WRIST = {"wrist": {"type": "force_torque", "link": "panda_hand"}}
         ({"interface": "position"}, "TASK341", "link: panda_link7"),
         ({"interface": "position", "sensors": {"low": {"type": "force_torque", "link": "panda_link3"}}}, "TASK341", ""),
         ({"interface": "velocity"}, "TASK340", "command_interface: effort"),
+        ({"interface": "effort", "sensors": {"felt_force": WRIST["wrist"]}}, "TASK343", "rename the sensor"),
     ],
 )
 def test_an_arm_that_cannot_feel_or_yield_is_refused(tmp_path, more, code, hint):

@@ -15,8 +15,9 @@ from scipy import stats
 
 from manipcli.core.errors import InvalidInput
 from manipcli.judge.drawn import Drawn, Number
+from manipcli.task.designs import draw
 from manipcli.task.load_task import load_task
-from manipcli.task.vary import bind, deviate, draw
+from manipcli.task.vary import bind, deviate
 
 ROOT = Path(__file__).parents[2]
 COUNT = 2000

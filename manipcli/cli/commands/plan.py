@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
+from manipcli.cli.options import (
+    AllowOutside,
+    Design,
+    Format,
+    Overrides,
+    PackagePath,
+    Sample,
+    Seed,
+    TaskFile,
+    check_design,
+)
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, NotPlannable
 
@@ -47,6 +57,7 @@ def plan(
     ] = False,
     seed: Seed = None,
     sample: Sample = None,
+    design: Design = "",
     overrides: Overrides = None,
     format_: Format = "text",
     package_path: PackagePath = None,
@@ -60,6 +71,7 @@ def plan(
     from manipcli import pipeline
     from manipcli.cli.progress import PlanningProgress
 
+    check_design(design, sample)
     if folder is not None and export is None:
         raise InvalidInput([Diagnostic("USE084", "--to has no effect without --export")])
     check_outputs(("--csv", csv), ("--picture", picture), ("--html", html), reads=(task,))
@@ -73,6 +85,7 @@ def plan(
         overrides=tuple(overrides or ()),
         seed=seed,
         sample=sample,
+        design=design,
         package_path=tuple(package_path or ()),
         allow_outside=allow_outside,
     )

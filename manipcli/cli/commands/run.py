@@ -11,7 +11,17 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.engine_options import CheckStep, Engines, engine_names, refuse_single_outputs
-from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
+from manipcli.cli.options import (
+    AllowOutside,
+    Design,
+    Format,
+    Overrides,
+    PackagePath,
+    Sample,
+    Seed,
+    TaskFile,
+    check_design,
+)
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
@@ -50,6 +60,7 @@ def run(
     junit: JunitFile = None,
     seed: Seed = None,
     sample: Sample = None,
+    design: Design = "",
     overrides: Overrides = None,
     format_: Format = "text",
     package_path: PackagePath = None,
@@ -65,6 +76,7 @@ def run(
     from manipcli.cli.interrupts import Interrupts
     from manipcli.cli.log_to_stdout import refuse_stdout, stdout_or
 
+    check_design(design, sample)
     to_stdout = log is not None and str(log) == "-"
     if state is not None and from_step is None:
         raise InvalidInput([Diagnostic("USE123", "--state needs --from STEP", hint="name the first step to run")])
@@ -86,6 +98,7 @@ def run(
                 report_file=report_file,
                 seed=seed,
                 sample=sample,
+                design=design,
                 overrides=tuple(overrides or ()),
                 format_=format_,
                 package_path=tuple(package_path or ()),
@@ -112,6 +125,7 @@ def run(
                     overrides=words,
                     seed=seed,
                     sample=sample,
+                    design=design,
                     log=path,
                     force=force,
                     embed_meshes=embed_meshes,
@@ -150,7 +164,13 @@ def run(
             )
         elif outputs.wanted:
             refused = pipeline.load_task(
-                task, overrides=words, seed=seed, sample=sample, package_path=folders, allow_outside=allow_outside
+                task,
+                overrides=words,
+                seed=seed,
+                sample=sample,
+                design=design,
+                package_path=folders,
+                allow_outside=allow_outside,
             )
             outputs.of_refusal(refused, report.verdict, task, report.warnings)
         return exit_code(report.verdict)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Lock, Thread
@@ -13,7 +12,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.engine_options import CheckStep, Engines, engine_names
-from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, cores, seconds
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
@@ -113,7 +112,7 @@ def test(
             if collect_only:
                 return _listed(session, format_)
             with _Lines(session, text=format_ == "text", quiet=quiet) as lines:
-                suite = session.run(at_once=jobs or _cores(), ended=lines.ended, first=first)
+                suite = session.run(at_once=jobs or cores(), ended=lines.ended, first=first)
             unwritten = _write(suite, session, junit, report)
         slowest = slowest_lines(suite, durations) if durations is not None and format_ == "text" else ()
         _show(replace(suite, notes=(*slowest, *suite.notes, *unwritten)), format_, github=github)
@@ -252,11 +251,3 @@ def _check_folder(option: str, folder: Path | None, *, hint: str | None = None) 
         raise InvalidInput([Diagnostic("USE086", message, hint=hint)])
     if not os.access(there, os.W_OK):
         raise InvalidInput([Diagnostic("USE086", f"{option} '{folder}': '{there}' is not writable", hint=hint)])
-
-
-def _cores() -> int:
-    """Number of cores that this process may use."""
-    if sys.platform == "linux":
-        return len(os.sched_getaffinity(0))
-    else:
-        return os.cpu_count() or 1

@@ -85,7 +85,7 @@ def monitor_at(spec: JointAtSpec, world: World) -> Monitor:
         def describe(k: int) -> str:
             return f"joint '{joint.name}' is at {readable(float(q[k]), joint.unit)}; {_wanted(spec, joint)}"
 
-        margins: list[Array] = [within - abs(q - spec.at)] if spec.at is not None else []
+        margins: list[Array] = [within - abs(joint.apart(q, spec.at))] if spec.at is not None else []
         margins += [q - spec.above] if spec.above is not None else []
         margins += [spec.below - q] if spec.below is not None else []
         return least(
@@ -115,7 +115,7 @@ def monitor_opened(spec: OpenedSpec | ClosedSpec, world: World) -> Monitor:
     limit = spec.by if isinstance(spec, OpenedSpec) else tolerance(joint, spec.within)
 
     def look(window: StateWindow) -> Robustness:
-        opening = abs(joint_positions(world.scene, window.states, joint) - joint.closed)
+        opening = abs(joint.apart(joint_positions(world.scene, window.states, joint), joint.closed))
         margin = opening - limit if opened else limit - opening
 
         def describe(k: int) -> str:
@@ -151,7 +151,7 @@ def check_opened(spec: OpenedSpec | ClosedSpec, context: CheckContext) -> tuple[
     if found := not_one_joint(scene, spec.object, ("object",)):
         return found
     joint = joint_of(scene, spec.object)
-    most = max(joint.upper - joint.closed, joint.closed - joint.lower)
+    most = math.pi if joint.type == "continuous" else max(joint.upper - joint.closed, joint.closed - joint.lower)
     if isinstance(spec, OpenedSpec) and spec.by > most + 1e-9:
         message = f"'{spec.object}' opens by at most {readable(most, joint.unit)}, the limit of joint '{joint.name}'"
         return (Problem(("by",), message),)

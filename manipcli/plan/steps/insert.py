@@ -4,8 +4,8 @@
     - insert: {object: plug, into: block/hole, depth: 20 mm, search: 5 mm}
 
 The peg is held upright above the believed hole and lowered until it is felt. If it has not dropped in, it slides along
-a spiral, pressed on with a fifth of the force, until it does: see `plan.spiral`. It then goes down with at most the
-force. The arm is soft across the hole, about the tip of the peg, so that the walls guide it.
+a spiral, pressed on with a fifth of the force, until it does: see `plan.spiral`. It then goes down with the force. The
+arm is soft across the hole, about the tip of the peg, so that the walls guide it.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, between, named
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
+from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.carrying import carry
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import Beyond, Compliance, Pressing, compliant
-from manipcli.plan.contact_line import approach_speed, effective_mass, refuse_too_strong
+from manipcli.plan.contact_line import approach_speed, effective_mass
 from manipcli.plan.motion import Insertion, PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.peg_fit import Fit, best_yaws, deep, fit, section, upright
@@ -48,18 +49,21 @@ from manipcli.spec.quantity import Force, Length
 
 SUNK: Final = 0.006
 """[m] A hand that is this much lower than at the rim has found the hole: more than the peg slips in it."""
-DROP: Final = 0.0015
+DROP: Final = 0.001
 """[m] A peg that drops by this while it slides has found the hole."""
 SEARCHING: Final = 0.2
 """Share of the force with which the peg is pressed on while it slides."""
-FIRM: Final = 3000.0
-"""[N/m] Stiffness across the hole while it slides: friction holds it back by less than a millimetre."""
+FIRM: Final = 1500.0
+"""[N/m] Stiffness across the hole while it slides: friction holds it back by less than a millimetre, and a peg that
+has dropped into the hole is not torn out before that is noticed."""
 SOFT: Final = 400.0
 """[N/m] Stiffness across the hole on the way down."""
 ALONG: Final = 1000.0
 """[N/m] Stiffness along the hole."""
 LOWERING: Final = 0.01
 """[m/s] Of the reference, on the way down."""
+GUIDED: Final = 0.01
+"""Share of the velocity limits with which the plan goes down besides: faster, it knocks at the floor of the hole."""
 IMPACT: Final = 1.3
 """Force of the first contact, at most, per force with which it slides."""
 FELT: Final = 0.2
@@ -84,7 +88,9 @@ class InsertSpec(Model):
     object: MovableName = Field(description="The held peg.")
     into: ContainerName = Field(description="The container whose hollow is the hole.")
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
-        15.0, description="Largest force of the tool along the hole [N], above 0; it slides with a fifth. Default 15 N."
+        15.0,
+        description="Force of the tool along the hole [N], above 0; it slides with a fifth. Impacts may exceed it for "
+        "a moment; the most that was felt is reported. Default 15 N.",
     )
     depth: Annotated[Length, Field(ge=0.001, le=1.0)] | None = Field(
         None,
@@ -158,7 +164,7 @@ def _attempt(
             search_motion(builder, planner, X_WT, X_WS.R, pitch_of(fitted.clearance), radius)
     X_WE = Transform.of(xyz=(high + depth) * down) @ X_WT
     with compliant(builder, law(spec.force, LOWERING, SOFT, depth if spec.depth else depth + SUNK)):
-        builder.straight("insert", X_WE, speed=0.05 * spec.velocity_scaling)
+        builder.straight("insert", X_WE, speed=GUIDED * spec.velocity_scaling)
     with compliant(builder, replace(Compliance.of(along=ALONG, across=SOFT, X_TC=X_TC), here=True)):
         builder.dwell("rest", FELT)
     motions = tuple(replace(motion, awaits=False) for motion in builder.plan().motions)
@@ -198,8 +204,8 @@ def check(spec: InsertSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, .
     if spec.depth is not None and spec.depth > depth + 1e-9:
         message = f"'{hole.name}' is {readable(depth, 'm')} deep; expected a depth of at most that"
         return (Problem(("depth",), message, "leave `depth` out to go to its floor", "TASK352"),)
-    if not peg.geometries:  # a file with other errors: only its name is known
-        return ()
+    if not peg.geometries:
+        return ()  # its description is wrong, which is another finding
     entering = section(peg, spec.depth or depth)
     fitted = max((fit(entering, hole.interior, yaw) for yaw in (0.0, math.pi / 2.0)), key=lambda each: each.clearance)
     if fitted.clearance <= 0.0:
@@ -218,7 +224,7 @@ def clause(spec: InsertSpec, robot: RobotModel) -> str:
     depth = "to its floor" if spec.depth is None else f"{amount(spec.depth, 'm')} deep"
     search = "" if spec.search is None else f", searching for it within {amount(spec.search, 'm')}"
     return (
-        f"insert {named(spec.object)} into {named(spec.into)}, {depth}, with at most {amount(spec.force, 'N')}, "
+        f"insert {named(spec.object)} into {named(spec.into)}, {depth}, with {amount(spec.force, 'N')}, "
         f"lowered from {between(spec.clearance, 'm')} above its rim{search}{at_share(spec.velocity_scaling, 0.5)}"
     )
 

@@ -9,13 +9,14 @@ from typing import Annotated, ClassVar, Final
 from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.core.errors import NotPlannable
 from manipcli.core.prose import amount, between, named
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.clauses import at_share
-from manipcli.plan.jointed import position_of
+from manipcli.plan.jointed import does_not_stay, position_of
 from manipcli.plan.motion import JointGoal, PlanningState, StepPlan
 from manipcli.plan.operating import Handling, ways
 from manipcli.plan.planner import Planner
@@ -94,7 +95,8 @@ def by_hand(
     """The ways to take the handle and to move the joint to the goal; no motion where it is there already.
 
     Raises:
-        NotPlannable: the hand holds something, or the robot is too near to something already.
+        NotPlannable: the joint would not stay at the goal, the hand holds something, or the robot is too near to
+            something already.
     """
     handling = Handling(
         joint, handle, goal, LABELS[spec.verb], spec.approach, spec.retreat, spec.posture, spec.open, spec.force,
@@ -103,9 +105,13 @@ def by_hand(
     if goal.short(position_of(planner, state, joint)) <= goal.within:
         there = StepPlan((), state, joint=goal)
         return Candidates([Candidate(lambda: there, name="it is there already")])
+    what = f"cannot {spec.verb} '{spec.object}'"
+    if why := does_not_stay(planner, state, joint, goal):
+        name = joint.name.rpartition(SEPARATOR)[2]
+        hint = f"move it to where it stays, or add `joints: {{{name}: {{friction: ...}}}}` to its body"
+        raise NotPlannable(f"{what}: {why}", hint=hint)
     planner.free_hand(state, joint.child)
     planner.free_start(state)
-    what = f"cannot {spec.verb} '{spec.object}'"
     options = itertools.chain(pushes(handling, planner, state) if push else (), ways(handling, planner, state))
     return Candidates(options, what=what, decides="branch", explain=handling.explain)
 

@@ -39,7 +39,8 @@ class OpenSpec(HandleSpec):
     """Take a drawer, a door or a lid by its handle, move it along the path of its joint, let go, and withdraw.
 
     The hand keeps its pose in the handle. It is stiff along the path, and yields across it, where the joint guides it.
-    The step is done when the joint is open by `by`, less 5 mm or 3 deg; more is done as well.
+    The step is done when the joint is open by `by`, less 5 mm or 3 deg; more is done as well. It is refused where the
+    joint does not stay there when the hand lets go: a lid that falls back, a door with a spring.
     """
 
     verb: ClassVar[str] = "open"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -18,15 +18,16 @@ from manipcli.conditions.frames import carrier, unknown_frame
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, named, point
 from manipcli.model.robot import RobotModel
+from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.claimed_joints import Claims, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import SOFT, Compliance, Pressing, compliant
-from manipcli.plan.contact_line import CLOSE, HOVER, approach_speed, effective_mass, hover, refuse_too_strong
+from manipcli.plan.contact_line import CLOSE, HOVER, approach_speed, effective_mass, hover
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import StepMember, single
-from manipcli.plan.steps.move import RENAMED, VelocityScaling
+from manipcli.plan.steps.move import VelocityScaling
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.names import FrameName
@@ -44,8 +45,6 @@ RELAX: Final = 0.4
 
 class ForceSpec(Model):
     """Keys of steps that press with a force."""
-
-    renamed: ClassVar = RENAMED
 
     object: FrameName = Field(description="The body, or a part of one (`panel/button`).")
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(description="Of the tool on it [N], above 0.")

@@ -1,11 +1,11 @@
 """`push`: slide a body over what it stands on, with the closed hand behind it.
 
     - push: {object: box, by: 10 cm, direction: [0, 1]}
-    - push: {object: box, onto: mat, force: 20 N}
+    - push: {object: box, onto: mark, force: 20 N}
 
-The hand goes behind the body, in line with its middle, and on in the direction. The arm is a spring along it, so that
-the force never exceeds `force`: the reference goes further than the body, by force / stiffness, and the motion ends as
-soon as the tool has gone the distance.
+The hand goes behind the body, in line with its middle and flat on its face, and on in the direction. The arm is a
+spring along it, so that the force never exceeds `force`: the reference goes further than the body, by force /
+stiffness, and the motion ends as soon as the tool has gone the distance.
 """
 
 from __future__ import annotations
@@ -24,16 +24,19 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.prose import amount, named, point
 from manipcli.core.units import readable
+from manipcli.model.grasp import friction_coefficient
 from manipcli.model.robot import RobotModel
+from manipcli.plan.arm_force import refuse_too_strong
 from manipcli.plan.candidates import Candidate, Candidates
 from manipcli.plan.claimed_joints import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.clauses import at_share
 from manipcli.plan.compliance import FIRM, Beyond, Compliance, compliant
-from manipcli.plan.contact_line import HOVER, gap, refuse_too_strong
+from manipcli.plan.contact_line import HOVER, ahead, travel_to
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.prediction import put
+from manipcli.plan.sliding import LEVEL, refuse_step_up, refuse_too_heavy, step_up
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.unknown_names import unknown_posture
@@ -46,6 +49,8 @@ BEHIND: Final = 0.06
 """[m] Gap between the body's outline and the tool, from which the hand comes straight on."""
 HEIGHTS: Final = (0.5, 0.35, 0.7, 0.9)
 """Of the tool above the bottom of the body, as shares of its height."""
+FARTHEST: Final = 0.38
+"""[m] From there on it does not look for the body any more."""
 STEADY: Final = 2000.0
 """[N/m] Stiffness along the push."""
 PACE: Final = 0.1
@@ -54,14 +59,22 @@ BACK: Final = 0.03
 """[m] By which the hand backs off."""
 ALONG_WAY: Final = 4
 """Places on the way at which the body is examined."""
+FLAT: Final = ("box", "tray")
+"""Shapes with flat faces."""
+UPRIGHT: Final = 0.1
+"""Largest vertical part of the unit normal of a face that the hand lies on."""
+RESERVE: Final = 0.8
+"""Share of the friction between hand and face that a plan uses."""
 UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 class PushSpec(Model):
     """Slide a body over what it stands on, straight, with the closed hand behind it.
 
-    Exactly one of `by`, `to` and `onto` says how far. The body keeps its rotation. The arm yields along the push, so
-    that it never presses with more than `force`; no controllers file is needed for it.
+    Exactly one of `by`, `to` and `onto` says how far. The body keeps its rotation: the hand is flat on the face of a
+    box, and a push further off this face than friction allows is refused. The arm yields along the push, so
+    that it never presses with more than `force`; no controllers file is needed for it. A push that friction under the
+    body stops, mu m g, is refused.
 
     It is done when the body is measured to be within 1 cm and 10 deg of its goal; it fails if the body needs more than
     `force`.
@@ -75,7 +88,9 @@ class PushSpec(Model):
         None, description="With `by`: in the world, [x, y] of any length. Default: away from the base of the robot."
     )
     to: tuple[Length, Length] | None = Field(None, description="Where its frame goes, [x, y] in the world [m].")
-    onto: BodyName | None = Field(None, description="The body over whose middle it goes, as a mat.")
+    onto: BodyName | None = Field(
+        None, description="The body over whose middle it goes; its top is level with what the body stands on."
+    )
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
         30.0, description="Largest force of the hand on it [N], above 0. Default 30 N."
     )
@@ -127,6 +142,10 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
     if distance < 1e-3:
         raise NotPlannable(f"'{spec.object}' is there already: the way is {readable(distance, 'm')}")
     axis = shift / distance
+    if spec.onto is not None:
+        refuse_step_up(planner, state, spec.object, spec.onto)
+    refuse_too_heavy(planner, state, spec.object, axis, spec.force)
+    normal = facing(spec, planner, state, axis)
     _refuse_obstructed(spec, planner, state, shift)
     body, X_WO = planner.scene.body(spec.object), planner.body_pose(state, spec.object)
     middle = X_WO.apply(body.centre)
@@ -135,17 +154,17 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
 
     def attempt(share: float, turn: float) -> StepPlan:
         start = middle - (outline + BEHIND) * axis + (2.0 * share - 1.0) * half[2] * UP
-        side = np.cross(UP, axis)
+        side, along_face = np.cross(UP, axis), np.cross(UP, normal)
         c, s = math.cos(turn), math.sin(turn)
-        y = c * side + s * axis  # of the tool: the fingers are broad along it
+        y = c * along_face + s * normal  # of the tool: the fingers are broad along it
         R = np.column_stack([np.cross(y, -UP), y, -UP])
         builder = MotionBuilder(planner, state, verb="push")
         builder.reach("behind", Transform.of(xyz=start, R=R), speed=spec.velocity_scaling, hand=spec.posture, free=True)
         refuse_too_strong(planner, builder.now.position, axis, spec.force)
         X_WA = planner.tool_pose(builder.now)
-        near = _advance(planner, builder.now, spec.object, X_WA, axis)
+        near = travel_to(planner, builder.now, spec.object, X_WA, axis, left=HOVER, most=FARTHEST)
         end = near + distance + HOVER
-        builder.straight("approach", _moved(X_WA, near, axis), speed=spec.velocity_scaling)
+        builder.straight("approach", ahead(X_WA, near, axis), speed=spec.velocity_scaling)
         slack = spec.force / STEADY
         stuck = f"'{spec.object}' did not go {readable(distance, 'm')}: it needs more than {readable(spec.force, 'N')}"
         beyond = Beyond(frozen(axis), float(axis @ X_WA.p) + end, most=spec.force, otherwise=stuck)
@@ -154,12 +173,12 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
         allowed = planner.hand_contacts(spec.object)
         with compliant(builder, replace(law, until=beyond)):
             builder.straight(
-                "push", _moved(X_WA, end + slack, axis), speed=PACE * spec.velocity_scaling, allowed=allowed
+                "push", ahead(X_WA, end + slack, axis), speed=PACE * spec.velocity_scaling, allowed=allowed
             )
         moved = Transform.of(xyz=shift) @ X_WO
         with compliant(builder, replace(law, relative=True)):
             builder.straight(
-                "back off", _moved(X_WA, end - BACK, axis), speed=spec.velocity_scaling / 2.0, allowed=allowed
+                "back off", ahead(X_WA, end - BACK, axis), speed=spec.velocity_scaling / 2.0, allowed=allowed
             )
         planned = builder.plan()
         motions = tuple(replace(motion, awaits=False) for motion in planned.motions)
@@ -177,29 +196,26 @@ def candidates(spec: PushSpec, planner: Planner, state: PlanningState) -> Candid
     return Candidates(options, what=f"cannot push '{spec.object}'")
 
 
-def _advance(planner: Planner, state: PlanningState, body: str, X_WA: Transform, axis: Array) -> float:
-    """[m] from X_WA along the axis to a gap of `HOVER`.
+def facing(spec: PushSpec, planner: Planner, state: PlanningState, axis: Array) -> Array:
+    """(3,) horizontal unit vector into the face that the hand lies flat on; of other shapes than boxes the direction.
 
     Raises:
-        NotPlannable: the hand does not meet the body on its line.
+        NotPlannable: the direction is outside the cone of friction about it: the hand would slide along the face, and
+            the body rotate.
     """
-    travel, near = 0.0, gap(planner, state, body)
-    for _ in range(12):
-        if near - HOVER < 1e-4:
-            return travel
-        travel += near - HOVER
-        if travel > 3.0 * BEHIND + 0.2:
-            break
-        q = planner.solver.solve(_moved(X_WA, travel, axis), state.position, planner.rng)
-        state = state.moved(q)
-        near = gap(planner, state, body)
-    else:
-        return travel
-    raise NotPlannable(f"the hand does not meet '{body}' on its line")
-
-
-def _moved(X: Transform, distance: float, axis: Array) -> Transform:
-    return Transform.of(xyz=distance * axis) @ X
+    body = planner.scene.body(spec.object)
+    if body.kind not in FLAT:
+        return axis
+    columns = planner.body_pose(state, spec.object).R.T
+    normals = [sign * column for column in columns if abs(column[2]) < UPRIGHT for sign in (1.0, -1.0)]
+    normal = max(normals, key=lambda each: float(each @ axis), default=axis)
+    cone = math.atan(RESERVE * friction_coefficient(planner.robot, body))
+    off = math.acos(min(1.0, float(normal @ axis)))
+    if off > cone:
+        message = f"'{spec.object}' would rotate: the push is {readable(off, 'rad')} off its face"
+        limit = f"friction keeps the hand on the face up to {readable(cone, 'rad')}"
+        raise NotPlannable(f"{message}, {limit}", hint="push it along its faces, in two steps")
+    return np.array([normal[0], normal[1], 0.0]) / math.hypot(normal[0], normal[1])
 
 
 def _carried(planner: Planner, state: PlanningState, name: str, X_WO: Transform) -> dict[str, Transform]:
@@ -212,7 +228,8 @@ def _carried(planner: Planner, state: PlanningState, name: str, X_WO: Transform)
 def _refuse_obstructed(spec: PushSpec, planner: Planner, state: PlanningState, shift: Array) -> None:
     """
     Raises:
-        NotPlannable: the body would meet another on its way, which it does not touch now.
+        NotPlannable: the body would meet another on its way, which it does not touch now; over what is level with its
+            support it slides.
     """
     X_WO = planner.body_pose(state, spec.object)
     free = {name for pair in planner.touching(state, spec.object) for name in pair}
@@ -221,7 +238,7 @@ def _refuse_obstructed(spec: PushSpec, planner: Planner, state: PlanningState, s
         there = put(planner, state, {spec.object: Transform.of(xyz=k / ALONG_WAY * shift) @ X_WO})
         for pair in sorted(planner.touching(there, spec.object)):
             other = next((name for name in pair if name not in free), None)
-            if other is not None:
+            if other is not None and step_up(planner, state, spec.object, other) > LEVEL:
                 hint = f"move '{other}' away, or push it less far"
                 raise NotPlannable(f"'{other}' is in the way of '{spec.object}'", hint=hint, parts=frozenset((other,)))
 

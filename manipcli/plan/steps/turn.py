@@ -59,7 +59,7 @@ def candidates(spec: TurnSpec, planner: Planner, state: PlanningState) -> Candid
     """The ways to take the handle."""
     joint, handle = joint_and_handle(planner.scene, spec)
     here = position_of(planner, state, joint)
-    target = here + spec.by if spec.by is not None else spec.to or 0.0
+    target = here + (spec.by if spec.by is not None else float(joint.apart(spec.to or 0.0, here)))
     if not joint.lower - ROUNDING <= target <= joint.upper + ROUNDING:
         least, limit = amount(joint.lower, "rad"), amount(joint.upper, "rad")
         message = f"'{joint.name}' turns from {least} to {limit}, not to {amount(target, 'rad')}"

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from manipcli.control.controller import JointState
-from manipcli.control.controllers.cartesian_impedance import (
-    CartesianImpedanceController,
-    CartesianImpedanceSpec,
-    check,
-)
+from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceSpec, check
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
+from manipcli.control.impedance_controller import CartesianImpedanceController
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, matrix_from_axis_angle
 from manipcli.model.build_robot import build_robot

@@ -1,0 +1,195 @@
+"""A sweep in the terminal and as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+
+from manipcli.core.text import listed, number_of, shorten
+from manipcli.core.units import readable
+from manipcli.report.table import table
+from manipcli.sweep.analysis import Analysis, Influence
+from manipcli.sweep.results import SampleResult
+from manipcli.sweep.statistics import SHARES, Rate
+from manipcli.sweep.sweep import Progress
+
+NAMED = 8
+"""Number of samples named for each way of failing."""
+_SHOWN = (0, 1, 3, 5, 6)  # of SHARES
+_BAR = 10
+
+
+def percent(share: float) -> str:
+    """`97.0 %`."""
+    return f"{100.0 * share:.1f} %"
+
+
+def rate_text(rate: Rate) -> str:
+    """`194 of 200 passed: 97.0 % (95 % interval 93.6 % to 98.6 %)`."""
+    least, most = rate.interval
+    interval = f"95 % interval {percent(least)} to {percent(most)}"
+    return f"{rate.passed} of {rate.count} passed: {percent(rate.share)} ({interval})"
+
+
+def progress_text(progress: Progress) -> str:
+    """`120 of 200: 118 passed, 2 failed, 3.1 per second, 26 s left`."""
+    failed = progress.done - progress.passed
+    text = f"{progress.done} of {progress.asked}: {progress.passed} passed, {failed} failed"
+    if progress.left is None:
+        return text
+    pace = f"{progress.rate:.1f} per second" if progress.rate >= 0.95 else f"{1.0 / progress.rate:.1f} s per sample"
+    return f"{text}, {pace}, {_time(progress.left)} left"
+
+
+def render_text(analysis: Analysis) -> str:
+    """The rate, the margins, the ways of failing, what matters, and the worst samples with their commands."""
+    sweep = analysis.sweep
+    sampling = sweep.sampling
+    least = f"design {sampling.design}, seed {sampling.seed}, {number_of(len(analysis.columns), 'number')} varied"
+    lines = [f"{sampling.task}: {rate_text(sweep.rate)}", least]
+    if sampling.design.word != "random":
+        lines.append("the interval holds for random samples; these cover the space evenly or follow its axes")
+    if sweep.missing:
+        missing = listed(map(str, sweep.missing), most=NAMED)
+        lines.append(f"missing: {len(sweep.missing)} of {sweep.asked} samples: {missing}")
+    if sweep.results:
+        lines += ["", _margins(analysis)]
+    if analysis.influences:
+        lines += ["", _influences(analysis)]
+    if analysis.failures:
+        lines += ["", "Ways of failing"]
+        lines += [
+            f"  {len(way.samples)} x {way}: samples {listed(map(str, way.samples), most=NAMED)}"
+            for way in analysis.failures
+        ]
+    if analysis.worst:
+        lines += ["", "Smallest margins"]
+        for result in analysis.worst:
+            lines += [f"  {sample_text(result)}", f"      {sampling.job(result.number).command()}"]
+    return "\n".join(lines)
+
+
+def sample_text(result: SampleResult) -> str:
+    """`sample 17 failed: ...`; of a sample that passed its tightest margin."""
+    if not result.passed:
+        return f"sample {result.number} {result.outcome}: {shorten(result.cause, width=100)}"
+    known = [margin for margin in result.margins if margin.telling]
+    tightest = min(known, key=lambda margin: margin.relative or 0.0, default=None)
+    if tightest is None:
+        return f"sample {result.number} passed"
+    return f"sample {result.number} passed: {tightest.name} by {readable(tightest.value or 0.0, tightest.unit)}"
+
+
+def _margins(analysis: Analysis) -> str:
+    names = {0.0: "least", 0.5: "median", 1.0: "most"}
+    headers = ("expectation", "met", *(names.get(SHARES[k], f"{SHARES[k]:.0%}".replace("%", " %")) for k in _SHOWN))
+    rows = []
+    for spread in analysis.spreads:
+        shown = [readable(spread.quantiles[k], spread.unit) for k in _SHOWN] if spread.telling else ["-"] * len(_SHOWN)
+        met = f"{spread.met}/{len(analysis.sweep.results)}"
+        rows.append((shorten(spread.name, width=48), met, *(text.replace("-", "−") for text in shown)))
+    return table(headers, rows, right=headers[1:])
+
+
+def _influences(analysis: Analysis) -> str:
+    """What matters for the smallest margin."""
+    headers: tuple[str, ...]
+    if analysis.influences[0].indices is not None:
+        headers = ("number", "first-order index", "95 % interval", "total index", "95 % interval ")
+        rows = [(one.column.name, *_index_cells(one)) for one in analysis.influences]
+        return table(headers, rows, right=headers[1:])
+    headers = ("rank correlation", "nominal", "with margin", "with passing", "by chance up to", "")
+    rows = []
+    for one in analysis.influences:
+        cells = ["-" if found is None else f"{found.rho:+.2f}" for found in (one.correlation, one.passing)]
+        bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "-")
+        nominal = f"{one.column.nominal:.4g}"
+        bar = "█" * round(one.size * _BAR) if one.matters else ""
+        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells, bound)), bar))
+    return table(headers, rows, right=headers[1:5])
+
+
+def _index_cells(influence: Influence) -> tuple[str, ...]:
+    if influence.indices is None:
+        return ("-", "", "-", "")
+    cells: list[str] = []
+    for index in (influence.indices.first, influence.indices.whole):
+        low, high = index.interval
+        cells += [f"{index.value:.2f}".replace("-", "−"), f"{low:.2f} to {high:.2f}".replace("-", "−")]
+    return tuple(cells)
+
+
+def render_json(analysis: Analysis) -> str:
+    """The sweep as one JSON object."""
+    sweep = analysis.sweep
+    sampling = sweep.sampling
+    least, most = sweep.rate.interval
+    return json.dumps(
+        {
+            "task": sampling.task,
+            "design": str(sampling.design),
+            "seed": sampling.seed,
+            "asked": sweep.asked,
+            "passed": sweep.rate.passed,
+            "count": sweep.rate.count,
+            "rate": sweep.rate.share,
+            "interval": [least, most],
+            "missing": list(sweep.missing),
+            "outcomes": dict(sorted(analysis.outcomes.items())),
+            "expectations": [
+                {
+                    "name": spread.name,
+                    "unit": spread.unit,
+                    "met": spread.met,
+                    "evaluated": spread.evaluated,
+                    "quantiles": {f"{share:g}": q for share, q in zip(SHARES, spread.quantiles, strict=False)},
+                }
+                for spread in analysis.spreads
+            ],
+            "numbers": [_number_object(influence) for influence in analysis.influences],
+            "failures": [
+                {"outcome": way.outcome, "step": way.step, "expectation": way.broken, "samples": list(way.samples)}
+                for way in analysis.failures
+            ],
+            "samples": [_sample_object(analysis, result) for result in sweep.results],
+            "wall_time": sweep.duration,
+        },
+        indent=2,
+        allow_nan=False,
+    )
+
+
+def _number_object(influence: Influence) -> Mapping[str, object]:
+    found, indices = influence.correlation, influence.indices
+    return {
+        "name": influence.column.name,
+        "nominal": influence.column.nominal,
+        "correlation": found.rho if found is not None else None,
+        "correlation_with_passing": influence.passing.rho if influence.passing is not None else None,
+        "bound": found.bound if found is not None else None,
+        "first_order": None if indices is None else {"value": indices.first.value, "interval": indices.first.interval},
+        "total": None if indices is None else {"value": indices.whole.value, "interval": indices.whole.interval},
+    }
+
+
+def _sample_object(analysis: Analysis, result: SampleResult) -> Mapping[str, object]:
+    smallest = result.smallest
+    return {
+        "sample": result.number,
+        "outcome": result.outcome,
+        "step": result.step,
+        "expectation": result.broken,
+        "cause": result.cause,
+        "smallest_margin": smallest if math.isfinite(smallest) else None,
+        "margins": {margin.name: margin.finite for margin in result.margins},
+        "values": dict(zip((column.name for column in analysis.columns), analysis.values[result.number], strict=True)),
+        "command": analysis.sweep.sampling.job(result.number).command(),
+    }
+
+
+def _time(seconds: float) -> str:
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    minutes = seconds / 60.0
+    return f"{minutes:.0f} min" if minutes < 100.0 else f"{minutes / 60.0:.1f} h"
