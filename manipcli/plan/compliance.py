@@ -62,7 +62,7 @@ class Beyond:
         normal: (3,) unit vector in the world.
         offset: [m] the plane is n . p = offset.
         drop: [m] it also ends when the origin is this far beyond its mean of the last second; None: it does not.
-        most: [N] it also ends, before the plane, when the tool is felt to press with more than this.
+        most: [N] it also ends, before the plane, when the tool is felt to press with more than this for 50 ms.
         otherwise: why the step has failed if the motion ends before the plane; "": that is no failure.
     """
 

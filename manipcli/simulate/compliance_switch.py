@@ -20,6 +20,8 @@ from manipcli.simulate.session import Session
 
 MEAN = 1.0
 """[s] Time constant of the mean from which the tool drops."""
+TOO_LONG = 0.05
+"""[s] A force above the most is too much for longer than this: an impact of rigid bodies lasts a tick or a few."""
 BLEND = 0.5
 """[s] Time in which a trajectory that begins elsewhere than planned joins its plan."""
 HOLDING_SPEED = 0.002
@@ -39,7 +41,7 @@ class ComplianceSwitch:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._mean, self._passed = math.nan, False
+        self._mean, self._passed, self._over = math.nan, False, 0.0
 
     @property
     def _manager(self) -> ControllerManager:
@@ -81,7 +83,9 @@ class ComplianceSwitch:
             self._mean = along
         self._mean += (along - self._mean) * min(1.0, self._session.period / MEAN)
         self._passed = along >= until.offset or (until.drop is not None and along - self._mean >= until.drop)
-        return self._passed or float(np.linalg.norm(arm.felt[:3])) > until.most
+        over = float(np.linalg.norm(arm.felt[:3])) > until.most
+        self._over = self._over + self._session.period if over else 0.0
+        return self._passed or self._over > TOO_LONG
 
     @property
     def felt(self) -> str:
@@ -108,7 +112,7 @@ class ComplianceSwitch:
             InvalidArgument: no controller complies, or the switch was refused.
         """
         arm, trajectory = self._arm, motion.trajectory
-        self._mean, self._passed = math.nan, False
+        self._mean, self._passed, self._over = math.nan, False, 0.0
         if self._session.engine.ideal:
             return trajectory  # without physics nothing yields
         if motion.compliance is None:

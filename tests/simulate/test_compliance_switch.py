@@ -15,7 +15,7 @@ from manipcli.plan.compliance import Beyond, Compliance, Pressing, compliant
 from manipcli.plan.motion import Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.run.execute import build_manager
-from manipcli.simulate.compliance_switch import ComplianceSwitch
+from manipcli.simulate.compliance_switch import TOO_LONG, ComplianceSwitch
 from manipcli.task.load_task import load_task
 
 TASK = Path(__file__).parents[2] / "tasks" / "press.yaml"
@@ -83,7 +83,7 @@ def test_the_controllers_of_compliant_steps_are_listed_to_clients(session):
 
 
 def test_a_motion_ends_when_more_is_felt_than_it_may_press_with(session):
-    """It has then failed for the reason that it gives."""
+    """For longer than an impact lasts: it has then failed for the reason that it gives."""
     switch, (arm,) = ComplianceSwitch(session), [own for own in session.manager.controllers if complies(own)]
     until = Beyond(np.array([0.0, 0.0, 1.0]), 100.0, most=20.0, otherwise="it is stuck")
     motion = Motion("push", None, None, 1.0, compliance=replace(Compliance.of(), until=until))
@@ -91,8 +91,12 @@ def test_a_motion_ends_when_more_is_felt_than_it_may_press_with(session):
     session.manager.update(0.0, session.state)
     arm.felt[:3] = 0.0, 12.0, 15.0
     assert not switch.passed(motion)
-    arm.felt[:3] = 0.0, 12.0, 17.0  # 20.8 N
-    assert switch.passed(motion)
+    impact = round(TOO_LONG / session.period) - 1
+    for force in (*[17.0] * impact, 15.0, *[17.0] * impact):  # 20.8 N, then 19.2 N
+        arm.felt[2] = force
+        assert not switch.passed(motion)
+    ended = [switch.passed(motion) for _ in range(3)]
+    assert ended[-1]
     assert switch.result(motion) == ("", "it is stuck")
 
 

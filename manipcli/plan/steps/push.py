@@ -4,8 +4,8 @@
     - push: {object: box, onto: mark, force: 20 N}
 
 The hand goes behind the body, in line with its middle and flat on its face, and on in the direction. The arm is a
-spring along it, so that the force never exceeds `force`: the reference goes further than the body, by force /
-stiffness, and the motion ends as soon as the tool has gone the distance.
+spring along it: the reference goes further than the body, by force / stiffness. The motion ends as soon as the tool has
+gone the distance, and fails when more than `force` is felt for 50 ms.
 """
 
 from __future__ import annotations
@@ -72,9 +72,9 @@ class PushSpec(Model):
     """Slide a body over what it stands on, straight, with the closed hand behind it.
 
     Exactly one of `by`, `to` and `onto` says how far. The body keeps its rotation: the hand is flat on the face of a
-    box, and a push further off this face than friction allows is refused. The arm yields along the push, so
-    that it never presses with more than `force`; no controllers file is needed for it. A push that friction under the
-    body stops, mu m g, is refused.
+    box, and a push further off this face than friction allows is refused. The arm yields along the push, and
+    the step fails where more than `force` is felt for 50 ms; no controllers file is needed for it. A push that friction
+    under the body stops, mu m g, is refused.
 
     It is done when the body is measured to be within 1 cm and 10 deg of its goal; it fails if the body needs more than
     `force`.
