@@ -48,7 +48,7 @@ from manipcli.spec.quantity import Force, Length
 
 SUNK: Final = 0.006
 """[m] A hand that is this much lower than at the rim has found the hole: more than the peg slips in it."""
-DROP: Final = 0.001
+DROP: Final = 0.0008
 """[m] A peg that drops by this while it slides has found the hole."""
 SEARCHING: Final = 0.2
 """Share of the force with which the peg is pressed on while it slides."""
@@ -88,8 +88,8 @@ class InsertSpec(Model):
     into: ContainerName = Field(description="The container whose hollow is the hole.")
     force: Annotated[Force, Field(gt=0, le=1e4)] = Field(
         15.0,
-        description="Force of the tool along the hole [N], above 0; it slides with a fifth. Impacts may exceed it for a "
-        "moment; the most that was felt is reported. Default 15 N.",
+        description="Force of the tool along the hole [N], above 0; it slides with a fifth. Impacts may exceed it for "
+        "a moment; the most that was felt is reported. Default 15 N.",
     )
     depth: Annotated[Length, Field(gt=0, le=1.0)] | None = Field(
         None, description="How deep the end of the peg goes, from the rim [m]. Default: to the floor of the hole."
