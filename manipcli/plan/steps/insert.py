@@ -49,7 +49,7 @@ from manipcli.spec.quantity import Force, Length
 
 SUNK: Final = 0.006
 """[m] A hand that is this much lower than at the rim has found the hole: more than the peg slips in it."""
-DROP: Final = 0.001
+DROP: Final = 0.0008
 """[m] A peg that drops by this while it slides has found the hole."""
 SEARCHING: Final = 0.2
 """Share of the force with which the peg is pressed on while it slides."""
