@@ -55,6 +55,12 @@ class BodyShape:
     flat_top: bool = False
     inertial: Inertial | None = None
 
+    def covers(self, x: float, y: float) -> bool:
+        """Whether the outline seen from above has (x, y) [m], from its middle."""
+        if self.radius is not None:
+            return bool(np.hypot(x, y) <= self.radius)
+        return bool(abs(x) <= self.size[0] / 2.0 and abs(y) <= self.size[1] / 2.0)
+
 
 def inertial_of(spec: BodySpec, shape: BodyShape) -> Inertial:
     """Mass properties in O: those of a file scaled to the written mass, else those of the union of the shapes."""

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-import numpy as np
-
 from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import digits
@@ -343,12 +341,7 @@ class _Builder:
         top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
         X_WO = Transform.of(xyz=(*at, top - bottom(shape, Transform.identity())), rpy=(0.0, 0.0, yaw))
         x, y = X_WB.inverse().apply(X_WO.p)[:2] - support.centre[:2]
-        beside = (
-            np.hypot(x, y) > support.radius
-            if support.radius is not None
-            else abs(x) > support.size[0] / 2.0 or abs(y) > support.size[1] / 2.0
-        )
-        if beside:
+        if not support.covers(x, y):
             where = f"[{spec.at[0]:g}, {spec.at[1]:g}] m" + (f" in '{spec.frame}'" if spec.frame else "")
             middle = X_WB.apply(support.centre)
             across = f"{support.size[0]:g} by {support.size[1]:g} m"
