@@ -5,8 +5,10 @@ With the felt force p along the axis and the stiffness k of the spring, the shif
     s' = speed                              before contact,
     s' = 2 pi bandwidth (target - p) / k    in contact; at most `speed` where what is touched may give way.
 
-While the force first rises, s' is also at most speed (k + K) / k. K is the stiffness of what is touched, the force over
-the distance by which it gave way: a button moves at `speed` at most, and so meets its end stop.
+While the force first rises, s' is also at most v (k + K) / k. K is the stiffness of what is touched, the force over the
+distance by which it gave way: a button moves at v at most, and so meets its end stop. There v = `speed` `SHARE`
+(1 + `OVER` - p / target): where `speed` is the target times a period over the mass, an impact of one period brings the
+force to no more than 1 + `OVER` of the target.
 
 In contact with something stiff p' = k s', so that p tends to the target as exp(-2 pi bandwidth t) and never exceeds it.
 Contact begins above `TOUCH` of the target, at least `LEAST` [N], and is lost below half of that: the reference then
@@ -27,6 +29,10 @@ from manipcli.plan.compliance import Pressing
 
 TOUCH: Final = 0.05
 """Share of the target at which contact begins."""
+OVER: Final = 0.3
+"""Share of the target by which the force may exceed it in an impact."""
+SHARE: Final = 0.75
+"""Share of the speed that this allows, as an impact in PyBullet is a little longer than a period."""
 LEAST: Final = 0.3
 """[N] Least force that counts as contact."""
 TOLERANCE: Final = 0.1
@@ -120,9 +126,10 @@ class PressingReference:
         step = self._rate * error if touching else pressing.speed
         if pressing.yields:
             step = min(step, pressing.speed)
-        if self._met is not None and (given := self.shift - stretch - self._met[0]) >= 0.0:
+        elif self._met is not None and (given := self.shift - stretch - self._met[0]) >= 0.0:
             body = max(0.0, felt - self._met[1]) / given if given else 0.0
-            step = min(step, pressing.speed * (1.0 + body / self.stiffness))
+            most = pressing.speed * SHARE * max(0.0, 1.0 + OVER - felt / pressing.target)
+            step = min(step, most * (1.0 + body / self.stiffness))
         if step < 0.0 or not self.missed:
             self.shift += step * period
         if self.contact is not None:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from manipcli.control.pressing import DEPTH, PressingReference, Relaxing
+from manipcli.control.pressing import DEPTH, OVER, SHARE, PressingReference, Relaxing
 from manipcli.plan.compliance import Pressing
 
 PERIOD = 1e-3
@@ -29,14 +29,19 @@ def press(body, *, time, gap=0.004, target=10.0, speed=0.01, reach=0.02):
 
 @pytest.mark.parametrize("body", [600.0, 4e3, 1e6])
 def test_the_force_rises_as_an_exponential_and_never_exceeds_its_target(body):
-    """p' = 2 pi b kappa (F - p), with kappa = k_body / (k + k_body), in contact; k_body times speed at most."""
+    """p' = 2 pi b kappa (F - p), with kappa = k_body / (k + k_body), in contact, until 90 % of F at most c (1.3 F - p).
+
+    c = k_body 0.75 speed / F is what the speed of the tool allows.
+    """
     law, forces, _ = press(body, time=4.0)
-    rate = math.tau * body / (SPRING + body)
+    rate, slow = math.tau * body / (SPRING + body), body * SHARE * 0.01 / 10.0
     (begin,) = np.flatnonzero(forces >= 0.5)[:1]
     times = PERIOD * np.arange(len(forces) - begin)
-    knee = max(float(forces[begin]), 10.0 - 0.01 * body / rate)
-    until = (knee - forces[begin]) / (0.01 * body)
-    rising = forces[begin] + 0.01 * body * times
+    first = float(forces[begin])
+    cross = (10.0 * rate - 13.0 * slow) / (rate - slow)  # of the two rates
+    knee = first if slow > rate else max(first, min(9.0, cross))
+    until = math.log((13.0 - first) / (13.0 - knee)) / slow
+    rising = 13.0 - (13.0 - first) * np.exp(-slow * times)
     expected = np.where(times < until, rising, 10.0 - (10.0 - knee) * np.exp(-rate * (times - until)))
     np.testing.assert_allclose(forces[begin:], expected, atol=0.08)  # Euler steps of 1 ms
     assert forces.max() <= 10.0
@@ -50,10 +55,30 @@ def test_what_gives_way_moves_at_the_approach_speed_at_most():
     assert np.diff(tool).max() <= 0.011 * PERIOD  # 10 mm/s; the first force that counts as contact is 5 %
 
 
+def test_an_impact_at_an_end_stop_stays_within_the_tolerance():
+    """A mass on the damped spring meets a stop behind a spring: p + m v / T <= 1.3 F, with the speed v = F T / m."""
+    mass, target, body, stop = 6.0, 8.0, 1000.0, 0.006
+    law = PressingReference(Pressing(Z, target, target * PERIOD / mass, 0.03, hold=1.0), SPRING)
+    damping = 2.0 * math.sqrt(SPRING * mass)
+    x = speed = felt = highest = 0.0
+    for _ in range(25000):
+        shift = law.update(PERIOD, felt, law.shift - x)
+        depth = max(0.0, x - 0.002)
+        force = body * min(depth, stop) + max(0.0, depth - stop) * 2e5
+        speed += PERIOD * (SPRING * (shift - x) - damping * speed - force) / mass
+        x += PERIOD * speed
+        felt += (1.0 - math.exp(-math.tau * 25.0 * PERIOD)) * (force - felt)
+        if depth > 0.0:
+            highest = max(highest, force + mass * speed / PERIOD)
+    assert depth > stop
+    assert highest <= (1.0 + OVER) * target
+    np.testing.assert_allclose(felt, target, rtol=0.02)
+
+
 @pytest.mark.parametrize("body", [600.0, 1e6])
 def test_at_rest_the_force_is_stiffness_times_depth(body):
     """Springs in series: the reference is F / k + F / k_body beyond the surface."""
-    _, forces, shifts = press(body, time=4.0)
+    _, forces, shifts = press(body, time=6.0)
     np.testing.assert_allclose(shifts[-1] - 0.004, 10.0 / SPRING + 10.0 / body, atol=1e-5)
     np.testing.assert_allclose(forces[-1], 10.0, atol=1e-3)
 
