@@ -56,7 +56,7 @@ def _edges(graph: Graph) -> set[tuple[str, str]]:
 
 
 def test_every_topic_of_the_table_has_a_producer() -> None:
-    assert {channel.topic for channel in channel_table([])} == set(PRODUCERS)
+    assert {channel.topic for channel in channel_table([], scene_joints=True)} == set(PRODUCERS)
 
 
 def test_the_graph_of_a_task_is_what_its_files_say(task: Callable[..., Path]) -> None:
