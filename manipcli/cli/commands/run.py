@@ -39,7 +39,11 @@ def run(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the --log file if it exists.")] = False,
     embed_meshes: Annotated[
-        bool, typer.Option("--embed-meshes", help="Store the mesh files in the log, so that replay needs no packages.")
+        bool,
+        typer.Option(
+            "--embed-meshes",
+            help="Store the mesh files in the log, for replay, export and --verify on a machine without the robot's packages; other viewers do not read them.",
+        ),
     ] = False,
     engines: Engines = None,
     check_step: CheckStep = False,
