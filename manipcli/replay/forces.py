@@ -61,13 +61,13 @@ class Forces:
 
     def at(self, k: int) -> tuple[Push, ...]:
         """The contact forces at the k-th time."""
-        playback = self._playback
-        return tuple(
-            push
-            for contact, time in zip(playback.contacts[k], playback.contact_times[k], strict=True)
-            if contact.force > LEAST
-            for push in self._pushes(contact, time, k)
-        )
+        return tuple(push for _, pushes in self.by_contact(k) for push in pushes)
+
+    def by_contact(self, k: int) -> tuple[tuple[Contact, tuple[Push, ...]], ...]:
+        """The contacts at the k-th time that have contact points, with their forces."""
+        contacts = zip(self._playback.contacts[k], self._playback.contact_times[k], strict=True)
+        found = ((one, tuple(self._pushes(one, time, k))) for one, time in contacts if one.force > LEAST)
+        return tuple((contact, pushes) for contact, pushes in found if pushes)
 
     def _pushes(self, contact: Contact, time: float, k: int) -> list[Push]:
         loaded = [point for point in contact.points if point.force > 0.0]
