@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from manipcli.cli import console
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+from manipcli.core.text import number_of
 
 if TYPE_CHECKING:
     from manipcli.replay.playback import Playback
@@ -34,6 +35,12 @@ class LogExports:
         check_outputs(("--rerun", self.rerun), ("--glb", self.glb), reads=(log,))
         _check_ending("--glb", self.glb, ".glb")
         _check_ending("--rerun", self.rerun, ".rrd")
+        if self.rosbag2 is not None:
+            from manipcli.record.foreign.bag import write_bag
+
+            topics = write_bag(log, self.rosbag2)
+            console.talk(f"{number_of(len(topics.all), 'topic')}, {number_of(topics.count, 'message')}")
+            console.result(str(self.rosbag2))
         if self.glb is not None or self.rerun is not None:
             from manipcli.logs.replay import open_playback
 

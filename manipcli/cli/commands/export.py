@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.log_files import is_log, one_file
 from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Seed
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.text import listed, number_of
@@ -59,8 +60,6 @@ def export(
     --ros2: URDF with a ros2_control block, SRDF, controllers.yaml and, for a task, each goal of the plan as YAML, with
     a script that sends them in order. The other options need a log, and can be combined.
     """
-    from manipcli.cli.log_files import is_log
-
     of_log = (("--foxglove", foxglove), ("--rerun", rerun), ("--rosbag2", rosbag2), ("--glb", glb), ("--files", files))
     of_task = (
         ("--ros2", ros2),
@@ -79,9 +78,9 @@ def export(
     if log:
         from manipcli.cli.log_exports import LogExports
 
-        return LogExports(foxglove=foxglove, rerun=rerun, rosbag2=rosbag2, glb=glb, files=files).write(
-            file, package_path=tuple(package_path or ()), allow_outside=allow_outside
-        )
+        exports = LogExports(foxglove=foxglove, rerun=rerun, rosbag2=rosbag2, glb=glb, files=files)
+        with one_file(file) as whole:
+            return exports.write(whole, package_path=tuple(package_path or ()), allow_outside=allow_outside)
     assert ros2 is not None
     return _for_ros2(
         file,

@@ -10,6 +10,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
+from manipcli.cli.log_files import opened
 from manipcli.cli.options import AllowOutside, Format, OpenPage, PackagePath, PagePort
 from manipcli.cli.serving import stay
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
@@ -22,7 +23,13 @@ if TYPE_CHECKING:
 
 def replay(
     log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="MCAP file, or the .partial file of a killed run.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="MCAP file, the .partial file of a killed run, or the folder of a rosbag2.",
+            show_default=False,
+            callback=opened,
+        ),
     ],
     *,
     html: Annotated[
