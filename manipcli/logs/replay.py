@@ -107,6 +107,7 @@ def _open_own(
         verdict=verdict,
         lost=recording.lost,
         notes=notes,
+        period=recording.period,
         sensed=partial(read_sensed, path, begin=0, end=float(states.time[-1])),
         keep=meshes.folder,
     )

@@ -84,6 +84,7 @@ class Playback:
         verdict: the verdict; None if the log cannot be judged.
         lost: why the end of the log is missing, or None.
         notes: what is missing or differs from the run, one sentence each.
+        period: of the control tick [s]; None for a log of another program.
         sensed: reads what the sensors measured, for a drawing with these frames.
         keep: owner of resources with the same lifetime: the folder of embedded meshes.
     """
@@ -105,6 +106,7 @@ class Playback:
     verdict: Verdict | None = None
     lost: str | None = None
     notes: tuple[str, ...] = ()
+    period: float | None = None
     sensed: Callable[[Collection[str]], Sensed] = field(repr=False, default=lambda frames: Sensed())
     keep: object = field(repr=False, default=None)
 

@@ -20,6 +20,7 @@ from manipcli.replay.pack import Json, Pack
 from manipcli.replay.playback import Playback
 from manipcli.replay.scene_json import scene_json
 from manipcli.replay.sensed_json import sensed_json
+from manipcli.replay.theme import colours, switch
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 """Content-Security-Policy of a whole page: it loads nothing."""
@@ -66,8 +67,8 @@ def player_page(playback: Playback, *, ghosts: Sequence[Ghost] = ()) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{name}</title><link rel="icon" href="data:,">\n'
-        f"<style>\n{_read('whole_page.css')}"
-        f"</style></head><body>\n<header><h1>{name}</h1>{''.join(lines)}</header>\n"
+        f"<style>\n{colours()}{_read('whole_page.css')}"
+        f"</style></head><body>\n{switch()}<header><h1>{name}</h1>{''.join(lines)}</header>\n"
         f"{player_html(playback, ghosts=ghosts, whole_page=True)}</body></html>\n"
     )
 

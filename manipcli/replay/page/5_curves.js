@@ -1,18 +1,31 @@
 // The curve plot.
 
-const COLOURS = ["#1769d2", "#d9480f", "#2b8a3e", "#9c36b5", "#c92a2a", "#0b7285", "#e67700", "#5f3dc4", "#495057",
-  "#a61e4d", "#087f5b", "#364fc7", "#846358"];
+// A colour of the page's variables, as the canvas takes it: their computed value, not their text.
+const colours = new Map();
+function colour(name) {
+  if (!colours.has(name)) {
+    const probe = root.appendChild(document.createElement("i"));
+    probe.style.color = `var(${name})`;
+    colours.set(name, getComputedStyle(probe).color);
+    probe.remove();
+  }
+  return colours.get(name);
+}
+document.documentElement.addEventListener("scheme", () => { colours.clear(); refresh(); });
+
+const SERIES = 13;
+const series = (c) => colour(`--series-${c % SERIES}`);
 const plot = { table: 0, column: -1, span: 0 };
 
 // The plotted curves: [name, colour, dashed, values of table, column].
 function curves() {
   const table = run.curves[plot.table];
   if (!table) return [];
-  if (plot.column < 0) return table.columns.map((name, c) => ({ name, colour: COLOURS[c % COLOURS.length], table, c }));
-  const name = table.columns[plot.column], found = [{ name, colour: COLOURS[0], table, c: plot.column }];
+  if (plot.column < 0) return table.columns.map((name, c) => ({ name, colour: series(c), table, c }));
+  const name = table.columns[plot.column], found = [{ name, colour: series(0), table, c: plot.column }];
   const reference = run.curves.find((table) => table.name === "joint reference");
   if (table.name === "joint position" && reference && reference.columns.includes(name))
-    found.push({ name: "reference", colour: COLOURS[1], dashed: true, table: reference, c: reference.columns.indexOf(name) });
+    found.push({ name: "reference", colour: series(1), dashed: true, table: reference, c: reference.columns.indexOf(name) });
   return found;
 }
 
@@ -57,8 +70,8 @@ function drawPlot() {
   const X = (t) => left + ((t - begin) / (end - begin || 1)) * (right - left);
   const Y = (v) => lower - ((v - low) / (top - low)) * (lower - upper);
   plot.at = (x) => begin + ((x - left) / (right - left)) * (end - begin);
-  pen.strokeStyle = "#e8ecf1";
-  pen.fillStyle = "#687686";
+  pen.strokeStyle = colour("--rule");
+  pen.fillStyle = colour("--faint");
   pen.lineWidth = 1;
   const dy = stride(top - low, Math.max(2, high / 45)), dx = stride(end - begin || 1, Math.max(2, wide / 70));
   const digits = Math.max(0, -Math.floor(Math.log10(dy) + 1e-9));
@@ -77,7 +90,7 @@ function drawPlot() {
   pen.beginPath(); pen.rect(left, 0, right - left, high); pen.clip();
   const active = stepAt(time);
   if (active) {
-    pen.fillStyle = "#1769d212";
+    pen.fillStyle = colour("--chosen");
     pen.fillRect(X(active.start), upper, X(active.end) - X(active.start), lower - upper);
   }
   for (const curve of shown) {
@@ -95,7 +108,7 @@ function drawPlot() {
     pen.stroke();
   }
   pen.setLineDash([]);
-  pen.strokeStyle = "#1769d2";
+  pen.strokeStyle = colour("--accent");
   pen.lineWidth = 1.5;
   pen.beginPath(); pen.moveTo(X(time), upper); pen.lineTo(X(time), lower); pen.stroke();
   pen.restore();

@@ -76,22 +76,7 @@ function build() {
   });
   scrub(part("plot"), (event) => plot.at(event.clientX - part("plot").getBoundingClientRect().left));
   part("play").addEventListener("click", () => play(!playing));
-  // A switch for each other run, in its colour.
-  ghosts.forEach((ghost, k) => {
-    const label = element(root.querySelector(".shows"), "label"), box = element(label, "input");
-    box.type = "checkbox";
-    box.dataset.part = `show-run-${k}`;
-    shows[`run-${k}`] = true;
-    const [r, g, b] = GHOSTS[k % GHOSTS.length].map((c) => Math.round(255 * c));
-    element(label, "b", "", ghost.name).style.color = `rgb(${r} ${g} ${b})`;
-  });
-  for (const name of Object.keys(shows)) {
-    const box = part("show-" + name);
-    if (!box) continue;
-    box.checked = shows[name];
-    box.disabled = name === "forces" && !run.pushes;
-    box.addEventListener("change", () => { shows[name] = box.checked; refresh(); });
-  }
+  buildLayers();
   const tables = part("table"), columns = part("column");
   run.curves.forEach((table, k) => { element(tables, "option", "", table.name).value = k; });
   const fill = () => {
@@ -133,7 +118,7 @@ async function begin() {
   wanted = run.reference ? array(run.reference) : null;
   bodies = array(run.body);
   ghosts = (run.ghosts || []).map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
-  if (run.pushes) [pushFirst, pushes] = [array(run.pushes.first), array(run.pushes.rows)];
+  if (run.pushes) [pushFirst, pushes, pushPair] = ["first", "rows", "pair"].map((name) => array(run.pushes[name]));
   for (const table of run.curves) table.values = array(table.values);
   look();
   try {
