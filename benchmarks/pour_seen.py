@@ -25,7 +25,8 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.robustness import ROOT, wilson
+from benchmarks.processes import ROOT
+from manipcli.sweep.statistics import Rate
 
 PATIENCE: Final = 3600.0
 """A sample that takes longer [s] hangs, also on a machine that is busy with other things."""
@@ -89,7 +90,7 @@ def main() -> int:
     good = True
     for kind, samples in found.items():
         passed = sum(sample.passed for sample in samples)
-        low, high = wilson(passed, len(samples))
+        low, high = Rate(passed, len(samples)).interval
         print(f"{kind}: {passed} of {len(samples)} passed (95 % interval {100 * low:.0f} to {100 * high:.0f} %)")
         errors = np.array([error for sample in samples for error in sample.position])
         if len(errors):

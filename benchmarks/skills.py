@@ -20,8 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.robustness import ROOT, wilson
+from benchmarks.processes import ROOT
 from manipcli.core.units import readable
+from manipcli.sweep.statistics import Rate
 
 TASKS: Final = {"drawer": 20, "door": 20, "peg": 20, "press": 20, "granular_pour": 20, "pour_into_mug": 40}
 """Samples of each task; all are expected to pass."""
@@ -58,7 +59,7 @@ class Result:
     @property
     def row(self) -> str:
         """Of the table."""
-        low, high = wilson(self.passed, self.samples)
+        low, high = Rate(self.passed, self.samples).interval
         share = f"{self.passed} of {self.samples} | {100 * low:.0f} to {100 * high:.0f} %"
         return (
             f"| {self.task} | {lines(self.task)} | {self.engine} | {share} | {self.tightest} | {self.seconds:.1f} s |"

@@ -23,7 +23,7 @@ from manipcli.live.loop import Outside, simulate_live
 from manipcli.live.session import LiveOptions, recorded_session, served, session_logs
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
-from manipcli.logs.part_of import task_part
+from manipcli.logs.part_of import part_until, task_part
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.model.robot import LinkInertial, RobotModel
@@ -79,6 +79,7 @@ __all__ = [
     "self_collisions",
     "simulation_of",
     "unplanned",
+    "up_to",
     "updated_schema",
     "verify_log",
     "words",
@@ -149,6 +150,15 @@ def ros2_files(
     period = SimulationSpec().control_period
     spec = None if controllers is None else checked_controllers(controllers, sight.robot, period)
     return robot_files(sight.robot, sight.q, self_collision_matrix(sight.robot), spec, period=period)
+
+
+def up_to(task: Task, step: str, *, option: str = "--until") -> Task:
+    """The task from its start to a step, as `run --until` runs it; `option`: names the step in errors.
+
+    Raises:
+        InvalidInput: an unknown step or block, or one inside a block not done in order.
+    """
+    return replace(task, part=part_until(task, step, option=option))
 
 
 def run_task(

@@ -126,7 +126,8 @@ class Outputs:
             warnings: of the files and the plan, before the run.
             meshes, package_path, allow_outside: known mesh files, and where others may be.
         """
-        from manipcli.logs.report import file_places, log_page, log_places
+        from manipcli.logs.causes import file_places, log_places
+        from manipcli.logs.report import log_page
         from manipcli.record.read.reading import open_recording
         from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
@@ -157,7 +158,8 @@ class Outputs:
 
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Diagnostic]) -> None:
         """Writes the requested files about a task with a step that cannot be planned."""
-        from manipcli.logs.report import refused_page, task_places
+        from manipcli.logs.causes import task_places
+        from manipcli.logs.report import refused_page
         from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
 

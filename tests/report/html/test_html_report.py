@@ -22,10 +22,11 @@ from manipcli.judge.measures.grasp_intervals import GraspFacts, Hold, Slip, Spre
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
+from manipcli.replay.cause import Cause, Written
 from manipcli.report.html.markup import Markup, element, joined
 from manipcli.report.html.page_parts import number, of_limit, signed
 from manipcli.report.html.render_page import render_page
-from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
+from manipcli.report.run_page import Picture, RunPage, Source
 
 ROOT = Path(__file__).parents[3]
 RunCli = Callable[..., Any]
