@@ -42,7 +42,8 @@ def run(
         bool,
         typer.Option(
             "--embed-meshes",
-            help="Store the mesh files in the log, for replay, export and --verify on a machine without the robot's packages; other viewers do not read them.",
+            help="Store the mesh files in the log, for replay and export on machines without the robot's packages. "
+            "Other viewers do not read them: see export --foxglove.",
         ),
     ] = False,
     engines: Engines = None,
