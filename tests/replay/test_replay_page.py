@@ -263,6 +263,7 @@ def test_the_page_of_its_own_takes_keys(browser: Page, playback: Playback, tmp_p
         _press(browser, key, code, number)
         assert browser.evaluate(f"{player}.time") == pytest.approx(then, abs=1e-6)
 
+    browser.evaluate("document.querySelector('.layer-panel').open = true")
     for name in ("loop", "show-path"):
         box = f"document.querySelector('[data-part={name}]')"
         before = browser.evaluate(f"{box}.focus(), {box}.checked")

@@ -95,30 +95,11 @@ function buildTrack() {
   });
 }
 
-function buildSwitches() {
-  // A switch for each other run, in its colour.
-  ghosts.forEach((ghost, k) => {
-    const label = element(root.querySelector(".shows"), "label"), box = element(label, "input");
-    box.type = "checkbox";
-    box.dataset.part = `show-run-${k}`;
-    shows[`run-${k}`] = true;
-    const [r, g, b] = GHOSTS[k % GHOSTS.length].map((c) => Math.round(255 * c));
-    element(label, "b", "", ghost.name).style.color = `rgb(${r} ${g} ${b})`;
-  });
-  for (const name of Object.keys(shows)) {
-    const box = part("show-" + name);
-    if (!box) continue;
-    box.checked = shows[name];
-    box.disabled = name === "forces" && !run.pushes;
-    box.addEventListener("change", () => { shows[name] = box.checked; refresh(); });
-  }
-}
-
 function build() {
   buildCauses();
   buildSteps();
   buildTrack();
-  buildSwitches();
+  buildLayers();
   buildPlot();
   buildKeys();
   part("play").addEventListener("click", () => play(!playing));

@@ -66,7 +66,7 @@ async function begin() {
   wanted = run.reference ? array(run.reference) : null;
   bodies = array(run.body);
   ghosts = (run.ghosts || []).map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
-  if (run.pushes) [pushFirst, pushes] = [array(run.pushes.first), array(run.pushes.rows)];
+  if (run.pushes) [pushFirst, pushes, pushPair] = ["first", "rows", "pair"].map((name) => array(run.pushes[name]));
   for (const table of run.curves) {
     table.values = array(table.values);
     if (table.relative) table.relative = array(table.relative);
