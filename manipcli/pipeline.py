@@ -34,6 +34,7 @@ from manipcli.preflight.editor_schema import updated_schema
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
+from manipcli.record.recording import END
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.logs.verification import Verification
 from manipcli.report.ros2.files import robot_files, task_files
@@ -42,7 +43,7 @@ from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
-from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
+from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, variant_log, verdict_metadata
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.task.bare_task import bare_task
 from manipcli.task.controller_rows import checked_controllers, controllers_of
@@ -390,7 +391,7 @@ def _record(
             end, simulating = timed(simulate, task, plan, manager, recorder, progress)
         else:
             end, simulating = timed(simulate_live, task, plan, manager, recorder, live, progress)
-        recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
+        recorder.metadata(END, {"status": end.status, "cause": end.cause})
         verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))
     return verdict, Timing(plan=end.replanning, simulate=simulating - end.replanning, judge=judging)
