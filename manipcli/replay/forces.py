@@ -28,9 +28,11 @@ STRONG = 95.0
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """Forces at a point (3,) [m] in the world on the movable body, or on the robot: `normal` (3,) and `friction` (3,)
-    [N]."""
+    """Forces at a point (3,) [m] in the world on `on`, a movable body or else the robot, from `other`: `normal` (3,)
+    and `friction` (3,) [N]."""
 
+    on: str
+    other: str
     point: Array
     normal: Array
     friction: Array
@@ -69,6 +71,14 @@ class Forces:
         found = ((one, tuple(self._pushes(one, time, k))) for one, time in contacts if one.force > LEAST)
         return tuple((contact, pushes) for contact, pushes in found if pushes)
 
+    def net(self, name: str, k: int) -> Array:
+        """Sum of the drawn forces on a body or `robot/<link>` at the k-th time, (3,) [N] in the world."""
+        total = np.zeros(3)
+        for push in self.at(k):
+            if name in (push.on, push.other):
+                total += (push.normal + push.friction) * (1.0 if name == push.on else -1.0)
+        return total
+
     def _pushes(self, contact: Contact, time: float, k: int) -> list[Push]:
         loaded = [point for point in contact.points if point.force > 0.0]
         if not loaded:
@@ -82,6 +92,8 @@ class Forces:
             turned = other_turned
         return [
             Push(
+                on,
+                other,
                 p_now + rotate(turned, np.subtract(point.position, p_then)),
                 sign * point.force * rotate(turned, point.normal),
                 sign * rotate(turned, point.friction),
