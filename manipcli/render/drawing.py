@@ -17,6 +17,7 @@ from manipcli.core.text import listed
 from manipcli.description.elements import Inertial, Link
 from manipcli.model.robot import RobotModel
 from manipcli.render.mesh_surfaces import mesh_surfaces
+from manipcli.render.mitred_walls import mitred_walls
 from manipcli.render.placing import Poses
 from manipcli.render.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.scene.scene import Body, Scene
@@ -104,8 +105,9 @@ def frame_names(robot: RobotModel | None, scene: Scene | None) -> tuple[str, ...
 def draw(robot: RobotModel | None, scene: Scene | None = None, *, deviation: float | None = None) -> Drawing:
     """The drawing of a robot, a scene, or both; spheres and cylinders within `deviation` [m] [default: for the eye].
 
-    Collision meshes are drawn as their convex hulls, as planner and physics use them. A link without drawable visual
-    shapes is drawn with its collision shapes, and a link without either with bones.
+    For the eye, the walls of a cup are drawn with mitred joints. Collision meshes are drawn as their convex hulls, as
+    planner and physics use them. A link without drawable visual shapes is drawn with its collision shapes, and a link
+    without either with bones.
     """
     missing: list[str] = []
     drawables: list[Drawable] = []
@@ -178,9 +180,15 @@ def _shapes(
     missing: list[str],
     deviation: float | None,
 ) -> Iterator[Drawable]:
-    for k, geometry in enumerate(geometries if layer == "collision" else drawn_once(geometries)):
+    shown = geometries if layer == "collision" else drawn_once(geometries)
+    walls = mitred_walls(shown) if layer == "visual" and deviation is None else {}
+    for k, geometry in enumerate(shown):
         try:
-            surfaces = shape_surfaces(geometry.shape, hull=layer == "collision", deviation=deviation)
+            surfaces = (
+                (walls[k],)
+                if k in walls
+                else shape_surfaces(geometry.shape, hull=layer == "collision", deviation=deviation)
+            )
         except UnusableMesh as error:
             missing.append(f"{layer} shape of '{frame}': {error}")
             continue

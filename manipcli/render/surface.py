@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,6 +73,15 @@ def _indices(faces: npt.ArrayLike) -> Faces:
 def surface(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = None) -> Surface:
     """A surface from array-likes; shared vertices stay shared."""
     return Surface(frozen(np.reshape(vertices, (-1, 3))), _indices(np.reshape(faces, (-1, 3))), rgba)
+
+
+def joined(surfaces: Sequence[Surface]) -> Surface:
+    """One surface of all triangles of several, which share no vertices; its colour is that of the first."""
+    if len(surfaces) == 1:
+        return surfaces[0]
+    first = np.cumsum([0, *(len(each.vertices) for each in surfaces[:-1])])
+    faces = np.concatenate([each.faces + k for each, k in zip(surfaces, first, strict=True)])
+    return surface(np.concatenate([each.vertices for each in surfaces]), faces, surfaces[0].rgba)
 
 
 def box_surface(box: Box) -> Surface:

@@ -28,9 +28,11 @@ STRONG = 95.0
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """Forces at a point (3,) [m] in the world on the movable body, or on the robot: `normal` (3,) and `friction` (3,)
-    [N]."""
+    """Forces at a point (3,) [m] in the world on `on`, a movable body or else the robot, from `other`: `normal` (3,)
+    and `friction` (3,) [N]."""
 
+    on: str
+    other: str
     point: Array
     normal: Array
     friction: Array
@@ -61,13 +63,21 @@ class Forces:
 
     def at(self, k: int) -> tuple[Push, ...]:
         """The contact forces at the k-th time."""
-        playback = self._playback
-        return tuple(
-            push
-            for contact, time in zip(playback.contacts[k], playback.contact_times[k], strict=True)
-            if contact.force > LEAST
-            for push in self._pushes(contact, time, k)
-        )
+        return tuple(push for _, pushes in self.by_contact(k) for push in pushes)
+
+    def by_contact(self, k: int) -> tuple[tuple[Contact, tuple[Push, ...]], ...]:
+        """The contacts at the k-th time that have contact points, with their forces."""
+        contacts = zip(self._playback.contacts[k], self._playback.contact_times[k], strict=True)
+        found = ((one, tuple(self._pushes(one, time, k))) for one, time in contacts if one.force > LEAST)
+        return tuple((contact, pushes) for contact, pushes in found if pushes)
+
+    def net(self, name: str, k: int) -> Array:
+        """Sum of the drawn forces on a body or `robot/<link>` at the k-th time, (3,) [N] in the world."""
+        total = np.zeros(3)
+        for push in self.at(k):
+            if name in (push.on, push.other):
+                total += (push.normal + push.friction) * (1.0 if name == push.on else -1.0)
+        return total
 
     def _pushes(self, contact: Contact, time: float, k: int) -> list[Push]:
         loaded = [point for point in contact.points if point.force > 0.0]
@@ -82,6 +92,8 @@ class Forces:
             turned = other_turned
         return [
             Push(
+                on,
+                other,
                 p_now + rotate(turned, np.subtract(point.position, p_then)),
                 sign * point.force * rotate(turned, point.normal),
                 sign * rotate(turned, point.friction),

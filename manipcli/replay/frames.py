@@ -8,10 +8,11 @@ import numpy.typing as npt
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, to_si
-from manipcli.render.drawing import FLOOR, draw
+from manipcli.render.drawing import draw
 from manipcli.render.placing import Placing, Poses
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
+from manipcli.replay.furniture import furniture
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.renderer import Image, Renderer
 
@@ -19,8 +20,6 @@ Numbers = npt.NDArray[np.int64]
 
 LOOKED_AT = 60
 """Number of states of a run that are in view."""
-LARGE = 0.6
-"""A fixed body with this share of the extent of robot and objects is a floor or table."""
 LEAST_SIZE, MOST_SIZE = 64, 4096
 """Limits of the width and height of a picture [pixel]."""
 FALLING = 0.5
@@ -55,9 +54,9 @@ class Frames(Renderer):
         self.colours = tuple(dict.fromkeys(drawable.rgba[:3] for drawable in drawing.layer("visual")))
         count = len(playback.times)
         some = np.unique(np.linspace(0, count - 1, min(count, LOOKED_AT)).round().astype(int))
-        self.camera: Camera = framing(
-            drawing, self._poses(some), aspect=size[0] / size[1], leave_out=self._furniture(some), towards=towards
-        )
+        poses = self._poses(some)
+        large = furniture(playback.scene, self._placing, poses)
+        self.camera: Camera = framing(drawing, poses, aspect=size[0] / size[1], leave_out=large, towards=towards)
         super().__init__(drawing, size=size, still=self._placing.still)
 
     def at(self, time: float) -> Image:
@@ -69,20 +68,6 @@ class Frames(Renderer):
     def _poses(self, k: int | Numbers) -> Poses:
         run = self.playback
         return self._placing.at(run.stance[k], run.body_position[k], run.body_quat_xyzw[k])
-
-    def _furniture(self, some: Numbers) -> frozenset[str]:
-        """Bodies that need not be in view completely: the floor, and large fixed bodies."""
-        scene = self.playback.scene
-        fixed = [body for body in scene.bodies if body.fixed] if scene is not None else []
-        poses = self._poses(some)
-        names = [body.name for body in scene.bodies] if scene is not None else []
-        links = poses.position.shape[-2] - len(names)
-        moving = [k for k in range(1, links + len(names)) if k < links or names[k - links] not in self._placing.still]
-        points = poses.position[:, moving].reshape(-1, 3)
-        extent = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else np.inf
-        return frozenset(
-            body.name for body in fixed if body.kind == FLOOR or float(np.linalg.norm(body.size)) > LARGE * extent
-        )
 
 
 def moment(playback: Playback, text: str) -> float:

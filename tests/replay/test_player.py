@@ -127,9 +127,9 @@ def test_the_page_needs_nothing_but_itself(playback: Playback) -> None:
 def test_no_name_leaves_its_place(playback: Playback) -> None:
     page = player_page(playback)
     elements = _Elements(page)
-    assert len(elements.scripts) == 3
-    assert all("alert(1)" not in text for text in elements.scripts[1:])
-    head = json.loads(elements.scripts[0])
+    assert len(elements.scripts) == 4
+    assert all("alert(1)" not in text for text in elements.scripts[2:])
+    head = json.loads(elements.scripts[1])
     assert head["name"] == HOSTILE
     assert [step["label"] for step in head["steps"]] == ["one", HOSTILE]
     assert head["steps"][1]["text"] == HOSTILE
@@ -142,7 +142,7 @@ def test_two_of_them_stand_in_one_page(playback: Playback) -> None:
 
 
 def test_triangles_and_joints_are_those_of_the_run(playback: Playback) -> None:
-    head, data, _ = _Elements(player_page(playback)).scripts
+    _, head, data, _ = _Elements(player_page(playback)).scripts
     told = json.loads(head)
     np.testing.assert_allclose(_array(told["position"], data).reshape(-1, 2), playback.position, atol=1e-7)
     np.testing.assert_allclose(_array(told["reference"], data).reshape(-1, 2)[:, 1], playback.position[:, 1], atol=1e-7)
@@ -168,14 +168,14 @@ def test_what_is_too_large_for_the_browser_is_as_large_as_its_numbers_get(playba
     effort[3, 1] = 1e300
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        head, data, _ = _Elements(player_page(replace(playback, effort=effort))).scripts
+        _, head, data, _ = _Elements(player_page(replace(playback, effort=effort))).scripts
     (table,) = [one for one in json.loads(head)["curves"] if one["name"] == "joint effort"]
     values = _array(table["values"], data).reshape(len(playback.times), -1)
     assert np.isfinite(values[3]).all() and values[3].max() > 1e38
 
 
 def test_the_page_has_the_force_and_the_friction_of_each_point(playback: Playback) -> None:
-    head, data, _ = _Elements(player_page(playback)).scripts
+    _, head, data, _ = _Elements(player_page(playback)).scripts
     pushes = json.loads(head)["pushes"]
     first, rows = _array(pushes["first"], data), _array(pushes["rows"], data).reshape(-1, 9)
     assert first.tolist() == list(range(0, 53, 2))
@@ -186,4 +186,4 @@ def test_the_page_has_the_force_and_the_friction_of_each_point(playback: Playbac
 
 def test_a_page_without_points_has_no_pushes(playback: Playback) -> None:
     bare = tuple(tuple(one._replace(points=()) for one in each) for each in playback.contacts)
-    assert json.loads(_Elements(player_page(replace(playback, contacts=bare))).scripts[0])["pushes"] is None
+    assert json.loads(_Elements(player_page(replace(playback, contacts=bare))).scripts[1])["pushes"] is None

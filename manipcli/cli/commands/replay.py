@@ -10,6 +10,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
+from manipcli.cli.log_files import opened
 from manipcli.cli.options import AllowOutside, Format, OpenPage, PackagePath, PagePort
 from manipcli.cli.serving import stay
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
@@ -22,7 +23,13 @@ if TYPE_CHECKING:
 
 def replay(
     log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="MCAP file, or the .partial file of a killed run.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="MCAP file, the .partial file of a killed run, or the folder of a rosbag2.",
+            show_default=False,
+            callback=opened,
+        ),
     ],
     *,
     html: Annotated[
@@ -67,6 +74,10 @@ def replay(
         str | None,
         typer.Option("--robot", metavar="NAMESPACE", help="Robot to show if the log has several."),
     ] = None,
+    rerun: Annotated[
+        bool,
+        typer.Option("--rerun", help="Open the viewer Rerun instead of the page (needs manipcli[rerun])."),
+    ] = False,
     port: PagePort = None,
     open_: OpenPage = False,
     verify: Annotated[
@@ -87,9 +98,18 @@ def replay(
     """
     files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
     drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
-    shows = (*files, *drawn, ("--robot", robot), ("--port", port), ("--open", open_ or None))
+    shows = (
+        *files,
+        *drawn,
+        ("--robot", robot),
+        ("--port", port),
+        ("--open", open_ or None),
+        ("--rerun", rerun or None),
+    )
     verifies = (("--allow-different", allow_different or None), ("--format json", format_ == "json" or None))
     _refuse(shows if verify else verifies, verify=verify)
+    if rerun:
+        _check_rerun((("--port", port), ("--open", open_ or None)))
     with Interrupts() as interrupts:
         if verify:
             from manipcli.cli.commands.verify import verify as verified
@@ -117,7 +137,7 @@ def replay(
             package_path=tuple(package_path or ()),
             allow_outside=allow_outside,
         )
-        _show(playback, pictures, html, port=port, open_=open_)
+        _show(playback, pictures, html, rerun=rerun, port=port, open_=open_)
     return ExitCode.PASSED
 
 
@@ -133,13 +153,31 @@ def _refuse(options: Sequence[tuple[str, object]], *, verify: bool) -> None:
         raise InvalidInput([Diagnostic("USE080", f"{listed(given)}: no effect {reason} --verify")])
 
 
-def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:
+def _check_rerun(page: Sequence[tuple[str, object]]) -> None:
+    """Checks that Rerun can be opened, before the log is read; `page`: options that concern the page only.
+
+    Raises:
+        InvalidInput: an option has no effect, the extra is not installed, or there is no screen.
+    """
+    from manipcli.replay.rerun.installed import check_installed
+    from manipcli.replay.rerun.viewer import check_display
+
+    given = [option for option, value in page if value is not None]
+    if given:
+        raise InvalidInput([Diagnostic("USE080", f"{listed(given)}: no effect with --rerun")])
+    check_installed("--rerun")
+    check_display()
+
+
+def _show(
+    playback: Playback, pictures: Pictures, html: Path | None, *, rerun: bool, port: int | None, open_: bool
+) -> None:
     """Prints what is missing and writes the requested files; without any, serves the page until Ctrl-C."""
     if playback.lost is not None:
         console.talk(f"the log is incomplete: {playback.lost}")
     for note in playback.notes:
         console.talk(f"note: {note}")
-    pages = html is not None or not pictures.wanted
+    pages = html is not None or not (pictures.wanted or rerun)
     if pages:
         from manipcli.replay.player import player_page
 
@@ -150,8 +188,27 @@ def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: in
         write_whole(html, page.encode())
         console.result(str(html))
     pictures.make(playback)
-    if html is None and pages:
+    if rerun:
+        _open_rerun(playback)
+    elif html is None and pages:
         from manipcli.replay.page_server import PageServer
 
         with PageServer(page, port=port) as server:
             stay(server.url, open_=open_)
+
+
+def _open_rerun(playback: Playback) -> None:
+    """Opens the viewer on a temporary recording, until its window is closed or Ctrl-C."""
+    from tempfile import TemporaryDirectory
+
+    from manipcli.replay.rerun.viewer import show
+    from manipcli.replay.rerun.write_recording import write_recording
+
+    with TemporaryDirectory(prefix="manipcli-") as folder:
+        recording = Path(folder) / "run.rrd"
+        console.not_drawn(write_recording(recording, playback))
+        try:
+            console.talk("Close the window of Rerun, or press Ctrl-C, to stop.")
+            show(recording)
+        except KeyboardInterrupt:
+            console.talk("")

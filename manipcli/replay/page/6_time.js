@@ -1,8 +1,7 @@
 // The shown time and playback.
 
-let stamps, measured, wanted, bodies, pushFirst, pushes, ghosts = [];
+let stamps, measured, wanted, bodies, pushFirst, pushes, pushPair, ghosts = [];
 let time = run.start, playing = false, before = 0, waiting = false;
-const shows = { ghost: false, path: true, forces: true, frames: false };
 
 function stepAt(t) {
   for (let k = run.steps.length - 1; k >= 0; k--)

@@ -8,6 +8,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from manipcli.core.text import escape
+from manipcli.replay.theme import colours, switch
 
 Attribute = str | float | bool | None
 _EMPTY = frozenset({"br", "img", "line", "link", "meta", "rect", "polygon"})
@@ -21,7 +22,7 @@ class Markup(str):
 
 
 def document(title: str, *body: str | None, style: Markup, policy: str) -> str:
-    """A whole HTML page that loads no other file; `policy` is its Content-Security-Policy."""
+    """A whole HTML page, light or dark, that loads no other file; `policy` is its Content-Security-Policy."""
     whole = element(
         "html",
         element(
@@ -31,9 +32,9 @@ def document(title: str, *body: str | None, style: Markup, policy: str) -> str:
             element("meta", name_="viewport", content="width=device-width, initial-scale=1"),
             element("title", title),
             element("link", rel="icon", href="data:,"),
-            element("style", style),
+            element("style", Markup(colours() + style)),
         ),
-        element("body", *body),
+        element("body", Markup(switch()), *body),
         lang="en",
     )
     return f"<!DOCTYPE html>\n{whole}\n"

@@ -7,9 +7,10 @@ import math
 from collections.abc import Iterable, Sequence
 
 from manipcli.core.units import readable
+from manipcli.replay.cause import Written
 from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
-from manipcli.report.run_page import Picture, Written
+from manipcli.report.run_page import Picture
 
 
 def heading(name: str, title: str, about: str = "") -> Markup:

@@ -31,6 +31,7 @@ from manipcli.simulate.engines.pybullet_contacts import (
 )
 from manipcli.simulate.engines.pybullet_joints import BASE, JointedThings, Place
 from manipcli.simulate.engines.pybullet_motors import Motors
+from manipcli.simulate.engines.pybullet_normals import Normals
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
 from manipcli.simulate.engines.pybullet_sleep import Sleep
@@ -144,14 +145,16 @@ class PybulletEngine:
             # Two calls: with a damping, Bullet drops all other values of a link.
             p.changeDynamics(self._robot, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
             p.changeDynamics(self._robot, link, lateralFriction=robot.friction, physicsClientId=client)
-        self._merge = ContactMerger(
-            {(place.body, place.link): name for name, place in self._places.items()}
-            | {(self._robot, link): f"robot/{name}" for link, name in link_names.items()},
-            still=[
-                *((place.body, place.link) for name, place in self._places.items() if scene.body(name).fixed),
-                *((self._robot, link) for link, name in link_names.items() if name in still_links(robot)),
-            ],
-        ).merged
+        places = {name: (place.body, place.link) for name, place in self._places.items()}
+        still = [
+            *(place for name, place in places.items() if scene.body(name).fixed),
+            *((self._robot, link) for link, name in link_names.items() if name in still_links(robot)),
+        ]
+        names = {place: name for name, place in places.items()}
+        names |= {(self._robot, link): f"robot/{name}" for link, name in link_names.items()}
+        self._merge = ContactMerger(names, still=still).merged
+        moving = {row: places[body.name] for row, body in enumerate(scene.movable)}
+        self._normals = Normals(p, client, moving, still)
         if settings.self_collision:
             collide_only(p, client, self._robot, link_names, settings.self_collision)
         unlike = list(differences(p, client, self._robot, robot, link_names))
@@ -235,6 +238,8 @@ class PybulletEngine:
             self._wrenches.measure(state.numbers[: 2 * len(self._joints)], self._contact_points, pulls)
         if self._sleep is not None and self._sleep.due and not self._attachments:
             self._sleep.look(state, self._contact_points())
+        if turned := self._normals.turned(state.body_quat_xyzw):
+            self._normals.look(turned, self._contact_points())
         return state
 
     def write(self, command: JointCommand) -> None:

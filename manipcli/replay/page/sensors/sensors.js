@@ -186,11 +186,7 @@ function furnishSenses() {
   const remarks = [...notes, ...rays.filter((finder) => finder.note).map((finder) => `${finder.name}: ${finder.note}`)];
   if (remarks.length && strip.parentNode) element(strip, "div", "note", remarks.join("\n"));
   if (rays.length) {
-    const label = element(root.querySelector(".shows"), "label"), box = element(label, "input");
-    box.type = "checkbox";
-    box.dataset.part = "show-rays";
-    label.append("rays");
-    label.title = remarks.join("\n") || "distances that range finders measured";
+    switches.push(["sensors", "rays", "rays", remarks.join("\n") || "distances that range finders measured", () => true]);
     shows.rays = true;
   }
   // For scripts and tests.
@@ -198,7 +194,7 @@ function furnishSenses() {
 }
 
 build = ((before) => () => { furnishSenses(); before(); })(build);
-label = ((before) => (all, now) => { if (shows.rays) drawRays(all, time); before(all, now); })(label);
+overlays.push((all) => { if (shows.rays) drawRays(all, time); });
 showStatus = ((before) => () => {
   before();
   for (const feed of feeds) Promise.resolve(feed(time)).catch(() => {});
