@@ -27,7 +27,7 @@ from manipcli.spec.condition import ExpectationSpec
 STORED, UNTIL = "verdict", "until"
 """Metadata of the log: the verdict at the end of the run, and the time [s] of its last judged tick."""
 RUN = "run"
-"""Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
+"""Metadata of the log: task, seed, engine, physics (`full` | `none`), period."""
 
 
 def judge(
@@ -58,7 +58,7 @@ def judge(
         traces: get the margins over time, in the order of `expect`.
     """
     run = recording.metadata.get(RUN, {})
-    status = run.get("status", "")
+    status = recording.end.get("status", "")
     errors = _errors(recording, status)
     part = RunPart.from_metadata(recording.metadata[PART]) if PART in recording.metadata else None
     steps = not_asked(step_outcomes(recording, interrupted=bool(errors)), part)
@@ -82,7 +82,7 @@ def judge(
             for outcome, spec in zip(outcomes, expect, strict=True)
         )
     errors = errors or _cut_short(recording, examined.end)
-    cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
+    cause = recording.end.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     found = Verdict(
         task=run.get("task", ""),
         verdict="error",

@@ -158,7 +158,6 @@ def _picture(frames: Frames, time: float) -> Picture:
 
 
 def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tuple[str, str], ...]:
-    run = recording.metadata.get("run", {})
     return (
         ("log", path.name),
         *recording.metadata.get("versions", {}).items(),
@@ -167,7 +166,7 @@ def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tup
         *recorded_inertials(recording.metadata),
         ("seed", str(verdict.seed)),
         ("control period", f"{1e3 * recording.period:g} ms"),
-        ("run", run.get("status", "") or "did not finish"),
+        ("run", recording.end.get("status", "") or "did not finish"),
     )
 
 
