@@ -40,10 +40,13 @@ def progress_text(progress: Progress) -> str:
     """`120 of 200: 118 passed, 2 failed, 3.1 per second, 26 s left`."""
     failed = progress.done - progress.passed
     text = f"{progress.done} of {progress.asked}: {progress.passed} passed, {failed} failed"
-    if progress.left is None:
-        return text
-    pace = f"{progress.rate:.1f} per second" if progress.rate >= 0.95 else f"{1.0 / progress.rate:.1f} s per sample"
-    return f"{text}, {pace}, {_time(progress.left)} left"
+    return text if progress.left is None else f"{text}, {pace_text(progress.rate, progress.left, of='sample')}"
+
+
+def pace_text(rate: float, left: float, *, of: str) -> str:
+    """`3.1 per second, 26 s left`; `rate` per second, time `left` [s], `of` what."""
+    pace = f"{rate:.1f} per second" if rate >= 0.95 else f"{1.0 / rate:.1f} s per {of}"
+    return f"{pace}, {_time(left)} left"
 
 
 def render_text(analysis: Analysis) -> str:
