@@ -16,6 +16,7 @@ from manipcli.replay.player import POLICY
 from manipcli.report.html.markup import Markup, document, element, joined, link
 from manipcli.report.html.page_parts import heading, mark, table
 from manipcli.sweep.analysis import Analysis, Influence, Spread
+from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.results import SampleResult
 from manipcli.sweep.text import NAMED, interval_text, percent
 
@@ -111,6 +112,11 @@ def _influences(analysis: Analysis) -> Markup | None:
     if not analysis.influences:
         return None
     headers: tuple[str, ...]
+    if analysis.sweep.sampling.design.word == "oat":
+        about = "How far each number can go from its value in the task, all others as written. Margins in tolerances."
+        found = [one.levels.cells for one in analysis.influences if one.levels is not None]
+        levels = table(HEADERS, found, numbers=HEADERS[1:])
+        return element("section", heading("influence", "What matters", about), levels)
     if analysis.influences[0].indices is not None:
         about = (
             "Share of the variance of the smallest margin (within ±1 tolerance) that a number explains alone, and with "

@@ -10,6 +10,7 @@ from manipcli.core.text import listed, number_of, shorten
 from manipcli.core.units import readable
 from manipcli.report.table import table
 from manipcli.sweep.analysis import Analysis, Influence
+from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.results import SampleResult
 from manipcli.sweep.statistics import SHARES, Rate
 from manipcli.sweep.sweep import Progress
@@ -83,7 +84,8 @@ def sample_text(result: SampleResult) -> str:
     tightest = min(known, key=lambda margin: margin.relative or 0.0, default=None)
     if tightest is None:
         return f"sample {result.number} passed"
-    return f"sample {result.number} passed: {tightest.name} by {readable(tightest.value or 0.0, tightest.unit)}"
+    amount = readable(tightest.value or 0.0, tightest.unit)
+    return f"sample {result.number} passed: {tightest.name} by {amount}, {tightest.relative:.2f} of its tolerance"
 
 
 def _margins(analysis: Analysis) -> str:
@@ -100,6 +102,9 @@ def _margins(analysis: Analysis) -> str:
 def _influences(analysis: Analysis) -> str:
     """What matters for the smallest margin."""
     headers: tuple[str, ...]
+    if analysis.sweep.sampling.design.word == "oat":
+        known = [one.levels.cells for one in analysis.influences if one.levels is not None]
+        return table(HEADERS, known, right=(HEADERS[1], *HEADERS[4:]))
     if analysis.influences[0].indices is not None:
         headers = ("number", "first-order index", "95 % interval", "total index", "95 % interval ")
         rows = [(one.column.name, *_index_cells(one)) for one in analysis.influences]
@@ -174,6 +179,7 @@ def _number_object(influence: Influence) -> Mapping[str, object]:
         "correlation_with_passing": influence.passing.rho if influence.passing is not None else None,
         "bound": found.bound if found is not None else None,
         "first_order": None if indices is None else {"value": indices.first.value, "interval": indices.first.interval},
+        "one_at_a_time": None if influence.levels is None else influence.levels.to_json(),
         "total": None if indices is None else {"value": indices.whole.value, "interval": indices.whole.interval},
     }
 
