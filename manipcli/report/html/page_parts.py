@@ -64,7 +64,10 @@ def table(
     Columns named in `numbers` are right-aligned.
     """
     right = [header in numbers for header in headers]
-    head = [element("th", name, class_="n" if is_n else None) for name, is_n in zip(headers, right, strict=True)]
+    head = [
+        element("th" if name.strip() else "td", name, class_="n" if is_n else None)
+        for name, is_n in zip(headers, right, strict=True)
+    ]
     body = [
         element(
             "tr",
