@@ -23,7 +23,7 @@ from manipcli.live.loop import Outside, simulate_live
 from manipcli.live.session import LiveOptions, recorded_session, served, session_logs
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.measure_run import measured_run
-from manipcli.logs.part_of import task_part
+from manipcli.logs.part_of import part_until, task_part
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.model.robot import LinkInertial, RobotModel
@@ -34,6 +34,7 @@ from manipcli.preflight.editor_schema import updated_schema
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.read.reading import open_recording
+from manipcli.record.recording import END
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.logs.verification import Verification
 from manipcli.report.ros2.files import robot_files, task_files
@@ -42,7 +43,7 @@ from manipcli.run.execute import build_manager, simulate
 from manipcli.run.libraries import load_libraries
 from manipcli.run.observer import SILENT, Progress
 from manipcli.run.prepared import Prepared
-from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, run_metadata, variant_log, verdict_metadata
+from manipcli.run.run_log import RUNS, default_log, mesh_files, open_log, variant_log, verdict_metadata
 from manipcli.spec.simulation import SimulationSpec
 from manipcli.task.bare_task import bare_task
 from manipcli.task.controller_rows import checked_controllers, controllers_of
@@ -78,6 +79,7 @@ __all__ = [
     "self_collisions",
     "simulation_of",
     "unplanned",
+    "up_to",
     "updated_schema",
     "verify_log",
     "words",
@@ -148,6 +150,15 @@ def ros2_files(
     period = SimulationSpec().control_period
     spec = None if controllers is None else checked_controllers(controllers, sight.robot, period)
     return robot_files(sight.robot, sight.q, self_collision_matrix(sight.robot), spec, period=period)
+
+
+def up_to(task: Task, step: str, *, option: str = "--until") -> Task:
+    """The task from its start to a step, as `run --until` runs it; `option`: names the step in errors.
+
+    Raises:
+        InvalidInput: an unknown step or block, or one inside a block not done in order.
+    """
+    return replace(task, part=part_until(task, step, option=option))
 
 
 def run_task(
@@ -380,7 +391,7 @@ def _record(
             end, simulating = timed(simulate, task, plan, manager, recorder, progress)
         else:
             end, simulating = timed(simulate_live, task, plan, manager, recorder, live, progress)
-        recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
+        recorder.metadata(END, {"status": end.status, "cause": end.cause})
         verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, activity=progress.activity)
         recorder.finish(verdict_metadata(verdict))
     return verdict, Timing(plan=end.replanning, simulate=simulating - end.replanning, judge=judging)

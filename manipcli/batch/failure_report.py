@@ -15,11 +15,12 @@ from manipcli.logs.invalid_input import invalid_page, invalid_verdict
 from manipcli.logs.replay import open_playback
 from manipcli.logs.report import log_page, refused_page
 from manipcli.pipeline import load_task
+from manipcli.replay.cause import Cause, Written
 from manipcli.replay.frames import Frames
 from manipcli.replay.renderer import png_bytes
 from manipcli.report.html.render_page import render_page
 from manipcli.report.nesting import block_line
-from manipcli.report.run_page import Cause, RunPage, Written
+from manipcli.report.run_page import RunPage
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite.suite import Trouble
 from manipcli.report.text import describe_expectation, describe_step

@@ -13,8 +13,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 from manipcli.core.text import escape
 
@@ -70,8 +69,8 @@ def result_is_terminal() -> bool:
     return _is_terminal(sys.stdout)
 
 
-def result_bytes(path: Path) -> None:
-    """Writes a file to stdout unchanged.
+def result_bytes(file: BinaryIO) -> None:
+    """Writes the rest of a file to stdout unchanged.
 
     Raises:
         OSError: not all of it could be written, also where the reader closed the pipe.
@@ -79,7 +78,7 @@ def result_bytes(path: Path) -> None:
     stream = sys.stdout
     if stream is None or stream.closed:
         return
-    with path.open("rb") as file, _through(stream, whole=True):
+    with _through(stream, whole=True):
         shutil.copyfileobj(file, stream.buffer)
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from manipcli.cli.log_files import opened
 from manipcli.core.errors import Diagnostic, InvalidInput
 
 OutputFormat = Literal["text", "json"]
@@ -19,7 +20,10 @@ XacroArguments = Annotated[
     list[str] | None,
     typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of the xacro file.", show_default=False),
 ]
-LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="MCAP file.", show_default=False)]
+LogFile = Annotated[
+    Path,
+    typer.Argument(metavar="LOG", help="MCAP file, or the folder of a rosbag2.", show_default=False, callback=opened),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(

@@ -27,14 +27,14 @@ JunitFile = Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", h
 
 
 def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None] = ()) -> None:
-    """Checks the output files of a command before anything is run.
+    """Checks the output files of a command before anything is run, and creates their folders.
 
     Args:
         outputs: the option and its path; None: the option is not given.
         reads: files that the same command reads, or writes under other rules.
 
     Raises:
-        InvalidInput: a path is used twice, is a folder or `-`, or its folder is missing or not writable.
+        InvalidInput: a path is used twice, is a folder or `-`, or its folder cannot be created or is not writable.
     """
     taken = [os.path.realpath(path) for path in reads if path is not None]
     for option, path in outputs:
@@ -45,9 +45,13 @@ def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None
             raise InvalidInput([Diagnostic("USE083", message)])
         if os.path.realpath(path) in taken:
             raise InvalidInput([Diagnostic("USE081", f"{option} '{path}': the command already uses this file")])
-        if path.is_dir() or not path.parent.is_dir():
-            what = "is a folder" if path.is_dir() else f"folder '{path.parent}' does not exist"
-            raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': {what}")])
+        if path.is_dir():
+            raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': is a folder")])
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            message = f"{option} '{path}': cannot create folder '{path.parent}': {error.strerror}"
+            raise InvalidInput([Diagnostic("USE082", message)]) from error
         whole = path if path.exists() and not path.is_file() else Path(os.path.realpath(path)).parent
         if not os.access(whole, os.W_OK):
             raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': '{whole}' is not writable")])
@@ -122,7 +126,8 @@ class Outputs:
             warnings: of the files and the plan, before the run.
             meshes, package_path, allow_outside: known mesh files, and where others may be.
         """
-        from manipcli.logs.report import file_places, log_page, log_places
+        from manipcli.logs.causes import file_places, log_places
+        from manipcli.logs.report import log_page
         from manipcli.record.read.reading import open_recording
         from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
@@ -153,7 +158,8 @@ class Outputs:
 
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Diagnostic]) -> None:
         """Writes the requested files about a task with a step that cannot be planned."""
-        from manipcli.logs.report import refused_page, task_places
+        from manipcli.logs.causes import task_places
+        from manipcli.logs.report import refused_page
         from manipcli.report.html.render_page import render_page
         from manipcli.report.junit import render_junit
 

@@ -16,6 +16,7 @@ from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
 from manipcli.judge.located import Correction, Corrections
+from manipcli.judge.margin_curves import MarginTraces
 from manipcli.judge.self_contacts import SelfContact, SelfContacts
 from manipcli.judge.state_windows import Order, WindowsOfSpans, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
@@ -47,8 +48,10 @@ def examine(
     steps: tuple[StepOutcome, ...],
     sensors: Mapping[str, Sensed],
     until: float = inf,
+    traces: MarginTraces | None = None,
 ) -> Examined:
-    """The outcomes of `expect` before the time `until` [s]; `sensors`: of the task.
+    """The outcomes of `expect` before the time `until` [s]; `sensors`: of the task; `traces`: get
+    their margins.
 
     Every span is read, even without expectations, so damage anywhere in the file is detected. Only the last half second
     is kept in memory.
@@ -85,7 +88,10 @@ def examine(
             )
             if believed is not None:
                 world = replace(world, belief=replace(world, start=believed.map(lambda a: a[0])))
-            asked = [Expected(expectation, world, steps, seam) for expectation in expect]
+            asked = [
+                Expected(expectation, world, steps, seam, None if traces is None else traces.next())
+                for expectation in expect
+            ]
         window = successive.next(span)
         if window.times[0] >= until - ROUNDING:
             continue

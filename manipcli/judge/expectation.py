@@ -15,11 +15,12 @@ import numpy as np
 from manipcli.conditions.condition import CheckContext, Problem, World
 from manipcli.conditions.formula import Seams, absent, believing, leaves, opened, problems, scopes
 from manipcli.conditions.members.step_done import StepDoneSpec
-from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Robustness, never
+from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Pick, Robustness, never
 from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean, listed
 from manipcli.core.units import readable
+from manipcli.judge.margin_curves import MarginTrace
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec, WatchSpec
 
@@ -86,11 +87,20 @@ def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | Not
 
 
 class Expected:
-    """Evaluates one expectation, window by window."""
+    """Evaluates one expectation, window by window; `trace`: gets its margins."""
 
-    def __init__(self, spec: ExpectationSpec, world: World, steps: Sequence[StepOutcome], seam: Seams) -> None:
+    def __init__(
+        self,
+        spec: ExpectationSpec,
+        world: World,
+        steps: Sequence[StepOutcome],
+        seam: Seams,
+        trace: MarginTrace | None = None,
+    ) -> None:
         self._spec = spec
-        self._extreme = Extreme("greatest" if spec.quantifier == "eventually" else "least")
+        self._pick: Pick = "greatest" if spec.quantifier == "eventually" else "least"
+        self._extreme = Extreme(self._pick)
+        self._trace = trace
         self._recent: deque[tuple[StateWindow, Robustness]] = deque()
         self._ticks, self._first, self._last = 0, 0.0, 0.0
         self._never: NotEvaluated | None = None
@@ -124,20 +134,28 @@ class Expected:
         answer = self._answer(shown)
         if self._when.last:
             self._recent.append((shown, answer))
+            self._traced(shown, answer)
             if len(self._recent) > 1:
                 self._recent.popleft()
             return
         for start, end in intervals:
             a, b = np.searchsorted(shown.times, (start, end))
             self._extreme.add(answer, shown.times, int(a), int(b))
+            self._traced(shown, answer, int(a), int(b))
 
     def _answer(self, window: StateWindow) -> Robustness:
         answer = self._monitor(window)
         return never(answer) if self._spec.quantifier == "never" else answer
 
+    def _traced(self, window: StateWindow, answer: Robustness, first: int = 0, last: int | None = None) -> None:
+        if self._trace is not None:
+            self._trace.add(answer, window.times, self._pick, first, last)
+
     def _keep(self, window: StateWindow) -> None:
         """Keep the windows of the last `END_WINDOW` seconds."""
-        self._recent.append((window, self._answer(window)))
+        answer = self._answer(window)
+        self._recent.append((window, answer))
+        self._traced(window, answer)
         start = float(window.times[-1]) - END_WINDOW - ROUNDING
         while len(self._recent) > 1 and self._recent[1][0].times[0] <= start:
             self._recent.popleft()
@@ -149,6 +167,8 @@ class Expected:
         for window, answer in self._recent:
             start = float(window.times[-1]) if self._when.last else end - END_WINDOW
             self._extreme.add(answer, window.times, int(np.searchsorted(window.times, start - ROUNDING)))
+            if self._trace is not None:
+                self._trace.since = start - ROUNDING
         self._recent.clear()
         found = self._extreme.found
         if found is None:

@@ -13,6 +13,7 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.evaluate import examine
+from manipcli.judge.margin_curves import MarginTraces
 from manipcli.judge.outside import not_asked, of_part, unless_outside
 from manipcli.judge.part import PART, RunPart
 from manipcli.judge.saturations import Saturations
@@ -26,7 +27,7 @@ from manipcli.spec.condition import ExpectationSpec
 STORED, UNTIL = "verdict", "until"
 """Metadata of the log: the verdict at the end of the run, and the time [s] of its last judged tick."""
 RUN = "run"
-"""Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
+"""Metadata of the log: task, seed, engine, physics (`full` | `none`), period."""
 
 
 def judge(
@@ -37,6 +38,7 @@ def judge(
     scene: Scene,
     implied: Sequence[ExpectationSpec] = (),
     sensors: Mapping[str, Sensed] = NO_SENSORS,
+    traces: MarginTraces | None = None,
 ) -> Verdict:
     """Judge a recording against the expectations of its task.
 
@@ -53,9 +55,10 @@ def judge(
         implied: expectations that the task does not write; they fail the run, but are not part of its expectations.
             One that cannot be evaluated is dropped.
         sensors: of the task, whose readings the recording has.
+        traces: get the margins over time, in the order of `expect`.
     """
     run = recording.metadata.get(RUN, {})
-    status = run.get("status", "")
+    status = recording.end.get("status", "")
     errors = _errors(recording, status)
     part = RunPart.from_metadata(recording.metadata[PART]) if PART in recording.metadata else None
     steps = not_asked(step_outcomes(recording, interrupted=bool(errors)), part)
@@ -69,6 +72,7 @@ def judge(
         sensors=sensors,
         steps=tuple(step for step in steps if not step.excused or step.started is None),  # without those of clients
         until=next((event.time for event in recording.events if event.kind == STEPS_ENDED), inf),
+        traces=traces,
     )
     outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes[: len(expect)])
     unwritten = tuple(each for each in examined.outcomes[len(expect) :] if each.outcome != "not_evaluated")
@@ -78,7 +82,7 @@ def judge(
             for outcome, spec in zip(outcomes, expect, strict=True)
         )
     errors = errors or _cut_short(recording, examined.end)
-    cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
+    cause = recording.end.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     found = Verdict(
         task=run.get("task", ""),
         verdict="error",

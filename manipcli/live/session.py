@@ -140,6 +140,6 @@ def recorded_session(recording: Recording, log: Path) -> Outside:
     Raises:
         InvalidInput: a command in the log is damaged.
     """
-    failed = recording.metadata.get("run", {}).get("status") == RunStatus.FAILED
+    failed = recording.end.get("status") == RunStatus.FAILED
     source = recorded_commands(log, recording.period, failed=failed)
     return Outside(source, Feed(recording.period), Pace(recording.period, speed=None))

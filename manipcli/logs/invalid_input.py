@@ -8,7 +8,8 @@ from pathlib import Path
 from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.version import __version__
 from manipcli.judge.verdict import Verdict
-from manipcli.report.run_page import Cause, RunPage, Source, Written
+from manipcli.replay.cause import Cause, Written
+from manipcli.report.run_page import RunPage, Source
 
 LARGEST = 1_000_000
 """Largest file that the page shows [byte]."""

@@ -11,6 +11,7 @@ from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.sensed import NO_SENSORS, Sensed
 from manipcli.judge.implied import implied
 from manipcli.judge.judge import RUN, judge
+from manipcli.judge.margin_curves import MarginTraces
 from manipcli.judge.verdict import Verdict
 from manipcli.logs.recorded_files import (
     recorded_controllers_file,
@@ -57,8 +58,14 @@ class _Watched:
             yield span
 
 
-def judge_recording(recording: Recording, path: Path, *, activity: Callable[[str], None] = lambda _: None) -> Verdict:
-    """The verdict on an open log; see `judge_log`."""
+def judge_recording(
+    recording: Recording,
+    path: Path,
+    *,
+    activity: Callable[[str], None] = lambda _: None,
+    traces: MarginTraces | None = None,
+) -> Verdict:
+    """The verdict on an open log; see `judge_log`. `traces`: get the margins of the expectations over time."""
     task = recorded_task_file(recording, path).spec
     robot = recorded_robot(recording, path)
     physics = recording.metadata.get(RUN, {}).get("physics", "") == "full"
@@ -68,7 +75,9 @@ def judge_recording(recording: Recording, path: Path, *, activity: Callable[[str
     sensors = _sensors(recording, path, task, robot, scene) if asked else NO_SENSORS
     recording = with_readings(recording, {name: sensors[name] for name in sorted(asked & {*sensors})})
     watched = replace(recording, spans=_Watched(recording.spans, activity))
-    return judge(watched, expect=task.judged, robot=robot, scene=scene, implied=unwritten, sensors=sensors)
+    return judge(
+        watched, expect=task.judged, robot=robot, scene=scene, implied=unwritten, sensors=sensors, traces=traces
+    )
 
 
 def _sensors(recording: Recording, path: Path, task: TaskSpec, robot: RobotModel, scene: Scene) -> Mapping[str, Sensed]:

@@ -35,7 +35,7 @@ def log_info(path: Path) -> LogInfo:
         except BadRecording as error:
             missing += [] if found.faults else [error.cause]
         else:
-            status = recording.metadata.get("run", {}).get("status", "")
+            status = recording.end.get("status", "")
             lacks = left_out(recording) if status == RunStatus.COMPLETE and recording.lost is None else ""
             interrupted = bool(lacks) or status not in ENDED
             steps = step_outcomes(recording, interrupted=interrupted)

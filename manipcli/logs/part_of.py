@@ -32,6 +32,16 @@ ROUNDING = 1e-9
 """[s] Recorded times are whole nanoseconds."""
 
 
+def part_until(task: Task, last: str, *, option: str = "--until") -> Part:
+    """The part of a task up to a step, from its start; `option`: names it in errors.
+
+    Raises:
+        InvalidInput: an unknown step or block, or one inside a block not done in order.
+    """
+    end = _index(task, last, option) + 1
+    return Part(last=end, until=str(task.spec.steps[end - 1].id))
+
+
 def task_part(task: Task, *, first: str | None, last: str | None, log: Path) -> Part:
     """The part of a task from step `first` to step `last`, both included.
 

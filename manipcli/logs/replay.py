@@ -11,8 +11,10 @@ import numpy as np
 
 from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import frozen
+from manipcli.judge.margin_curves import MarginTraces
 from manipcli.judge.measures.reference import references
 from manipcli.judge.verdict import StepOutcome, Verdict
+from manipcli.logs.causes import causes_of, log_places
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.other_log import open_other
@@ -65,7 +67,8 @@ def _open_own(
     if samples is None:
         raise InvalidInput([Diagnostic("REPLAY001", f"{path.name}: no recorded state to show")])
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
-    verdict = judge_recording(recording, path)
+    traces = MarginTraces(1.0 / rate)
+    verdict = judge_recording(recording, path, traces=traces)
     meshes = MeshSearch(
         path,
         hashes=recording.metadata.get("meshes", {}),
@@ -105,6 +108,9 @@ def _open_own(
         contact_times=tuple(contacts.times),
         steps=playback_steps(verdict, recording.events, end=float(states.time[-1])),
         verdict=verdict,
+        causes=causes_of(verdict, log_places(recording, path, verdict.steps), end=float(states.time[-1])),
+        margins=traces.curves(verdict.expectations),
+        events=recording.events,
         lost=recording.lost,
         notes=notes,
         period=recording.period,

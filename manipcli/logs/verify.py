@@ -14,10 +14,10 @@ from manipcli.judge.steps import RunStatus
 from manipcli.record.foreign.compare import compare_logs, compared_with_itself
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
-from manipcli.record.recording import Recording
+from manipcli.record.recording import END, Recording
 from manipcli.report.logs.verification import Verification
 
-UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, LIMITS, "repair")
+UNFINISHED = ("run", END, "verdict", JOINTS, ACTUATORS, LIMITS, "repair")
 """Metadata that a run writes at its end; it is missing or different in an unfinished log."""
 
 
@@ -41,7 +41,7 @@ def compared(
         began: start of the verification, by `perf_counter` [s].
     """
     second = open_recording(rerun)
-    interrupted = recording.metadata.get("run", {}).get("status") == RunStatus.INTERRUPTED
+    interrupted = recording.end.get("status") == RunStatus.INTERRUPTED
     cut = recording.lost or ("the run was interrupted" if interrupted else "")
     same = filecmp.cmp(log, rerun, shallow=False)
     messages = compared_with_itself(log) if same else compare_logs(log, rerun, exact=True, open_end=bool(cut))

@@ -85,7 +85,7 @@ def motion_margins(planner: Planner, motion: Motion, begins: PlanningState) -> M
     used = (*stated, *limits_used(planner.robot, trajectory, torque))
     margins = nearest_limits(used, trajectory.times)
     slowed = any(float(each.share.max()) >= BINDS for each in stated)
-    return MotionMargins(_binding(used, margins, slowed), margins, _manipulability(planner, trajectory, begins))
+    return MotionMargins(_binding(used, margins, slowed), margins, manipulability(planner, trajectory, begins))
 
 
 class Used(NamedTuple):
@@ -149,9 +149,13 @@ def _binding(used: tuple[Used, ...], margins: tuple[Margin, ...], slowed: bool) 
     return Binding(best.joint, best.quantity, float(counts.max()) / shares.shape[1])
 
 
-def _manipulability(planner: Planner, trajectory: JointTrajectory, begins: PlanningState) -> Manipulability | None:
+def manipulability(
+    planner: Planner, trajectory: JointTrajectory, begins: PlanningState, *, only_end: bool = False
+) -> Manipulability | None:
+    """The least along a motion that begins in this state, or at its end; None for a robot without a tool."""
     steps = max(1, round(trajectory.duration / EVERY))
-    chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, steps + 1).astype(int))
+    last = len(trajectory.times) - 1
+    chosen = np.unique(np.linspace(last if only_end else 0, last, steps + 1).astype(int))
     q = with_joints(planner.robot, begins.position, trajectory.names, trajectory.positions[chosen])
     try:
         values = [planner.solver.least_singular_value(row) for row in with_mimics(planner.robot, q)]

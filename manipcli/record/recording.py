@@ -90,6 +90,9 @@ class BeliefSnapshot:
 EMBEDDED = "embedded_meshes"
 """Name of the metadata record of embedded meshes: URI -> name of the attachment."""
 
+END = "end"
+"""Name of the metadata record of the end of a run: status, and the cause of a failure."""
+
 
 @dataclass(frozen=True, slots=True)
 class Recording:
@@ -129,6 +132,11 @@ class Recording:
     believed_names: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
     beliefs: tuple[BeliefSnapshot, ...] = ()
+
+    @property
+    def end(self) -> dict[str, str]:
+        """How the run ended: `status` and `cause`; empty if it did not. Older logs have both in `run`."""
+        return self.metadata.get(END) or self.metadata.get("run", {})
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The embedded mesh files by the URI in URDF and scene, with the material files of OBJ meshes; empty unless the

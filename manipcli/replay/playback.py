@@ -9,12 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from manipcli.core.geometry import Array, wrapped
+from manipcli.judge.margin_curves import MarginCurve
 from manipcli.judge.verdict import Verdict
 from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
+from manipcli.record.recording import TaskEvent
 from manipcli.render.placing import Placing, Poses
+from manipcli.replay.cause import Cause
 from manipcli.replay.sensed import Sensed
 from manipcli.scene.scene import Scene
 
@@ -82,8 +85,12 @@ class Playback:
         contact_times: for each time when these contacts were recorded [s], not after it.
         steps: steps in the order of their start.
         verdict: the verdict; None if the log cannot be judged.
+        causes: why the run did not pass, the first cause first.
+        margins: margins of the expectations over time, of those that have any.
+        events: events of the task.
         lost: why the end of the log is missing, or None.
         notes: what is missing or differs from the run, one sentence each.
+        begin: log time of t = 0 [ns].
         period: of the control tick [s]; None for a log of another program.
         sensed: reads what the sensors measured, for a drawing with these frames.
         keep: owner of resources with the same lifetime: the folder of embedded meshes.
@@ -104,8 +111,12 @@ class Playback:
     contact_times: tuple[tuple[float, ...], ...]
     steps: tuple[PlaybackStep, ...] = ()
     verdict: Verdict | None = None
+    causes: tuple[Cause, ...] = ()
+    margins: tuple[MarginCurve, ...] = ()
+    events: tuple[TaskEvent, ...] = ()
     lost: str | None = None
     notes: tuple[str, ...] = ()
+    begin: int = 0
     period: float | None = None
     sensed: Callable[[Collection[str]], Sensed] = field(repr=False, default=lambda frames: Sensed())
     keep: object = field(repr=False, default=None)

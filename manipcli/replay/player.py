@@ -15,6 +15,8 @@ from importlib.resources import files
 import numpy as np
 
 from manipcli.render.drawing import draw
+from manipcli.replay.cause import Cause
+from manipcli.replay.curves_json import curves_json
 from manipcli.replay.ghost import Ghost
 from manipcli.replay.pack import Json, Pack
 from manipcli.replay.playback import Playback
@@ -58,7 +60,9 @@ def player_page(playback: Playback, *, ghosts: Sequence[Ghost] = ()) -> str:
     if verdict is not None:
         good = verdict.verdict == "passed"
         word = f"{'✓' if good else '✗'} {verdict.verdict}"
-        lines.append(f'<p><b class="{"good" if good else "bad"}">{word}</b> {html.escape(verdict.text)}</p>')
+        # The causes stand beside the scene.
+        text = "" if playback.causes else f" {html.escape(verdict.text)}"
+        lines.append(f'<p><b class="{"good" if good else "bad"}">{word}</b>{text}</p>')
     if playback.lost is not None:
         lines.append(f'<p class="bad">The log is incomplete: {html.escape(playback.lost)}</p>')
     lines += [f'<p class="note">{html.escape(note)}</p>' for note in playback.notes]
@@ -68,8 +72,8 @@ def player_page(playback: Playback, *, ghosts: Sequence[Ghost] = ()) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{name}</title><link rel="icon" href="data:,">\n'
         f"<style>\n{colours()}{_read('whole_page.css')}"
-        f"</style></head><body>\n{switch()}<header><h1>{name}</h1>{''.join(lines)}</header>\n"
-        f"{player_html(playback, ghosts=ghosts, whole_page=True)}</body></html>\n"
+        f"</style></head><body>\n<header>{switch()}<h1>{name}</h1>{''.join(lines)}</header>\n"
+        f"<main>{player_html(playback, ghosts=ghosts, whole_page=True)}</main></body></html>\n"
     )
 
 
@@ -94,7 +98,8 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str, bo
         "start": playback.start,
         "end": playback.end,
         "steps": [asdict(step) for step in playback.steps],
-        "skipped": _skipped(playback),
+        "unbegun": _unbegun(playback),
+        "causes": [_cause(cause) for cause in playback.causes],
         "joints": playback.joint_names,
         "bodies": playback.body_position.shape[1],
         "times": pack.add(playback.times, "f"),
@@ -102,10 +107,7 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str, bo
         "reference": pack.add(playback.reference_position(), "f") if playback.has_reference else None,
         "body": pack.add(np.concatenate([playback.body_position, playback.body_quat_xyzw], axis=2), "f"),
         **scene_json(playback, drawing, pack),
-        "curves": [
-            {"name": table.name, "columns": table.columns, "units": table.units, "values": pack.add(table.values, "f")}
-            for table in playback.curves()
-        ],
+        **curves_json(playback, pack),
     }
     if ghosts:
         head["ghosts"] = [
@@ -121,13 +123,21 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str, bo
     return safe, pack.text(), bool(sensed)
 
 
-def _skipped(playback: Playback) -> list[Json]:
-    """The skipped steps, each with the number of steps that are listed before it."""
+def _cause(cause: Cause) -> Json:
+    where = cause.written
+    place = "" if where is None else where.place or (f"{where.file}:{where.line}" if where.line else "")
+    shown = {key: getattr(cause, key) for key in ("title", "text", "hint", "at", "step", "expectation")}
+    return {**shown, "place": place}
+
+
+def _unbegun(playback: Playback) -> list[Json]:
+    """The steps that were skipped or not begun, each with the number of steps that are listed before it."""
     index = {step.id: k for k, step in enumerate(playback.steps, 1)}
     found: list[Json] = []
     after = 0
     for step in playback.verdict.steps if playback.verdict is not None else ():
         after = index.get(step.id, after)
-        if step.outcome == "skipped":
-            found.append({"id": step.id, "label": step.label, "text": step.text, "after": after})
+        if step.outcome in ("skipped", "not_run"):
+            word = "skipped" if step.outcome == "skipped" else "not begun"
+            found.append({"id": step.id, "label": step.label, "word": word, "text": step.text, "after": after})
     return found

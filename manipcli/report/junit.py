@@ -12,9 +12,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from manipcli.core.text import escape
 from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
+from manipcli.replay.cause import Written
 from manipcli.report.display_quantity import quantity
 from manipcli.report.nesting import block_line
-from manipcli.report.run_page import Written
 from manipcli.report.text import how_wrong
 
 _NO_XML = re.compile("[\ufffe\uffff]")

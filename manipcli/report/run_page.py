@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from manipcli.core.errors import Diagnostic
 from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.replay.cause import Cause, Written
 from manipcli.replay.playback import Playback
 
 
@@ -20,38 +21,12 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
-    """Where a step or an expectation is written.
-
-    Attributes:
-        place: file and line of the user, such as `pour.yaml:13`; "" if unknown.
-        file: name of the `Source` that contains it.
-        line: its line in that source, from 1; 0 if no source contains it.
-    """
-
-    place: str
-    file: str = ""
-    line: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class Picture:
     """A picture of the run: `data` is a WebP file, `time` is in s from the start of the run."""
 
     time: float
     data: bytes
     size: tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class Cause:
-    """Why a run did not pass. `at` [s] is the time of the worst value; None if it has no time."""
-
-    title: str
-    text: str
-    at: float | None = None
-    written: Written | None = None
-    hint: str = ""
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,7 @@ def open_log(
                 *((file.attachment, BYTES, file.path.read_bytes()) for file in embedded),
             ],
             metadata={
-                "run": run_metadata(task),
+                "run": _run(task),
                 **({"engine": chosen} if (chosen := _chosen(task, plan)) else {}),
                 **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
                 **({PART: part.to_metadata()} if (part := task.part.described) is not None else {}),
@@ -162,8 +162,8 @@ def open_log(
             recorder.close_partial()
 
 
-def run_metadata(task: Task, **end: str) -> dict[str, str]:
-    """Metadata of the run; written at the start, and once more at the end with `end`, which replaces it in readers."""
+def _run(task: Task) -> dict[str, str]:
+    """Metadata of the run."""
     simulation = task.spec.simulation
     engine = ENGINES[simulation.engine]
     return {
@@ -173,7 +173,6 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
         "physics": engine.physics,
         "period": repr(simulation.control_period),
         **({"holding": task.true.robot.holding.kind} if task.true.robot.holding is not None else {}),
-        **end,
     }
 
 

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, get_args
 
 from manipcli.conditions.robustness import EDGE
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
@@ -108,7 +108,7 @@ class SampleResult:
         number, margins, outcome = read["sample"], read["margins"], read["outcome"]
         if not isinstance(number, int) or not isinstance(margins, list):
             raise TypeError("not a result")
-        word = next(word for word in _WORDS if word == outcome)
+        word = next(word for word in WORDS if word == outcome)
         simulated = read["simulated"]
         return SampleResult(
             number,
@@ -120,7 +120,7 @@ class SampleResult:
         )
 
 
-_WORDS: Final[tuple[CaseWord, ...]] = ("passed", "failed", "differs", "error", "invalid", "crashed", "hung")
+WORDS: Final[tuple[CaseWord, ...]] = get_args(CaseWord)
 
 
 def result_of(report: CaseReport) -> SampleResult:

@@ -348,8 +348,9 @@ def test_plan_that_cannot_write_its_csv_says_so(
 ) -> None:
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     pipeline.plan_task = lambda _, **__: SimpleNamespace(motions=(), clearances=tuple, stretches=())
-    assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
-    assert "' does not exist" in capsys.readouterr().err
+    (tmp_path / "taken").touch()
+    assert main(["plan", "t.yaml", "--csv", str(tmp_path / "taken" / "plan.csv")]) == 4
+    assert "cannot create folder" in capsys.readouterr().err
 
 
 def test_a_reader_that_goes_away_is_no_error() -> None:

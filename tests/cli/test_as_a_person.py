@@ -207,6 +207,19 @@ def test_a_signal_while_the_program_starts_is_2_as_well(long_task: Path) -> None
             assert "Traceback" not in err
 
 
+def test_a_signal_while_the_commands_are_imported_is_2_without_a_traceback(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\n"
+        "class Finder:\n    @staticmethod\n    def find_spec(name, *_):\n"
+        "        if name == 'typer': raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Finder)\n"
+    )
+    paths = os.pathsep.join([str(tmp_path), str(ROOT)])
+    environment = {**os.environ, "PYTHONPATH": paths}
+    ran = subprocess.run([*MANIPCLI, "list"], env=environment, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (2, "error[USE002]: interrupted\n")
+
+
 def test_a_signal_while_a_text_is_executed_is_2_as_well(nod: Path, tmp_path: Path) -> None:
     """As by the definition of a dataclass: CPython remembers it, whoever catches it, until the next text."""
     (tmp_path / "sitecustomize.py").write_text(

@@ -202,6 +202,21 @@ def test_the_log_to_stdout_is_the_log_and_the_report_goes_to_stderr(
 
 
 @pytest.mark.slow
+def test_a_run_ends_when_the_reader_of_its_log_goes_away(task: Path, tmp_path: Path) -> None:
+    """To wait for an hour takes minutes."""
+    long = tmp_path / "long.yaml"
+    long.write_text(task.read_text().replace("wait: 0.2 s", "wait: 1 h"))
+    words = [sys.executable, "-m", "manipcli", "run", str(long), "--log", "-", "--quiet"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        assert run.stdout is not None and run.stderr is not None
+        assert len(run.stdout.read(1000)) == 1000
+        run.stdout.close()
+        told = run.stderr.read().decode()
+        assert run.wait(60) == 3
+    assert "error[LOG201]" in told and "not run" not in told
+
+
+@pytest.mark.slow
 def test_a_log_whose_reader_goes_away_is_lost(task: Path) -> None:
     words = [sys.executable, "-m", "manipcli", "run", str(task), "--log", "-", "--quiet"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
@@ -213,6 +228,18 @@ def test_a_log_whose_reader_goes_away_is_lost(task: Path) -> None:
     assert told.rstrip().endswith(
         "error[LOG201]: standard output: the log is incomplete: its reader closed the pipe before the end"
     )
+
+
+def test_a_summary_with_a_wrong_checksum_is_told_and_not_used(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = bytearray(log.read_bytes())
+    data[-12] ^= 0xFF  # the checksum stands before the last eight bytes
+    changed = tmp_path / "changed.mcap"
+    changed.write_bytes(data)
+    for words in (["judge", str(changed)], ["replay", str(changed), "--html", str(tmp_path / "page.html")]):
+        assert main(words) == 0
+        assert "the summary does not fit its checksum" in capsys.readouterr().err
 
 
 def test_a_log_with_its_meshes_holds_every_file(task: Path, tmp_path: Path, log: Path) -> None:

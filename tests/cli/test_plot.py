@@ -133,7 +133,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in this time range"),
         (["--from", "500"], "PLOT004", "no value in this time range"),
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
-        (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': folder 'absent' does not exist"),
+        (["-o", "/dev/null/a.svg"], "USE082", "--output '/dev/null/a.svg': cannot create folder '/dev/null'"),
         (["gone.mcap"], "LOG300", "No such file"),
         (["joint_states.position"] * 31, "PLOT005", "more than 400 curves"),
     ],

@@ -23,9 +23,10 @@ from manipcli.live.pace import Pace
 from manipcli.live.session import LiveOptions
 from manipcli.live.source import Schedule
 from manipcli.logs.judge_log import judge_log
+from manipcli.record.recording import END
 from manipcli.run.execute import build_manager
 from manipcli.run.observer import SILENT, Progress
-from manipcli.run.run_log import open_log, run_metadata, verdict_metadata
+from manipcli.run.run_log import open_log, verdict_metadata
 from manipcli.task.part import LIVE, Part
 
 ROOT = Path(__file__).parents[2]
@@ -56,7 +57,7 @@ def simulated(path: Path, commands: Mapping[int, Sequence[Command]], log: Path, 
     outside = Outside(Schedule(commands), Feed(period), Pace(period, speed=None))
     with open_log(task, plan, manager, log, overwrite=True, embed_meshes=True) as recorder:
         end = simulate_live(task, plan, manager, recorder, outside)
-        recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
+        recorder.metadata(END, {"status": end.status, "cause": end.cause})
         recorder.finish(verdict_metadata(judge_log(recorder.partial_path, being_written=True)))
 
 

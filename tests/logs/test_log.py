@@ -120,8 +120,14 @@ def test_the_last_record_of_a_name_says_all_that_the_log_says_under_it(log: Path
     assert by_name == {name: dict(values) for name, values in read_recording(log).metadata.items()}
     assert by_name["run"] == {
         "task": "still", "seed": "0", "engine": "kinematic", "physics": "none", "period": "0.001",
-        "status": "complete", "cause": "",
     }  # fmt: skip
+    assert by_name["end"] == {"status": "complete", "cause": ""}
+
+
+def test_a_name_of_metadata_is_written_once(log: Path) -> None:
+    with log.open("rb") as file:
+        names = [one.name for one in make_reader(file).iter_metadata()]
+    assert len(names) == len(set(names))
 
 
 def test_a_log_says_the_hashes_of_the_files_that_it_carries(log: Path) -> None:

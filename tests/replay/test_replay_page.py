@@ -21,6 +21,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
 from manipcli.render.drawing import draw
+from manipcli.replay.cause import Cause, Written
 from manipcli.replay.ghost import ghost_of
 from manipcli.replay.page_server import PageServer
 from manipcli.replay.pixels import from_image
@@ -29,6 +30,7 @@ from manipcli.replay.player import player_html, player_page
 from manipcli.replay.sensed import CameraFeed, PictureStream, RayFeed, Sensed, TaxelFeed, counted
 
 ROOT = Path(__file__).parents[2]
+PLOT = "document.querySelector('[data-part=plot]')"
 CLICK = """(text => {
   const found = [...document.querySelectorAll("label, button")].find(e => e.textContent.includes(text));
   if (found) found.click();
@@ -353,6 +355,84 @@ def test_the_page_of_its_own_takes_keys(browser: Page, playback: Playback, tmp_p
     assert ends == pytest.approx([playback.start, playback.end], abs=0.005)
     browser.wait_for(f"{track}.getAttribute('aria-valuetext').startsWith('0.10 s')")
     assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_the_page_opens_at_the_failure_with_its_cause(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """The failed step is marked, what did not begin is listed, and the margin of a missed expectation is chosen."""
+    assert playback.verdict is not None
+    (curve, *_) = playback.margins
+    failed, missed = playback.steps[1], curve.outcome.name
+    steps = (playback.steps[0], replace(failed, outcome="failed"))
+    rest = tuple(replace(step, outcome="not_run", started=None, ended=None) for step in playback.verdict.steps[2:])
+    causes = (
+        Cause("step failed", "it slipped", failed.end, Written("task.yaml:7"), "hold it", step=failed.id),
+        Cause("expectation fails", "too far", 1.5, expectation=missed),
+    )
+    verdict = replace(playback.verdict, verdict="failed", steps=(*playback.verdict.steps[:2], *rest))
+    path = tmp_path / "failed.html"
+    path.write_text(player_page(replace(playback, steps=steps, verdict=verdict, causes=causes)), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player')?.player")
+    player = "document.querySelector('.mc-player').player"
+    assert browser.evaluate(f"{player}.time") == pytest.approx(failed.end, abs=1e-3)
+    browser.wait_for(f"document.querySelector('.steps .now')?.textContent.includes({json.dumps(failed.label)})")
+    panel = str(browser.evaluate("document.querySelector('.causes').innerText"))
+    assert all(text in panel for text in ("step failed", "it slipped", "hint: hold it", "task.yaml:7", "1 more"))
+    seen = "(e => { const b = e.getBoundingClientRect(); return b.top >= 0 && b.bottom <= innerHeight; })"
+    assert browser.evaluate(f"{seen}(document.querySelector('.causes'))"), "without scrolling"
+    unbegun = str(browser.evaluate("[...document.querySelectorAll('.steps .unbegun')].map(e => e.innerText).join()"))
+    assert unbegun.count("not begun") == len(rest) > 0
+    # The second failure is an expectation; its margin is shown.
+    _press(browser, "f", "KeyF", 70)
+    assert browser.evaluate(f"{player}.time") == pytest.approx(1.5, abs=1e-3)
+    chosen = "[...document.querySelectorAll('.choose select')].map(e => e.selectedOptions[0].text).join()"
+    assert str(browser.evaluate(chosen)).startswith(f"margins,{missed}")
+    # The address decides before the failure does.
+    browser.open(f"{path.as_uri()}?t=0.4")
+    browser.wait_for("!!document.querySelector('.mc-player')?.player")
+    assert browser.evaluate(f"{player}.time") == pytest.approx(0.4)
+    browser.evaluate("location.hash = 't=0.9'")
+    browser.wait_for(f"Math.abs({player}.time - 0.9) < 1e-6")
+    assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_the_curves_answer_the_pointer(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """Oracle: the recorded positions at the time under the pointer."""
+    path = tmp_path / "run.html"
+    path.write_text(player_page(playback), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player')?.player")
+    place = json.loads(str(browser.evaluate(f"JSON.stringify({PLOT}.getBoundingClientRect())")))
+    x, y = place["x"] + 0.6 * place["width"], place["y"] + 0.5 * place["height"]
+    browser.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    browser.wait_for("!document.querySelector('[data-part=values]').hidden")
+    told = str(browser.evaluate("document.querySelector('[data-part=values]').innerText")).split("\n")
+    time_of = float(told[0].split(" s")[0])
+    assert 0.4 * playback.end < time_of < 0.8 * playback.end
+    shown = " ".join(told)
+    for k, name in enumerate(playback.joint_names):
+        value = np.interp(time_of, playback.times, playback.position[:, k])
+        (text,) = re.findall(rf"{name} (\S+) (?:rad|m)\b", shown)
+        assert float(text) == pytest.approx(value, abs=2e-3), name
+    # The legend switches a series off, and its value goes.
+    first = "document.querySelector('.legend button')"
+    browser.evaluate(f"{first}.click()")
+    browser.wait_for(f"{first}.getAttribute('aria-pressed') === 'false'")
+    browser.wait_for(
+        f"!document.querySelector('[data-part=values]').innerText.includes({json.dumps(playback.joint_names[0])})"
+    )
+    assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_margins_are_those_of_the_verdict(playback: Playback) -> None:
+    """Oracle: the margin of the verdict is between the least where it counts, and the least with one interval more."""
+    assert playback.margins
+    for curve in playback.margins:
+        least, more = (curve.margins[curve.times >= since].min() for since in (curve.since, curve.since - 1.0 / RATE))
+        assert more <= curve.outcome.margin <= least
 
 
 @pytest.mark.slow

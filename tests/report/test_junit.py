@@ -9,8 +9,8 @@ import pytest
 
 from manipcli.core.errors import Diagnostic
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.replay.cause import Written
 from manipcli.report.junit import render_junit
-from manipcli.report.run_page import Written
 
 HOSTILE = "<b>&\"'\x00\x1b[31m\ud800\uffff ]]> é 杯"
 PASSED = Verdict(

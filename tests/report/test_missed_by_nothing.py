@@ -11,11 +11,11 @@ import pytest
 from manipcli.conditions.robustness import EDGE, Measured, Robustness, never, opposite, robustness
 from manipcli.judge.expectation import outcome
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.replay.cause import Written
 from manipcli.report.html.page_parts import signed
 from manipcli.report.json import render_verdict
 from manipcli.report.junit import render_junit
 from manipcli.report.logs.log_diff import _met
-from manipcli.report.run_page import Written
 from manipcli.report.text import _margin
 from manipcli.run.run_log import verdict_metadata
 

@@ -15,10 +15,10 @@ from manipcli.judge.verdict import BlockOutcome, Verdict
 from manipcli.logs.report import log_page
 from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import TaskEvent
+from manipcli.replay.cause import Written
 from manipcli.report import json as json_report
 from manipcli.report.html.render_page import render_page
 from manipcli.report.junit import render_junit
-from manipcli.report.run_page import Written
 from manipcli.report.text import render_verdict
 from manipcli.run.step_loop import ASKED
 

@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.log_files import opened
 from manipcli.cli.options import Format
 from manipcli.core.errors import ExitCode
 
 
 def diff(
-    a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.", show_default=False)],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.", show_default=False)],
+    a: Annotated[Path, typer.Argument(metavar="A", help="Log of a run.", show_default=False, callback=opened)],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Log of another run.", show_default=False, callback=opened)],
     *,
     tolerance: Annotated[
         float,

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.log_files import is_log, one_file
 from manipcli.cli.options import AllowOutside, Overrides, PackagePath, Seed
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.text import listed, number_of
@@ -36,6 +37,12 @@ def export(
         Path | None,
         typer.Option("--rerun", metavar="FILE.rrd", help="Log: recording for Rerun (needs manipcli[rerun])."),
     ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate", metavar="HZ", help="With --rerun: samples per second; 'inf' takes every tick [default: 50]."
+        ),
+    ] = None,
     rosbag2: Annotated[
         Path | None, typer.Option("--rosbag2", metavar="DIR", help="Log: folder that `ros2 bag` reads.")
     ] = None,
@@ -59,8 +66,6 @@ def export(
     --ros2: URDF with a ros2_control block, SRDF, controllers.yaml and, for a task, each goal of the plan as YAML, with
     a script that sends them in order. The other options need a log, and can be combined.
     """
-    from manipcli.cli.log_files import is_log
-
     of_log = (("--foxglove", foxglove), ("--rerun", rerun), ("--rosbag2", rosbag2), ("--glb", glb), ("--files", files))
     of_task = (
         ("--ros2", ros2),
@@ -69,7 +74,7 @@ def export(
         ("--set", overrides or None),
     )
     log = is_log(file)
-    _check_fit(file, of_task if log else of_log, log=log)
+    _check_fit(file, of_task if log else (*of_log, ("--rate", rate)), log=log)
     if all(path is None for _, path in (*of_log, ("--ros2", ros2))):
         expected = [option for option, _ in of_log] if log else ["--ros2"]
         raise InvalidInput([Diagnostic("USE096", f"nothing to write: expected {' or '.join(expected)}")])
@@ -79,9 +84,9 @@ def export(
     if log:
         from manipcli.cli.log_exports import LogExports
 
-        return LogExports(foxglove=foxglove, rerun=rerun, rosbag2=rosbag2, glb=glb, files=files).write(
-            file, package_path=tuple(package_path or ()), allow_outside=allow_outside
-        )
+        exports = LogExports(foxglove=foxglove, rerun=rerun, rosbag2=rosbag2, glb=glb, files=files, rate=rate)
+        with one_file(file) as whole:
+            return exports.write(whole, package_path=tuple(package_path or ()), allow_outside=allow_outside)
     assert ros2 is not None
     return _for_ros2(
         file,

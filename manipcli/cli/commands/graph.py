@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.log_files import is_log, one_file
 from manipcli.cli.options import AllowOutside, PackagePath
 from manipcli.core.errors import ExitCode
 
@@ -27,11 +28,11 @@ def graph(
     Task, planner, controllers, joint limits, drives, engine, sensors, topics; for a log with the number of messages.
     """
     from manipcli.logs.graph import log_graph, task_graph
-    from manipcli.record.records import begins_as_log
     from manipcli.report.logs.graph import render
 
-    if file.suffix in (".mcap", ".partial") or begins_as_log(file):
-        made = log_graph(file)
+    if is_log(file):
+        with one_file(file) as log:
+            made = log_graph(log)
     else:
         made = task_graph(file, package_path=tuple(package_path or ()), allow_outside=allow_outside)
     console.result(render(made, format_))

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Format, PackagePath
+from manipcli.cli.options import AllowOutside, Format, LogFile, PackagePath
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
 from manipcli.core.errors import ExitCode, InvalidInput
 
 
 def judge(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP file of a run.", show_default=False)],
+    log: LogFile,
     *,
     report: ReportFile = None,
     junit: JunitFile = None,

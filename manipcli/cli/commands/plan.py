@@ -51,6 +51,9 @@ def plan(
         Path | None,
         typer.Option("--to", metavar="FOLDER", help="With --export: folder of the files [default: TASK_trajectories]."),
     ] = None,
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="STEP", help="Plan up to this step or block only.")
+    ] = None,
     why: Annotated[
         bool,
         typer.Option("--why", help="Search longer before the task is refused, and show every refused candidate."),
@@ -89,6 +92,8 @@ def plan(
         package_path=tuple(package_path or ()),
         allow_outside=allow_outside,
     )
+    if until is not None:
+        loaded = pipeline.up_to(loaded, until)
     try:
         with PlanningProgress() as progress:
             planned = pipeline.plan_task(loaded, on_progress=progress.activity, deeper=why)

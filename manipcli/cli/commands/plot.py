@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.log_files import is_log, one_file
 from manipcli.cli.options import Format, OutputFormat
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
@@ -19,6 +20,7 @@ LOG_ENDINGS = (".mcap", ".partial")
 
 
 def plot(
+    context: typer.Context,
     words: Annotated[
         list[str],
         typer.Argument(
@@ -46,7 +48,7 @@ def plot(
 
     -o writes a figure, --csv a table, --fields lists the fields of a log. Works with any ROS 2 log.
     """
-    logs = [Path(word) for word in words if _is_log(word)]
+    logs = [context.with_resource(one_file(Path(word))) for word in words if _is_log(word)]
     asked = [word for word in words if not _is_log(word)]
     if not logs:
         hint = "run `manipcli plot LOG.mcap [TOPIC.FIELD]...`"
@@ -86,8 +88,8 @@ def plot(
 
 
 def _is_log(word: str) -> bool:
-    """Whether a word names a file; no topic or field ends in `.mcap`."""
-    return word.endswith(LOG_ENDINGS) or Path(word).is_file()
+    """Whether a word names a file or a bag; no topic or field ends in `.mcap`."""
+    return word.endswith(LOG_ENDINGS) or Path(word).is_file() or is_log(Path(word))
 
 
 def _write_table(chart: Chart, csv: str) -> None:

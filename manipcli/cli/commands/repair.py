@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import Format, LogFile
+from manipcli.cli.options import Format
 from manipcli.core.errors import ExitCode
 
 
 def repair(
-    log: LogFile,
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP file.", show_default=False)],
     *,
     output: Annotated[
         Path | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -196,7 +197,7 @@ class _Copy:
             self._open.append(f"{strangers} messages of channels without a declaration")
         if not known:
             return
-        content = _content(chunk.data, known, whole=not strangers)
+        content = chunk_content(chunk.data, known, whole=not strangers)
         self._settle(content.start_ns)
         self.container.chunk(content)
         self._start = content.start_ns if self._start is None else min(self._start, content.start_ns)
@@ -238,7 +239,7 @@ class _Copy:
         )
 
 
-def _content(data: bytes, places: dict[int, Places], *, whole: bool) -> ChunkContent:
+def chunk_content(data: bytes, places: Mapping[int, Places], *, whole: bool) -> ChunkContent:
     """The messages at `places`; with `whole` these are all messages, and the data is used unchanged."""
     if not whole:
         spans = sorted(

@@ -29,6 +29,7 @@ class Topic:
         type: `sensor_msgs/msg/JointState`, as in the log; "" if unknown.
         definition: text of the schema; "" unless it is `ros2msg` with CDR messages.
         encoding: message encoding, `cdr`; for other than ROS 2 messages with the schema encoding, `json/jsonschema`.
+        qos: profiles of its publishers, as rosbag2 writes them; "" if unknown.
         count: number of messages.
         first, last: log times [ns]; 0 without messages.
     """
@@ -37,6 +38,7 @@ class Topic:
     type: str = ""
     definition: str = ""
     encoding: str = ""
+    qos: str = ""
     count: int = 0
     first: int = 0
     last: int = 0
@@ -205,6 +207,7 @@ def _declare(log: Topics, channel: Channel, schema: Schema | None) -> None:
         text = schema.data.decode("utf-8", "replace")
     name = schema.name if schema is not None else ""
     words = encoding if written in ("", "ros2msg") else f"{encoding}/{written}"
-    known = log.all.setdefault(channel.topic, Topic(channel.topic, name, text, words))
+    qos = channel.metadata.get("offered_qos_profiles", "")
+    known = log.all.setdefault(channel.topic, Topic(channel.topic, name, text, words, qos))
     if known.definition != text:
         log.damage.append(f"{channel.topic} has two types, {known.type} and {name}")

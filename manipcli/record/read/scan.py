@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
+from manipcli.core.activity import announce
 from manipcli.record.cdr import CdrError
 from manipcli.record.faults import REPAIRABLE, BadRecording
 from manipcli.record.read.resync import Index, next_chunk, read_index
@@ -190,7 +191,8 @@ class Scan:
         footer = len(rest) - len(MAGIC) - FOOTER_RECORD.size
         summary_start, crc = FOOTER_RECORD.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
         if summary_start not in (0, start) or crc not in (0, zlib.crc32(rest[: footer + FOOTER_RECORD.size - 4])):
-            raise BadRecording(self.path, "checksum mismatch of the summary: the file was changed", hint=REPAIRABLE)
+            # Nothing is read from the summary, and all that is read has checksums of its own.
+            announce(f"{self.path.name}: the summary does not fit its checksum; it is not used")
 
     def _following(self, file: BinaryIO, offset: int, record: Record | None) -> int | None:
         """Offset at which to continue after damage at `offset`; None if there is none."""

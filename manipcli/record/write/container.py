@@ -273,10 +273,9 @@ def _claim(path: Path, partial: Path, *, overwrite: bool) -> int:
         raise RecordingRefused(path, "the path is not a regular file", hint="choose another name; - is stdout")
     if os.path.lexists(path) and not overwrite:
         raise RecordingRefused(path, "the file exists", hint="choose another name, or pass --force to replace it")
-    if not path.parent.is_dir():
-        raise RecordingRefused(path, f"directory {path.parent} does not exist", hint="create it first")
     flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | (0 if overwrite else os.O_EXCL)
     try:
+        partial.parent.mkdir(parents=True, exist_ok=True)
         fd = os.open(partial, flags, 0o666)
     except FileExistsError:
         raise RecordingRefused(
@@ -285,7 +284,8 @@ def _claim(path: Path, partial: Path, *, overwrite: bool) -> int:
             hint="rename it, delete it, or pass --force to replace it",
         ) from None
     except OSError as error:
-        raise RecordingRefused(path, error.strerror or str(error)) from error
+        where = "" if path.parent.is_dir() else f"folder {path.parent}: "
+        raise RecordingRefused(path, f"{where}{error.strerror or error}") from error
     try:
         lock(fd)
         os.ftruncate(fd, 0)

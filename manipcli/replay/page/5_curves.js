@@ -1,4 +1,4 @@
-// The curve plot.
+// What the plot shows: one table of curves, some of its series, their limits.
 
 // A colour of the page's variables, as the canvas takes it: their computed value, not their text.
 const colours = new Map();
@@ -14,25 +14,51 @@ function colour(name) {
 document.documentElement.addEventListener("scheme", () => { colours.clear(); refresh(); });
 
 const SERIES = 13;
-const series = (c) => colour(`--series-${c % SERIES}`);
-const plot = { table: 0, column: -1, span: 0 };
+// `hidden`: series that the legend switched off; `pointer`: of the mouse over the plot [CSS pixel].
+const plot = { table: 0, column: -1, span: 0, hidden: new Set(), pointer: null };
 
-// The plotted curves: [name, colour, dashed, values of table, column].
+// The curves of the chosen table, and for one joint its reference.
 function curves() {
   const table = run.curves[plot.table];
   if (!table) return [];
-  if (plot.column < 0) return table.columns.map((name, c) => ({ name, colour: series(c), table, c }));
-  const name = table.columns[plot.column], found = [{ name, colour: series(0), table, c: plot.column }];
-  const reference = run.curves.find((table) => table.name === "joint reference");
-  if (table.name === "joint position" && reference && reference.columns.includes(name))
-    found.push({ name: "reference", colour: series(1), dashed: true, table: reference, c: reference.columns.indexOf(name) });
+  const curve = (table, c, more = {}) => ({ name: table.columns[c], key: `${table.name}/${table.columns[c]}`, series: c % SERIES,
+    table, c, values: table.values, unit: table.units[c], limit: table.limits[c], tightest: table.tightest && table.tightest[c],
+    since: table.since && table.since[c], ...more });
+  let found = plot.column < 0 ? table.columns.map((_, c) => curve(table, c)) : [curve(table, plot.column, { series: 0 })];
+  if (plot.column >= 0 && table.name === "joint position") {
+    const reference = run.curves.find((other) => other.name === "joint reference");
+    const c = reference ? reference.columns.indexOf(table.columns[plot.column]) : -1;
+    if (c >= 0) found.push(curve(reference, c, { name: "reference", series: 1, dashed: true }));
+  }
+  found.forEach((one) => { one.on = !plot.hidden.has(one.key); });
+  // Margins of several units are compared in tolerances.
+  if (table.relative && new Set(found.filter((one) => one.on).map((one) => one.unit)).size > 1) {
+    found = found.map((one) => ({ ...one, values: table.relative, unit: "tolerances",
+      tightest: one.tightest && { ...one.tightest, value: one.tightest.relative } }));
+  }
   return found;
+}
+
+const value = (curve, k) => curve.values[k * curve.table.columns.length + curve.c];
+
+// Value at a time; NaN where none is known.
+function valueAt(curve, t) {
+  const [k, fraction] = moment(t);
+  return between(curve.values, curve.table.columns.length, curve.c, k, fraction);
 }
 
 // Without a negative zero.
 const fixed = (v, digits) => v.toFixed(digits).replace(/^-(?=[0.]+$)/, "");
+const readable = (v, unit) =>
+  Number.isNaN(v) ? "–" : `${Math.abs(v) >= 100 ? fixed(v, 1) : fixed(v, Math.abs(v) < 0.1 ? 4 : 3)} ${unit}`;
 
-const value = (curve, k) => curve.table.values[k * curve.table.columns.length + curve.c];
+// The limit that all these curves share; null if they differ or have none.
+function sharedLimit(shown) {
+  const [first] = shown;
+  if (!first || !first.limit) return null;
+  const same = shown.every(({ limit }) => limit && limit[0] === first.limit[0] && limit[1] === first.limit[1]);
+  return same ? first.limit : null;
+}
 
 function range() {
   if (!plot.span) return [run.start, run.end];
@@ -40,21 +66,9 @@ function range() {
   return [begin, Math.min(begin + plot.span, run.end)];
 }
 
-// A step of 1, 2 or 5 times a power of ten that divides `length` into about `count` parts.
-function stride(length, count) {
-  const raw = length / count, power = 10 ** Math.floor(Math.log10(raw));
-  return power * ([1, 2, 5].find((factor) => factor * power >= raw) || 10);
-}
-
-function drawPlot() {
-  const canvas = part("plot"), ratio = window.devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight;
-  if (!wide || !high) return;
-  canvas.width = wide * ratio;
-  canvas.height = high * ratio;
-  const pen = canvas.getContext("2d"), shown = curves(), [begin, end] = range();
-  pen.scale(ratio, ratio);
-  pen.font = "11px system-ui, sans-serif";
-  const first = moment(begin)[0], last = Math.min(moment(end)[0] + 1, stamps.length - 1);
+// Lowest and highest value between rows `first` and `last`, with room around; a limit that is near is within, and that
+// of margins always.
+function extent(shown, first, last, limit) {
   let low = Infinity, top = -Infinity;
   for (const curve of shown)
     for (let k = first; k <= last; k++) {
@@ -63,66 +77,51 @@ function drawPlot() {
       if (v > top) top = v;
     }
   if (!(low <= top)) [low, top] = [0, 1];
+  const size = shown.some((curve) => curve.table.relative) ? Infinity : Math.max(top - low, 1e-9);
+  for (const end of limit || []) {
+    if (end === null) continue;
+    if (end < low && low - end < 2 * size) low = end;
+    if (end > top && end - top < 2 * size) top = end;
+  }
   const room = Math.max((top - low) * 0.06, 1e-9 + Math.abs(top) * 1e-6);
-  low -= room;
-  top += room;
-  const left = 46, right = wide - 8, upper = 6, lower = high - 20;
-  const X = (t) => left + ((t - begin) / (end - begin || 1)) * (right - left);
-  const Y = (v) => lower - ((v - low) / (top - low)) * (lower - upper);
-  plot.at = (x) => begin + ((x - left) / (right - left)) * (end - begin);
-  pen.strokeStyle = colour("--rule");
-  pen.fillStyle = colour("--faint");
-  pen.lineWidth = 1;
-  const dy = stride(top - low, Math.max(2, high / 45)), dx = stride(end - begin || 1, Math.max(2, wide / 70));
-  const digits = Math.max(0, -Math.floor(Math.log10(dy) + 1e-9));
-  pen.textAlign = "right";
-  for (let v = Math.ceil(low / dy) * dy; v <= top; v += dy) {
-    pen.beginPath(); pen.moveTo(left, Y(v)); pen.lineTo(right, Y(v)); pen.stroke();
-    pen.fillText(Math.abs(v) < dy / 1e6 ? "0" : v.toFixed(Math.min(digits, 6)), left - 5, Y(v) + 4);
-  }
-  pen.textAlign = "center";
-  for (let t = Math.ceil(begin / dx) * dx; t <= end; t += dx) {
-    pen.beginPath(); pen.moveTo(X(t), upper); pen.lineTo(X(t), lower); pen.stroke();
-    const text = +t.toFixed(6) + " s";
-    pen.fillText(text, Math.min(X(t), wide - pen.measureText(text).width / 2), high - 5);
-  }
-  pen.save();
-  pen.beginPath(); pen.rect(left, 0, right - left, high); pen.clip();
-  const active = stepAt(time);
-  if (active) {
-    pen.fillStyle = colour("--chosen");
-    pen.fillRect(X(active.start), upper, X(active.end) - X(active.start), lower - upper);
-  }
-  for (const curve of shown) {
-    pen.strokeStyle = curve.colour;
-    pen.lineWidth = curve.dashed ? 1.2 : 1.5;
-    pen.setLineDash(curve.dashed ? [4, 3] : []);
-    pen.beginPath();
-    let on = false;
-    for (let k = first; k <= last; k++) {
-      const v = value(curve, k);
-      if (Number.isNaN(v)) { on = false; continue; }
-      if (on) pen.lineTo(X(stamps[k]), Y(v)); else pen.moveTo(X(stamps[k]), Y(v));
-      on = true;
-    }
-    pen.stroke();
-  }
-  pen.setLineDash([]);
-  pen.strokeStyle = colour("--accent");
-  pen.lineWidth = 1.5;
-  pen.beginPath(); pen.moveTo(X(time), upper); pen.lineTo(X(time), lower); pen.stroke();
-  pen.restore();
-  const legend = part("legend"), [k, fraction] = moment(time);
+  return [low - room, top + room];
+}
+
+// A step of 1, 2 or 5 times a power of ten that divides `length` into about `count` parts.
+function stride(length, count) {
+  const raw = length / count, power = 10 ** Math.floor(Math.log10(raw));
+  return power * ([1, 2, 5].find((factor) => factor * power >= raw) || 10);
+}
+
+function choose(table, column) {
+  const k = run.curves.findIndex((one) => one.name === table);
+  if (k < 0) return;
+  part("table").value = k;
+  part("table").dispatchEvent(new Event("change"));
+  part("column").value = run.curves[k].columns.indexOf(column);
+  part("column").dispatchEvent(new Event("change"));
+}
+
+// The legend: a switch for each curve, with its value now.
+function showLegend(shown) {
+  const legend = part("legend");
   while (legend.childElementCount > shown.length) legend.lastChild.remove();
   shown.forEach((curve, c) => {
     let entry = legend.children[c];
     if (!entry) {
-      entry = legend.appendChild(document.createElement("span"));
-      entry.append(document.createElement("i"), document.createElement("span"));
+      entry = element(legend, "button");
+      entry.type = "button";
+      element(entry, "i");
+      element(entry, "span");
+      entry.addEventListener("click", () => {
+        if (!plot.hidden.delete(entry.dataset.key)) plot.hidden.add(entry.dataset.key);
+        refresh();
+      });
     }
-    const v = between(curve.table.values, curve.table.columns.length, curve.c, k, fraction);
-    entry.firstChild.style.background = curve.colour;
-    const text = Number.isNaN(v) ? "–" : Math.abs(v) >= 100 ? fixed(v, 1) : fixed(v, Math.abs(v) < 0.1 ? 4 : 3);
-    entry.lastChild.textContent = `${curve.name} ${text} ${curve.table.units[curve.c]}`;
+    entry.dataset.key = curve.key;
+    entry.setAttribute("aria-pressed", curve.on);
+    entry.title = curve.on ? "hide" : "show";
+    entry.firstChild.style.background = `var(--series-${curve.series})`;
+    entry.lastChild.textContent = `${curve.name} ${readable(valueAt(curve, time), curve.unit)}`;
   });
 }

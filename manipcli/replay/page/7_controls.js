@@ -1,4 +1,4 @@
-// Controls, and the start of the player.
+// Controls: the list of steps, the track, the switches.
 
 function element(parent, kind, name, text = "") {
   const made = parent.appendChild(document.createElement(kind));
@@ -34,105 +34,75 @@ function entry(list, kind, step, mark, title) {
   return made;
 }
 
-function build() {
-  const track = part("track"), length = run.end - run.start || 1, good = (step) => step.outcome === "done";
-  track.setAttribute("aria-valuemin", run.start.toFixed(2));
-  track.setAttribute("aria-valuemax", run.end.toFixed(2));
-  const list = part("steps"), skip = (k) => {
-    for (const step of run.skipped.filter((one) => one.after === k)) {
-      const row = entry(list, "div", step, "–", `${step.label}: skipped${step.text ? "\n" + step.text : ""}`);
-      row.className = "skipped";
-      element(row, "span", "when", "skipped");
+// The steps in the order of the task; those that did not begin have no button.
+function buildSteps() {
+  const list = part("steps"), good = (step) => step.outcome === "done";
+  const unbegun = (k) => {
+    for (const step of run.unbegun.filter((one) => one.after === k)) {
+      const row = entry(list, "div", step, step.word === "skipped" ? "–" : "○", `${step.label}: ${step.word}${step.text ? "\n" + step.text : ""}`);
+      row.className = "unbegun";
+      element(row, "span", "when", step.word);
     }
   };
-  skip(0);
+  unbegun(0);
   run.steps.forEach((step, k) => {
-    const piece = track.insertBefore(document.createElement("div"), part("head-line"));
-    piece.className = "step" + (good(step) ? "" : " bad");
-    piece.dataset.step = k;
-    piece.style.left = `${(100 * (step.start - run.start)) / length}%`;
-    piece.style.width = `${(100 * (step.end - step.start)) / length}%`;
-    piece.textContent = placed(step).short.replace(/^else\//, "");
-    piece.title = `${step.label}: ${step.outcome}${step.text ? "\n" + step.text : ""}`;
-    for (const phase of step.phases) {
-      const line = element(piece, "div", "phase");
-      line.style.left = `${(100 * (phase.start - step.start)) / (step.end - step.start || 1)}%`;
-    }
-    const button = entry(list, "button", step, good(step) ? "✓" : "✗", piece.title);
+    const title = `${step.label}: ${step.outcome}${step.text ? "\n" + step.text : ""}`;
+    const button = entry(list, "button", step, good(step) ? "✓" : "✗", title);
     button.type = "button";
     button.dataset.step = k;
+    if (run.causes.some((cause) => cause.step === step.id)) button.classList.add("failed");
     element(button, "span", "phase", step.phases.map((phase) => phase.name).join(" · "));
     element(button, "span", "when", `${step.start.toFixed(2)} s`);
     button.addEventListener("click", (event) => {
       seek(step.start);
       // After a click, keys control the time, not this button.
-      if (event.detail) track.focus({ preventScroll: true });
+      if (event.detail) part("track").focus({ preventScroll: true });
     });
-    skip(k + 1);
+    unbegun(k + 1);
   });
+}
+
+function buildTrack() {
+  const track = part("track"), length = run.end - run.start || 1, head = part("head-line");
+  const share = (t) => `${(100 * (t - run.start)) / length}%`;
+  track.setAttribute("aria-valuemin", run.start.toFixed(2));
+  track.setAttribute("aria-valuemax", run.end.toFixed(2));
+  const put = (name, from, to) => {
+    const piece = track.insertBefore(document.createElement("div"), head);
+    piece.className = name;
+    piece.style.left = share(from);
+    if (to !== undefined) piece.style.width = `${(100 * (to - from)) / length}%`;
+    return piece;
+  };
+  run.steps.forEach((step, k) => {
+    const piece = put("step" + (step.outcome === "done" ? "" : " bad"), step.start, step.end);
+    piece.dataset.step = k;
+    piece.textContent = placed(step).short.replace(/^else\//, "");
+    piece.title = `${step.label}: ${step.outcome}${step.text ? "\n" + step.text : ""}`;
+    for (const phase of step.phases)
+      element(piece, "div", "phase").style.left = `${(100 * (phase.start - step.start)) / (step.end - step.start || 1)}%`;
+  });
+  for (const [from, to] of run.gaps || []) put("gap", from, to).title = `no data from ${from.toFixed(2)} to ${to.toFixed(2)} s`;
+  for (const mark of run.marks) {
+    if (mark.kind === "contact") continue;
+    const piece = put("event", mark.time);
+    piece.style.background = `var(${MARKS[mark.kind]})`;
+    piece.title = `${mark.text} at ${mark.time.toFixed(2)} s`;
+  }
   scrub(track, (event) => {
     const box = track.getBoundingClientRect();
     return run.start + ((event.clientX - box.left) / box.width) * length;
   });
-  scrub(part("plot"), (event) => plot.at(event.clientX - part("plot").getBoundingClientRect().left));
-  part("play").addEventListener("click", () => play(!playing));
+}
+
+function build() {
+  buildCauses();
+  buildSteps();
+  buildTrack();
   buildLayers();
-  const tables = part("table"), columns = part("column");
-  run.curves.forEach((table, k) => { element(tables, "option", "", table.name).value = k; });
-  const fill = () => {
-    plot.table = Number(tables.value);
-    const table = run.curves[plot.table], chosen = columns.value;
-    columns.textContent = "";
-    element(columns, "option", "", "all").value = -1;
-    if (table) table.columns.forEach((name, k) => { element(columns, "option", "", name).value = k; });
-    if (chosen && columns.options.length > Number(chosen) + 1) columns.value = chosen;
-    plot.column = Number(columns.value);
-    refresh();
-  };
-  tables.addEventListener("change", fill);
-  columns.addEventListener("change", () => { plot.column = Number(columns.value); refresh(); });
-  part("span").addEventListener("change", () => { plot.span = Number(part("span").value); refresh(); });
-  fill();
-  (root.dataset.page ? document : root).addEventListener("keydown", (event) => {
-    const kind = event.target.tagName, slider = event.target === track;
-    const way = { ArrowRight: 1, ArrowLeft: -1, ...(slider ? { ArrowUp: 1, ArrowDown: -1 } : {}) }[event.key];
-    if (kind === "SELECT" || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === " " && kind !== "BUTTON" && kind !== "INPUT") play(!playing);
-    else if (way) seek(time + way * (event.shiftKey ? 1 : 0.1));
-    else if (event.key === "Home") seek(run.start);
-    else if (event.key === "End") seek(run.end);
-    else return;
-    event.preventDefault();
-  });
-  new ResizeObserver(refresh).observe(root);
+  buildPlot();
+  buildKeys();
+  part("play").addEventListener("click", () => play(!playing));
+  const resized = new ResizeObserver(refresh);
+  for (const box of [root, part("plot")]) resized.observe(box);
 }
-
-function complain(text) {
-  element(root.querySelector(".view"), "div", "trouble", text);
-}
-
-async function begin() {
-  await unpack();
-  stamps = array(run.times);
-  measured = array(run.position);
-  wanted = run.reference ? array(run.reference) : null;
-  bodies = array(run.body);
-  ghosts = (run.ghosts || []).map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
-  if (run.pushes) [pushFirst, pushes, pushPair] = ["first", "rows", "pair"].map((name) => array(run.pushes[name]));
-  for (const table of run.curves) table.values = array(table.values);
-  look();
-  try {
-    furnish(part("canvas"));
-    steer(part("canvas"));
-  } catch (error) {
-    gl = null;
-    complain(error.message);
-  }
-  build();
-  refresh();
-  // For scripts and tests.
-  root.player = { run, camera, pick, pointAt, seek, play, poses: (t) => poses(measured, t),
-    ghosts: (t) => ghosts.map((ghost) => poses(ghost.position, t, ghost.body)), get time() { return time; }, get playing() { return playing; } };
-}
-
-begin().catch((error) => complain("Cannot show the run: " + error.message));

@@ -7,9 +7,10 @@ import math
 from collections.abc import Iterable, Sequence
 
 from manipcli.core.units import readable
+from manipcli.replay.cause import Written
 from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
-from manipcli.report.run_page import Picture, Written
+from manipcli.report.run_page import Picture
 
 
 def heading(name: str, title: str, about: str = "") -> Markup:
@@ -63,7 +64,10 @@ def table(
     Columns named in `numbers` are right-aligned.
     """
     right = [header in numbers for header in headers]
-    head = [element("th", name, class_="n" if is_n else None) for name, is_n in zip(headers, right, strict=True)]
+    head = [
+        element("th" if name.strip() else "td", name, class_="n" if is_n else None)
+        for name, is_n in zip(headers, right, strict=True)
+    ]
     body = [
         element(
             "tr",

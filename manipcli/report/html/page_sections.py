@@ -9,6 +9,7 @@ from manipcli.judge.drawn import value_text
 from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import BlockOutcome, StepOutcome, own_name
+from manipcli.replay.cause import Written
 from manipcli.replay.playback import Phase
 from manipcli.report.display_quantity import quantity
 from manipcli.report.html.markup import Markup, element, joined
@@ -27,7 +28,7 @@ from manipcli.report.html.page_parts import (
 )
 from manipcli.report.located import LOCATED, located_rows
 from manipcli.report.nesting import block_line, nested
-from manipcli.report.run_page import RunPage, Source, Written
+from manipcli.report.run_page import RunPage, Source
 
 SHORT_HASH = 16
 """Shown digits of a hash; the page source holds all of them."""

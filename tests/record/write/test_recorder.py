@@ -328,12 +328,18 @@ class TestRefusedBeforeAnythingIsWritten:
         assert path.lstat() == before
         assert [p.name for p in tmp_path.iterdir()] == ["run.mcap"]
 
-    def test_directory_and_missing_directory(self, tmp_path: Path, make_run: MakeRun) -> None:
+    def test_directory_and_file_instead_of_one(self, tmp_path: Path, make_run: MakeRun) -> None:
         with pytest.raises(RecordingRefused, match=r"directory"):
             make_run(1).recorder(tmp_path)
-        with pytest.raises(RecordingRefused, match=r"does not exist"):
-            make_run(1).recorder(tmp_path / "no" / "run.mcap")
-        assert list(tmp_path.iterdir()) == []
+        (tmp_path / "file").touch()
+        with pytest.raises(RecordingRefused, match=r"folder .*Not a directory"):
+            make_run(1).recorder(tmp_path / "file" / "no" / "run.mcap")
+        assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+    def test_missing_folders_are_made(self, tmp_path: Path, make_run: MakeRun) -> None:
+        path = tmp_path / "a" / "b" / "run.mcap"
+        make_run(1).recorder(path).finish({})
+        assert path.is_file()
 
     def test_directory_that_may_not_be_written(
         self, tmp_path: Path, make_run: MakeRun, monkeypatch: pytest.MonkeyPatch

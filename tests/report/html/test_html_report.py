@@ -22,10 +22,11 @@ from manipcli.judge.measures.grasp_intervals import GraspFacts, Hold, Slip, Spre
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
+from manipcli.replay.cause import Cause, Written
 from manipcli.report.html.markup import Markup, element, joined
 from manipcli.report.html.page_parts import number, of_limit, signed
 from manipcli.report.html.render_page import render_page
-from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
+from manipcli.report.run_page import Picture, RunPage, Source
 
 ROOT = Path(__file__).parents[3]
 RunCli = Callable[..., Any]
@@ -288,8 +289,9 @@ def test_a_log_that_cannot_be_read_has_a_page_and_junit_in_place_of_those_of_an_
 @pytest.mark.parametrize("option", ["--report", "--junit"])
 def test_where_nothing_can_be_written_is_told_before_the_run(call_cli: RunCli, tmp_path: Path, option: str) -> None:
     task = ROOT / "tasks" / "home.yaml"
-    ran = call_cli("run", task, option, tmp_path / "nowhere" / "file", cwd=tmp_path)
-    assert ran.code == 4 and "' does not exist" in ran.err
+    (tmp_path / "taken").touch()
+    ran = call_cli("run", task, option, tmp_path / "taken" / "file", cwd=tmp_path)
+    assert ran.code == 4 and "cannot create folder" in ran.err
     assert not (tmp_path / "runs").exists()
     assert "the command already uses this file" in call_cli("run", task, option, task, cwd=tmp_path).err
 
