@@ -116,9 +116,12 @@ class Analysis:
         """The numbers with more than one value, those that matter most first."""
         varied = [k for k in range(len(self.columns)) if len({values[k] for values in self.values.values()}) > 1]
         indices = self._indices
+        results = [(result.smallest, result.passed) for result in self.sweep.results]
+        several = sum(len(set(column)) > 1 for column in zip(*results, strict=True))  # with margin, with passing
+        correlations = [self._correlations(k, of=several * len(varied)) for k in varied]
         found = [
-            Influence(self.columns[k], *self._correlations(k, of=len(varied)), indices.get(self.columns[k].dimension))
-            for k in varied
+            Influence(self.columns[k], *pair, indices.get(self.columns[k].dimension))
+            for k, pair in zip(varied, correlations, strict=True)
         ]
         return tuple(sorted(found, key=lambda influence: -influence.size))
 

@@ -25,21 +25,28 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def rate_text(rate: Rate) -> str:
-    """`194 of 200 passed: 97.0 % (95 % interval 93.6 % to 98.6 %)`."""
-    least, most = rate.interval
-    interval = f"95 % interval {percent(least)} to {percent(most)}"
-    return f"{rate.passed} of {rate.count} passed: {percent(rate.share)} ({interval})"
+def rate_text(rate: Rate, interval: tuple[float, float] | None) -> str:
+    """`194 of 200 passed: 97.0 % (95 % interval 93.6 % to 98.6 %)`; the interval where there is one."""
+    text = f"{rate.passed} of {rate.count} passed: {percent(rate.share)}"
+    return text if interval is None else f"{text} (95 % interval {interval_text(interval)})"
+
+
+def interval_text(interval: tuple[float, float]) -> str:
+    """`93.6 % to 98.6 %`."""
+    return " to ".join(map(percent, interval))
 
 
 def progress_text(progress: Progress) -> str:
     """`120 of 200: 118 passed, 2 failed, 3.1 per second, 26 s left`."""
     failed = progress.done - progress.passed
     text = f"{progress.done} of {progress.asked}: {progress.passed} passed, {failed} failed"
-    if progress.left is None:
-        return text
-    pace = f"{progress.rate:.1f} per second" if progress.rate >= 0.95 else f"{1.0 / progress.rate:.1f} s per sample"
-    return f"{text}, {pace}, {_time(progress.left)} left"
+    return text if progress.left is None else f"{text}, {pace_text(progress.rate, progress.left, of='sample')}"
+
+
+def pace_text(rate: float, left: float, *, of: str) -> str:
+    """`3.1 per second, 26 s left`; `rate` per second, time `left` [s], `of` what."""
+    pace = f"{rate:.1f} per second" if rate >= 0.95 else f"{1.0 / rate:.1f} s per {of}"
+    return f"{pace}, {_time(left)} left"
 
 
 def render_text(analysis: Analysis) -> str:
@@ -47,9 +54,7 @@ def render_text(analysis: Analysis) -> str:
     sweep = analysis.sweep
     sampling = sweep.sampling
     least = f"design {sampling.design}, seed {sampling.seed}, {number_of(len(analysis.columns), 'number')} varied"
-    lines = [f"{sampling.task}: {rate_text(sweep.rate)}", least]
-    if sampling.design.word != "random":
-        lines.append("the interval holds for random samples; these cover the space evenly or follow its axes")
+    lines = [f"{sampling.task}: {rate_text(sweep.rate, sweep.interval)}", least]
     if sweep.missing:
         missing = listed(map(str, sweep.missing), most=NAMED)
         lines.append(f"missing: {len(sweep.missing)} of {sweep.asked} samples: {missing}")
@@ -104,9 +109,9 @@ def _influences(analysis: Analysis) -> str:
     for one in analysis.influences:
         cells = ["-" if found is None else f"{found.rho:+.2f}" for found in (one.correlation, one.passing)]
         bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "-")
-        nominal = f"{one.column.nominal:.4g}"
+        nominal = one.column.text(one.column.nominal)
         bar = "█" * round(one.size * _BAR) if one.matters else ""
-        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells, bound)), bar))
+        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells)), bound, bar))
     return table(headers, rows, right=headers[1:5])
 
 
@@ -124,7 +129,6 @@ def render_json(analysis: Analysis) -> str:
     """The sweep as one JSON object."""
     sweep = analysis.sweep
     sampling = sweep.sampling
-    least, most = sweep.rate.interval
     return json.dumps(
         {
             "task": sampling.task,
@@ -134,7 +138,7 @@ def render_json(analysis: Analysis) -> str:
             "passed": sweep.rate.passed,
             "count": sweep.rate.count,
             "rate": sweep.rate.share,
-            "interval": [least, most],
+            "interval": sweep.interval,
             "missing": list(sweep.missing),
             "outcomes": dict(sorted(analysis.outcomes.items())),
             "expectations": [
@@ -165,6 +169,7 @@ def _number_object(influence: Influence) -> Mapping[str, object]:
     return {
         "name": influence.column.name,
         "nominal": influence.column.nominal,
+        "unit": influence.column.unit,
         "correlation": found.rho if found is not None else None,
         "correlation_with_passing": influence.passing.rho if influence.passing is not None else None,
         "bound": found.bound if found is not None else None,

@@ -65,6 +65,14 @@ class Design:
             hint = "write --design random" if word == "random" else f"write the number of points: {word}:256"
         raise InvalidInput([Diagnostic("USE180", f"'{escape(text)}' is not a design", hint=hint)])
 
+    @property
+    def spreads(self) -> bool:
+        """Whether samples are spread over the distributions, so that their success rate estimates that of the task.
+
+        A `grid` has its levels at the ends, `oat` changes one number at a time, `saltelli` repeats numbers.
+        """
+        return self.word in ("random", "lhs", "sobol")
+
     def has(self, quantity: Varied, k: int) -> bool:
         """Whether component k of a quantity is a dimension: one with a single value is not, except for `oat`, which
         compares it with the value in the file."""
