@@ -32,13 +32,17 @@ FLAGS = (
 
 
 class Page:
-    """One page; what it asked for over the network and what it complained about is kept."""
+    """One page; what it asked for over the network and what it complained about is kept.
+
+    `messages`: all lines of its console; `complaints`: its errors.
+    """
 
     def __init__(self, socket: ClientConnection) -> None:
         self._socket = socket
         self._number = 0
         self.requests: list[str] = []
         self.complaints: list[str] = []
+        self.messages: list[str] = []
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.ask(f"{domain}.enable")
 
@@ -67,8 +71,12 @@ class Page:
                 self.requests.append(url)
             case {"method": "Runtime.exceptionThrown", "params": {"exceptionDetails": details}}:
                 self.complaints.append(str(details))
-            case {"method": "Log.entryAdded", "params": {"entry": {"level": "error", "text": str(text)}}}:
-                self.complaints.append(text)
+            case {"method": "Log.entryAdded", "params": {"entry": {"level": str(level), "text": str(text)}}}:
+                self.messages.append(text)
+                if level == "error":
+                    self.complaints.append(text)
+            case {"method": "Runtime.consoleAPICalled", "params": {"args": list(values)}}:
+                self.messages.append(" ".join(str(value.get("value")) for value in values))
 
     def open(self, url: str) -> None:
         self.ask("Page.navigate", url=url)
@@ -84,6 +92,20 @@ class Page:
         while not self.evaluate(script):
             assert time.monotonic() < end, f"not within {seconds} s: {script}"
             time.sleep(0.2)
+
+    def press(self, key: str) -> None:
+        """A key, named as in `KeyboardEvent.key`."""
+        text = {"text": key} if len(key) == 1 else {}
+        for kind in ("keyDown", "keyUp"):
+            self.ask("Input.dispatchKeyEvent", type=kind, key=key, **(text if kind == "keyDown" else {}))
+
+    def point(self, selector: str, x: float, y: float) -> None:
+        """Move the mouse to a place of an element: 0 to 1 from left to right and from top to bottom."""
+        box = json.loads(
+            str(self.evaluate(f"JSON.stringify(document.querySelector({selector!r}).getBoundingClientRect())"))
+        )
+        at = {"x": box["x"] + x * box["width"], "y": box["y"] + y * box["height"]}
+        self.ask("Input.dispatchMouseEvent", type="mouseMoved", **at)
 
     def screenshot(self) -> bytes:
         """A PNG file."""

@@ -207,6 +207,7 @@ def open_other(
         contact_times=((),) * len(times),
         lost=topics.lost,
         notes=tuple(notes),
+        begin=log.begin,
         sensed=partial(read_sensed, path, begin=log.begin, end=float(times[-1])),
     )
 

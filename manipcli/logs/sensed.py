@@ -78,7 +78,7 @@ class _Series(Generic[T]):
         return [f"{count} not shown: {why}" for why, count in often[:MOST_NAMED]]
 
 
-def read_sensed(path: Path, frames: Collection[str], *, begin: int, end: float) -> Sensed:
+def read_sensed(path: Path, frames: Collection[str], *, begin: int, end: float, with_pictures: bool = True) -> Sensed:
     """What the sensors of a log measured.
 
     Args:
@@ -86,6 +86,7 @@ def read_sensed(path: Path, frames: Collection[str], *, begin: int, end: float) 
         frames: of the drawing: `world`, `robot/<link>` and bodies.
         begin: log time of t = 0 [ns].
         end: end of what is shown [s].
+        with_pictures: read those of cameras, too.
 
     Raises:
         BadRecording: the file cannot be read.
@@ -93,7 +94,10 @@ def read_sensed(path: Path, frames: Collection[str], *, begin: int, end: float) 
     topics = open_topics(path)
     notes: list[str] = []
     pictures, numbers = Budget(PICTURE_INTERVAL, PICTURE_BYTES), Budget(NUMBER_INTERVAL, MOST_NUMBERS)
-    images = [_Series(topic, _pictures(topic), Thinned(pictures)) for topic in _images(topics, notes)]
+    images = [
+        _Series(topic, _pictures(topic), Thinned(pictures))
+        for topic in (_images(topics, notes) if with_pictures else ())
+    ]
     grids = [_Series(topic, _grid, Thinned[Grid](numbers)) for topic in _chosen(topics, (messages.TAXELS,), notes)]
     kinds = messages.SCAN, messages.RANGE
     sweeps = [_Series(topic, _sweeps(topic), Thinned(numbers)) for topic in _chosen(topics, kinds, notes)]
@@ -105,7 +109,7 @@ def read_sensed(path: Path, frames: Collection[str], *, begin: int, end: float) 
         if name in every:
             every[name].take(data, places, begin, end)
         else:
-            _remember(parents, data, places)
+            remember_frames(parents, data, places)
     return Sensed(
         cameras=tuple(_cameras(images, notes)),
         taxels=tuple(_taxels(grids, notes)),
@@ -221,8 +225,8 @@ def _rays(
         if not found:
             continue
         first = found[0][1]
-        placed = _placed(first.frame, parents, frames)
-        if placed is None:
+        mount = placed(first.frame, parents, frames)
+        if mount is None:
             notes.append(f"{series.topic.name}: frame '{first.frame}' is not in the log: its rays are not drawn")
             continue
         counts, unit = counted(np.array([sweep.distance for _, sweep in found]))
@@ -230,8 +234,8 @@ def _rays(
         stamps = np.array([(sweep.stamp - begin) / NS_PER_S for _, sweep in found])
         yield RayFeed(
             name=_short(series.topic.name),
-            parent=placed[0],
-            X_PS=placed[1],
+            parent=mount[0],
+            X_PS=mount[1],
             angles=first.angles,
             times=times,
             taken=np.where(np.abs(stamps - times) < NEARBY, stamps, times),
@@ -241,7 +245,7 @@ def _rays(
         )
 
 
-def _remember(parents: dict[str, tuple[str, Transform]], data: bytes, places: Places) -> None:
+def remember_frames(parents: dict[str, tuple[str, Transform]], data: bytes, places: Places) -> None:
     """Add the frames of /tf_static to `parents`."""
     try:
         for _, reader in singly(data, places):
@@ -253,7 +257,7 @@ def _remember(parents: dict[str, tuple[str, Transform]], data: bytes, places: Pl
         return
 
 
-def _placed(
+def placed(
     frame: str, parents: Mapping[str, tuple[str, Transform]], frames: Collection[str]
 ) -> tuple[str, Transform] | None:
     """The nearest drawn frame above a frame, and the pose in it; None if there is none."""

@@ -10,7 +10,7 @@ import warnings
 import zlib
 from dataclasses import dataclass
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +47,24 @@ class Unshown(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
+class Pixels:
+    """A picture as it is: `rows` (h, w, 3) of colours, 0 to 255, else (h, w); `unit` of depths [m]."""
+
+    kind: PictureKind
+    rows: npt.NDArray[np.generic]
+    unit: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class PictureFile:
+    """A compressed picture as it is in the log, with checked dimensions; `kind` is depth for PNG with millimetres."""
+
+    kind: Literal["colour", "depth"]
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Small:
     """A picture for a page: its file, size [pixel] and kind; `low` and `high` as in `PictureStream`."""
 
@@ -57,10 +75,10 @@ class Small:
     high: float = np.nan
 
 
-def from_image(
+def pixels(
     encoding: str, width: int, height: int, step: int, data: memoryview, *, big: bool = False, labels: bool = False
-) -> Small:
-    """The picture of a sensor_msgs/Image.
+) -> Pixels:
+    """The pixels of a sensor_msgs/Image.
 
     Args:
         encoding: of its pixels, `rgb8`.
@@ -87,15 +105,26 @@ def from_image(
         (height, width, channels), kind, buffer=data, strides=(step, pixel, kind.itemsize)
     )
     if labels and encoding in ("8UC1", "16UC1", "mono8", "mono16"):
-        return _labels(rows[..., 0])
+        return Pixels("labels", rows[..., 0])
     if encoding in _DEPTHS:
-        return _depth(rows[..., 0], _DEPTHS[encoding])
+        return Pixels("depth", rows[..., 0], _DEPTHS[encoding])
+    if encoding == "mono16":
+        return Pixels("colour", np.repeat(_bright(rows[..., :1]), 3, axis=2))
+    return Pixels("colour", np.ascontiguousarray(rows[..., list(order)]).astype(np.uint8))
+
+
+def from_image(
+    encoding: str, width: int, height: int, step: int, data: memoryview, *, big: bool = False, labels: bool = False
+) -> Small:
+    """The picture of a sensor_msgs/Image; arguments and errors are those of `pixels`."""
+    found = pixels(encoding, width, height, step, data, big=big, labels=labels)
+    if found.kind == "labels":
+        return _labels(found.rows)
+    if found.kind == "depth":
+        return _depth(found.rows, found.unit)
     from PIL import Image
 
-    if encoding == "mono16":
-        return _colour(_gray(rows[..., 0]))
-
-    return _colour(Image.fromarray(np.ascontiguousarray(rows[..., list(order)]).astype(np.uint8)))
+    return _colour(Image.fromarray(np.ascontiguousarray(found.rows[..., 0] if encoding == "mono16" else found.rows)))
 
 
 def from_compressed(form: str, data: memoryview) -> Small:
@@ -118,8 +147,12 @@ def from_compressed(form: str, data: memoryview) -> Small:
             image.draft("RGB", (MOST_SIDE, MOST_SIDE))
             image.load()
             if image.mode in ("I;16", "I"):
-                pixels = np.asarray(image)
-                return _depth(pixels, _DEPTHS["16UC1"]) if deep or "16UC1" in form else _colour(_gray(pixels))
+                numbers = np.asarray(image)
+                return (
+                    _depth(numbers, _DEPTHS["16UC1"])
+                    if deep or "16UC1" in form
+                    else _colour(Image.fromarray(_bright(numbers)))
+                )
             return _colour(image.convert("RGB"))
     except Unshown:
         raise
@@ -129,13 +162,37 @@ def from_compressed(form: str, data: memoryview) -> Small:
         raise Unshown(f"more than {MOST_PIXELS} pixels") from error
 
 
-def _gray(rows: npt.NDArray[np.generic]) -> PillowImage:
-    """Numbers as brightness; the largest are white."""
+def picture_file(form: str, data: memoryview) -> PictureFile:
+    """The file in a sensor_msgs/CompressedImage, JPEG or PNG, if its head is sound and its size can be decoded.
+
+    Raises:
+        Unshown: another format, a damaged head or too many pixels.
+    """
     from PIL import Image
 
+    deep = "compressedDepth" in form
+    if deep and "32FC1" in form:
+        raise Unshown("compressedDepth of 32FC1 is not shown")
+    content = bytes(data[_DEPTH_HEAD:] if deep else data)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the size is checked below
+            image = Image.open(BytesIO(content), formats=("PNG",) if deep else ("JPEG", "PNG"))
+    except (OSError, SyntaxError, ValueError, EOFError, OverflowError, struct.error, zlib.error) as error:
+        raise Unshown(f"a damaged picture of format '{shorten(form)}'") from error
+    except Image.DecompressionBombError as error:
+        raise Unshown(f"more than {MOST_PIXELS} pixels") from error
+    if image.width * image.height > MOST_PIXELS:
+        raise Unshown(f"{image.width} x {image.height} pixels are more than {MOST_PIXELS}")
+    return PictureFile("depth" if deep else "colour", f"image/{(image.format or '').lower()}", content)
+
+
+def _bright(rows: npt.NDArray[np.generic]) -> npt.NDArray[np.uint8]:
+    """Numbers as brightness; the largest are white."""
     bright = rows.astype(np.float32)
     most = max(float(np.percentile(bright, SPREAD[1])), 1.0)
-    return Image.fromarray(np.clip(bright * (255.0 / most), 0.0, 255.0).astype(np.uint8))
+    scaled: npt.NDArray[np.uint8] = np.clip(bright * (255.0 / most), 0.0, 255.0).astype(np.uint8)
+    return scaled
 
 
 def _factor(width: int, height: int) -> int:

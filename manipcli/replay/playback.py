@@ -90,6 +90,7 @@ class Playback:
         events: events of the task.
         lost: why the end of the log is missing, or None.
         notes: what is missing or differs from the run, one sentence each.
+        begin: log time of t = 0 [ns].
         period: of the control tick [s]; None for a log of another program.
         sensed: reads what the sensors measured, for a drawing with these frames.
         keep: owner of resources with the same lifetime: the folder of embedded meshes.
@@ -115,6 +116,7 @@ class Playback:
     events: tuple[TaskEvent, ...] = ()
     lost: str | None = None
     notes: tuple[str, ...] = ()
+    begin: int = 0
     period: float | None = None
     sensed: Callable[[Collection[str]], Sensed] = field(repr=False, default=lambda frames: Sensed())
     keep: object = field(repr=False, default=None)

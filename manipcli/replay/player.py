@@ -72,8 +72,8 @@ def player_page(playback: Playback, *, ghosts: Sequence[Ghost] = ()) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{name}</title><link rel="icon" href="data:,">\n'
         f"<style>\n{colours()}{_read('whole_page.css')}"
-        f"</style></head><body>\n{switch()}<header><h1>{name}</h1>{''.join(lines)}</header>\n"
-        f"{player_html(playback, ghosts=ghosts, whole_page=True)}</body></html>\n"
+        f"</style></head><body>\n<header>{switch()}<h1>{name}</h1>{''.join(lines)}</header>\n"
+        f"<main>{player_html(playback, ghosts=ghosts, whole_page=True)}</main></body></html>\n"
     )
 
 

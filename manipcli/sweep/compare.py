@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
+from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, Place
-from manipcli.core.text import escape, listed
+from manipcli.core.text import any_of, distinguished, escape, listed, shorten
 from manipcli.report.display_quantity import quantity
 from manipcli.report.table import table
+from manipcli.sweep.results import WORDS
 from manipcli.sweep.statistics import Rate, Shift, shift, two_sided
 from manipcli.sweep.table import FIXED, MARGIN
 
@@ -21,14 +25,17 @@ MOST_SHOWN: Final = 10
 SMALLEST: Final = "smallest_margin"
 
 
-@dataclass(frozen=True, slots=True)
-class _Side:
-    """A CSV file: the rows by sample, and the names of its columns."""
+ROUNDING: Final = 1e-6
+"""Relative difference of two margins that counts as equal: processors and libraries round differently."""
 
-    path: Path
-    rows: Mapping[int, Mapping[str, str]]
-    margins: tuple[str, ...]
-    numbers: tuple[str, ...]
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A sample: its margins by the name of their column, None where not evaluated, and the values of its numbers."""
+
+    passed: bool
+    margins: Mapping[str, float | None]
+    numbers: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,23 +95,21 @@ def compare_sweeps(a: Path, b: Path, *, alpha: float, with_margins: bool = False
         InvalidInput: a file is not the CSV of a sweep, or they have no samples in common, or other values in a sample.
     """
     one, other = _read(a), _read(b)
-    numbers = sorted(one.rows.keys() & other.rows.keys())
-    if not numbers:
-        raise InvalidInput([Diagnostic("USE188", f"'{a}' and '{b}' have no sample in common")])
-    _refuse_other_samples(one, other, numbers)
-    pairs = [(one.rows[number], other.rows[number]) for number in numbers]
-    verdicts = [(first["outcome"] == "passed", second["outcome"] == "passed") for first, second in pairs]
-    worse = tuple(n for n, (before, after) in zip(numbers, verdicts, strict=True) if before and not after)
-    better = tuple(n for n, (before, after) in zip(numbers, verdicts, strict=True) if after and not before)
+    pairs = {number: (one[number], other[number]) for number in sorted(one.keys() & other.keys())}
+    if cause := _difference_of_samples(pairs):
+        message = f"'{a}' and '{b}' are not sweeps of the same samples: {cause}"
+        raise InvalidInput([Diagnostic("USE188", message, hint="use the same design, seed and `vary:` for both")])
+    worse = tuple(number for number, (before, after) in pairs.items() if before.passed and not after.passed)
+    better = tuple(number for number, (before, after) in pairs.items() if after.passed and not before.passed)
     shifts = {}
-    for name in (SMALLEST, *(name for name in one.margins if name in other.margins)):
-        both = [(float(x[name]), float(y[name])) for x, y in pairs if x[name] and y[name]]
-        if both:
-            shifts[name] = shift([after - before for before, after in both])
+    for name in next(iter(pairs.values()))[0].margins:
+        both = [(before.margins[name], after.margins.get(name)) for before, after in pairs.values()]
+        if found := [_change(a, b) for a, b in both if a is not None and b is not None]:
+            shifts[name] = shift(found)
     return Comparison(
-        Rate(sum(before for before, _ in verdicts), len(pairs)),
-        Rate(sum(after for _, after in verdicts), len(pairs)),
-        len(one.rows.keys() ^ other.rows.keys()),
+        Rate(sum(before.passed for before, _ in pairs.values()), len(pairs)),
+        Rate(sum(after.passed for _, after in pairs.values()), len(pairs)),
+        len(one.keys() ^ other.keys()),
         worse,
         better,
         two_sided(len(worse), len(better)),
@@ -117,9 +122,11 @@ def compare_sweeps(a: Path, b: Path, *, alpha: float, with_margins: bool = False
 def render_text(compared: Comparison) -> str:
     """Rates, the test, the samples that changed, and the shift of each margin."""
     a, b = compared.a, compared.b
-    word = "worse" if compared.is_worse else "not significantly different"
-    if not compared.is_worse and compared.significant:
-        word = "better"
+    word = "not significantly different"
+    if compared.significant:
+        word = "worse" if len(compared.worse) > len(compared.better) else "better"
+    if compared.is_worse and word != "worse":
+        word = "smaller margins" if not compared.significant else f"{word}, but smaller margins"
     lines = [
         f"{word}: {b.passed} of {b.count} samples passed, {a.passed} before",
         f"McNemar's test: p = {compared.p:.2g} (alpha {compared.alpha:g}); "
@@ -168,7 +175,7 @@ def _split(name: str) -> tuple[str, str]:
     """A column of margins as its expectation and unit."""
     if name == SMALLEST:
         return "smallest, in tolerances", ""
-    label = name.removeprefix(MARGIN)
+    label = escape(name.removeprefix(MARGIN))
     head, mark, unit = label.rpartition(" [")
     return (head, unit.removesuffix("]")) if mark and unit.endswith("]") else (label, "")
 
@@ -178,47 +185,82 @@ def _signed(value: float, unit: str) -> str:
     return f"+{text}" if value > 0.0 else text.replace("-", "−")
 
 
-def _read(path: Path) -> _Side:
-    """
+def _change(before: float, after: float) -> float:
+    """The change of a margin; 0 where it is a difference of rounding."""
+    return 0.0 if math.isclose(before, after, rel_tol=ROUNDING, abs_tol=EDGE) else after - before
+
+
+def _read(path: Path) -> dict[int, _Row]:
+    """The rows of a sweep by sample.
+
     Raises:
         InvalidInput: it is not the CSV of a sweep; names the line.
     """
     with path.open(encoding="utf-8", newline="") as stream:
-        reader = csv.reader(stream)
+        reader = csv.reader(stream, strict=True)
+        rows: dict[int, _Row] = {}
         try:
-            names = tuple(next(reader, []))
-            if names[: len(FIXED)] != FIXED:
+            names = next(reader, [])
+            if tuple(names[: len(FIXED)]) != FIXED:
                 raise ValueError(f"expected the columns {', '.join(FIXED)} first")
-            margins = tuple(name for name in names if name.startswith(MARGIN))
-            rows = {}
-            for row in reader:
-                cells = dict(zip(names, row, strict=True))
-                for name in (SMALLEST, *margins):
-                    float(cells[name] or 0.0)
-                rows[int(cells["sample"])] = cells
+            if double := next((name for k, name in enumerate(names) if name in names[:k]), None):
+                raise ValueError(f"two columns '{double}'")
+            for cells in reader:
+                number, row = _row(names, cells)
+                if number in rows:
+                    raise ValueError(f"sample {number} is there twice")
+                rows[number] = row
         except (ValueError, csv.Error) as error:
-            message = f"not the CSV of a sweep: {escape(str(error))}"
+            cause = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else escape(str(error))
+            place = Place(str(path), max(1, reader.line_num), 1)
             hint = "write one with `manipcli sweep TASK --csv FILE`"
-            raise InvalidInput(
-                [Diagnostic("USE187", message, Place(str(path), max(1, reader.line_num), 1), hint=hint)]
-            ) from None
-    return _Side(path, rows, margins, tuple(name for name in names[len(FIXED) :] if name not in margins))
+            message = f"not the CSV of a sweep: {cause}"
+            raise InvalidInput([Diagnostic("USE187", message, place, hint=hint)]) from None
+    return rows
 
 
-def _refuse_other_samples(one: _Side, other: _Side, numbers: Sequence[int]) -> None:
+def _row(names: Sequence[str], cells: Sequence[str]) -> tuple[int, _Row]:
     """
     Raises:
-        InvalidInput: a number that both vary has other values in a sample; they are not pairs.
+        ValueError: it is not a row of a sweep.
     """
-    shared = [name for name in one.numbers if name in other.numbers]
-    cause = ""
-    if not shared:
-        cause = "they vary no number in common"
-    for number in numbers:
+    if len(cells) != len(names):
+        raise ValueError(f"{len(cells)} cells, expected {len(names)}; the file may be cut off")
+    by_name = dict(zip(names, cells, strict=True))
+    number, outcome = by_name["sample"], by_name["outcome"]
+    if not (number.isascii() and number.isdecimal()):
+        raise ValueError(f"'{shorten(number)}' is not the number of a sample")
+    if outcome not in WORDS:
+        raise ValueError(f"'{shorten(outcome)}' is not an outcome, expected {any_of(WORDS)}")
+    margins = [name for name in names if name == SMALLEST or name.startswith(MARGIN)]
+    return int(number), _Row(
+        outcome == "passed",
+        {name: _finite(name, by_name[name]) if by_name[name] else None for name in margins},
+        {name: _finite(name, by_name[name]) for name in names[len(FIXED) :] if name not in margins},
+    )
+
+
+def _finite(name: str, cell: str) -> float:
+    """
+    Raises:
+        ValueError: it is not a finite number.
+    """
+    with suppress(ValueError):
+        if math.isfinite(value := float(cell)):
+            return value
+    raise ValueError(f"'{shorten(cell)}' is not a number, in column '{name}'")
+
+
+def _difference_of_samples(pairs: Mapping[int, tuple[_Row, _Row]]) -> str:
+    """Why the rows are not pairs, "" if they are: a number that both vary has the same value in each."""
+    if not pairs:
+        return "they have no sample in common"
+    for number, (before, after) in pairs.items():
+        shared = [name for name in before.numbers if name in after.numbers]
+        if not shared:
+            return "they vary no number in common"
         for name in shared:
-            a, b = one.rows[number][name], other.rows[number][name]
-            if a != b and not cause:
-                cause = f"'{escape(name)}' is {float(a):.4g} and {float(b):.4g} in sample {number}"
-    if cause:
-        message = f"'{one.path}' and '{other.path}' are not sweeps of the same samples: {cause}"
-        raise InvalidInput([Diagnostic("USE188", message, hint="use the same design, seed and `vary:` for both")])
+            if before.numbers[name] != after.numbers[name]:
+                a, b = distinguished(before.numbers[name], after.numbers[name])
+                return f"'{escape(name)}' is {a} and {b} in sample {number}"
+    return ""

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from typing import Final
+from typing import Final, get_args
 
 from manipcli.conditions.robustness import EDGE
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
@@ -108,7 +108,7 @@ class SampleResult:
         number, margins, outcome = read["sample"], read["margins"], read["outcome"]
         if type(number) is not int or number < 0 or not isinstance(margins, list):
             raise TypeError("not a result")
-        word = _WORDS[_WORDS.index(outcome)]  # ValueError for anything else
+        word = WORDS[WORDS.index(outcome)]  # ValueError for anything else
         return SampleResult(
             number,
             word,
@@ -117,6 +117,9 @@ class SampleResult:
             _number(read["simulated"]),
             tuple(map(_margin, margins)),
         )
+
+
+WORDS: Final[tuple[CaseWord, ...]] = get_args(CaseWord)
 
 
 def _number(read: object) -> float | None:
@@ -131,9 +134,6 @@ def _margin(read: object) -> Margin:
     if not isinstance(read, list) or len(read) != len(fields(Margin)) or not isinstance(read[4], bool):
         raise TypeError("not a margin")
     return Margin(str(read[0]), str(read[1]), _number(read[2]), _number(read[3]), read[4])
-
-
-_WORDS: Final[tuple[CaseWord, ...]] = ("passed", "failed", "differs", "error", "invalid", "crashed", "hung")
 
 
 def result_of(report: CaseReport) -> SampleResult:

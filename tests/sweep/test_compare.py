@@ -64,10 +64,48 @@ def test_only_the_same_samples_are_compared(tmp_path: Path, call_cli: RunCli) ->
 
 @pytest.mark.parametrize(
     ("text", "cause"),
-    [("a,b\n", "a.csv:1:1: .*not the CSV of a sweep"), (f"{HEAD}\n1,passed\n", "a.csv:2:1: "),
-     (f"{HEAD}\n1,passed,,,1.0,high,0.1,0.1\n", "a.csv:2:1: "), ("", "a.csv:1:1: ")],
+    [
+        ("a,b\n", "a.csv:1:1: .*not the CSV of a sweep"),
+        ("", "a.csv:1:1: .*expected the columns sample, outcome"),
+        (f"{HEAD}\n1,passed\n", "a.csv:2:1: .*2 cells, expected 8; the file may be cut off"),
+        (f"{HEAD}\n1,passed,,,1.0,high,0.1,0.1\n", "a.csv:2:1: .*'high' is not a number, in column 'smallest_margin'"),
+        (f"{HEAD}\n1,passed,,,1.0,0.1,nan,0.1\n", "'nan' is not a number, in column 'margin near .m.'"),
+        (f"{HEAD}\n1,passed,,,1.0,0.1,0.1,1e999\n", "'1e999' is not a number, in column 'scene.cup.mass'"),
+        (f"{HEAD}\n1,PASSED,,,1.0,0.1,0.1,0.1\n", "'PASSED' is not an outcome, expected 'passed', 'failed'"),
+        (f"{HEAD}\n-1,passed,,,1.0,0.1,0.1,0.1\n", "'-1' is not the number of a sample"),
+        (f"{HEAD}\n" + "1,passed,,,1.0,0.1,0.1,0.1\n" * 2, "a.csv:3:1: .*sample 1 is there twice"),
+        (f"{HEAD},scene.cup.mass\n", "two columns 'scene.cup.mass'"),
+    ],
 )  # fmt: skip
 def test_what_is_not_the_csv_of_a_sweep_is_told_at_its_line(tmp_path: Path, text: str, cause: str) -> None:
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(InvalidInput, match=cause):
         compare_sweeps(tmp_path / "a.csv", written(tmp_path / "b.csv", [True]), alpha=0.05)
+
+
+def test_differences_of_rounding_are_no_change(tmp_path: Path) -> None:
+    a, b = written(tmp_path / "a", [True] * 20), written(tmp_path / "b", [True] * 20, margin=0.01 * (1.0 - 1e-9))
+    found = compare_sweeps(a, b, alpha=0.05, with_margins=True)
+    assert {(of.less, of.more, of.p) for of in found.shifts.values()} == {(0, 0, 1.0)}
+    assert found.exit_code == ExitCode.PASSED
+
+
+def test_margins_keep_the_order_of_their_columns_where_the_first_sample_has_none(tmp_path: Path) -> None:
+    a, b = written(tmp_path / "a", [False, True]), written(tmp_path / "b", [False, True])
+    assert [*compare_sweeps(a, b, alpha=0.05).shifts] == ["smallest_margin", "margin near [m]"]
+
+
+def test_names_of_a_file_reach_a_terminal_escaped(tmp_path: Path) -> None:
+    a = written(tmp_path / "a", [True] * 3)
+    a.write_text(a.read_text().replace("near", "\x1b[31mnear"))
+    assert "\\x1b[31mnear" in render_text(compare_sweeps(a, a, alpha=0.05))
+
+
+def test_an_option_of_the_other_form_is_refused(tmp_path: Path, call_cli: RunCli) -> None:
+    written(tmp_path / "a.csv", [True] * 3)
+    ran = call_cli("sweep", "a.csv", "a.csv", "--html", "page.html", "--samples", "3", cwd=tmp_path)
+    assert ran.code == ExitCode.USAGE
+    assert "a comparison of two sweeps has no --samples and no --html" in ran.err
+    ran = call_cli("sweep", "task.yaml", "--margins", cwd=tmp_path)
+    assert ran.code == ExitCode.USAGE
+    assert "a sweep of a task has no --margins" in ran.err

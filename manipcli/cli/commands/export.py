@@ -37,6 +37,12 @@ def export(
         Path | None,
         typer.Option("--rerun", metavar="FILE.rrd", help="Log: recording for Rerun (needs manipcli[rerun])."),
     ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate", metavar="HZ", help="With --rerun: samples per second; 'inf' takes every tick [default: 50]."
+        ),
+    ] = None,
     rosbag2: Annotated[
         Path | None, typer.Option("--rosbag2", metavar="DIR", help="Log: folder that `ros2 bag` reads.")
     ] = None,
@@ -68,7 +74,7 @@ def export(
         ("--set", overrides or None),
     )
     log = is_log(file)
-    _check_fit(file, of_task if log else of_log, log=log)
+    _check_fit(file, of_task if log else (*of_log, ("--rate", rate)), log=log)
     if all(path is None for _, path in (*of_log, ("--ros2", ros2))):
         expected = [option for option, _ in of_log] if log else ["--ros2"]
         raise InvalidInput([Diagnostic("USE096", f"nothing to write: expected {' or '.join(expected)}")])
@@ -78,7 +84,7 @@ def export(
     if log:
         from manipcli.cli.log_exports import LogExports
 
-        exports = LogExports(foxglove=foxglove, rerun=rerun, rosbag2=rosbag2, glb=glb, files=files)
+        exports = LogExports(foxglove=foxglove, rerun=rerun, rosbag2=rosbag2, glb=glb, files=files, rate=rate)
         with one_file(file) as whole:
             return exports.write(whole, package_path=tuple(package_path or ()), allow_outside=allow_outside)
     assert ros2 is not None

@@ -137,7 +137,7 @@ def replay(
             package_path=tuple(package_path or ()),
             allow_outside=allow_outside,
         )
-        _show(playback, pictures, html, rerun=rerun, port=port, open_=open_)
+        _show(log, playback, pictures, html, rerun=rerun, port=port, open_=open_)
     return ExitCode.PASSED
 
 
@@ -170,7 +170,7 @@ def _check_rerun(page: Sequence[tuple[str, object]]) -> None:
 
 
 def _show(
-    playback: Playback, pictures: Pictures, html: Path | None, *, rerun: bool, port: int | None, open_: bool
+    log: Path, playback: Playback, pictures: Pictures, html: Path | None, *, rerun: bool, port: int | None, open_: bool
 ) -> None:
     """Prints what is missing and writes the requested files; without any, serves the page until Ctrl-C."""
     if playback.lost is not None:
@@ -189,7 +189,7 @@ def _show(
         console.result(str(html))
     pictures.make(playback)
     if rerun:
-        _open_rerun(playback)
+        _open_rerun(log, playback)
     elif html is None and pages:
         from manipcli.replay.page_server import PageServer
 
@@ -197,16 +197,17 @@ def _show(
             stay(server.url, open_=open_)
 
 
-def _open_rerun(playback: Playback) -> None:
+def _open_rerun(log: Path, playback: Playback) -> None:
     """Opens the viewer on a temporary recording, until its window is closed or Ctrl-C."""
     from tempfile import TemporaryDirectory
 
+    from manipcli.logs.rerun import write_rerun
+    from manipcli.replay.playback import RATE
     from manipcli.replay.rerun.viewer import show
-    from manipcli.replay.rerun.write_recording import write_recording
 
     with TemporaryDirectory(prefix="manipcli-") as folder:
         recording = Path(folder) / "run.rrd"
-        console.not_drawn(write_recording(recording, playback))
+        console.not_drawn(write_rerun(recording, log, playback, rate=RATE))
         try:
             console.talk("Close the window of Rerun, or press Ctrl-C, to stop.")
             show(recording)

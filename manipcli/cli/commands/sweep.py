@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Keep = Literal["none", "failed", "all"]
 DesignName = Literal["random", "grid", "lhs", "sobol", "oat", "saltelli"]
+_OF_COMPARISONS = frozenset({"alpha", "margins"})
+_OF_BOTH = frozenset({"paths", "format_", "quiet"})
 FOLDER = Path("runs") / "sweep"
 PERIOD = 0.1
 """[s] between two drawings of the live line."""
@@ -34,6 +36,7 @@ QUIET_PERIOD = 20.0
 
 
 def sweep(
+    context: typer.Context,
     paths: Annotated[
         list[Path], typer.Argument(metavar="TASK | A.csv B.csv", help="Task file, or two sweeps.", show_default=False)
     ],
@@ -97,7 +100,9 @@ def sweep(
     """
     from manipcli.cli.interrupts import Interrupts
 
-    if len(paths) == 2 and all(path.suffix == ".csv" for path in paths):
+    comparing = len(paths) == 2 and all(path.suffix == ".csv" for path in paths)
+    _refuse_without_effect(context, comparing=comparing)
+    if comparing:
         return _compare(*paths, alpha=alpha, margins=margins, format_=format_)
     if len(paths) != 1:
         message = f"expected a task, or two CSV files of sweeps; got {len(paths)} files"
@@ -159,6 +164,26 @@ def sweep(
         console.result(_text(analysis))
     _write(analysis, csv, html)
     return ExitCode.PASSED if swept.rate.share >= needed else ExitCode.FAILED
+
+
+def _refuse_without_effect(context: typer.Context, *, comparing: bool) -> None:
+    """
+    Raises:
+        InvalidInput: an option of a sweep is given for a comparison, or one of a comparison for a sweep.
+    """
+    given = [
+        max(parameter.opts, key=len)
+        for parameter in context.command.params
+        if parameter.name is not None
+        and parameter.name not in _OF_BOTH
+        and (parameter.name in _OF_COMPARISONS) is not comparing
+        and (source := context.get_parameter_source(parameter.name)) is not None
+        and source.name == "COMMANDLINE"
+    ]
+    if given:
+        what = "a comparison of two sweeps" if comparing else "a sweep of a task"
+        message = f"{what} has no {' and no '.join(given)}"
+        raise InvalidInput([Diagnostic("USE189", message, hint="remove it; `manipcli sweep --help` lists the options")])
 
 
 def _cluster(sampling: Sampling, path: Path, settings: Settings, scheduler: str, *, count: int, keep: Keep) -> Backend:

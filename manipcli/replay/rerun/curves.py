@@ -34,16 +34,16 @@ class Chart:
 
 
 def log_curves(
-    to: rr.RecordingStream, playback: Playback, lines: Timelines
+    to: rr.RecordingStream, playback: Playback, numbers: tuple[PlotTable, ...], lines: Timelines
 ) -> tuple[tuple[Chart, ...], dict[str, tuple[Chart, ...]]]:
-    """Logs all curves.
+    """Logs all curves; `numbers`: of sensors.
 
     Returns:
         The charts of all joints and of the other quantities; and by joint the charts of this joint with its limits.
     """
     whole: list[Chart] = []
     joints: dict[str, dict[str, tuple[str, str]]] = {}
-    for table in playback.curves():
+    for table in (*playback.curves(), *numbers):
         by_unit: dict[str, list[str]] = {}
         for k, (column, unit) in enumerate(zip(table.columns, table.units, strict=True)):
             path = _path(table, column)

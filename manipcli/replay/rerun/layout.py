@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from manipcli.replay.camera import Camera
 from manipcli.replay.rerun.bodies import LAYERS
 from manipcli.replay.rerun.curves import Chart
+from manipcli.replay.rerun.sensors import Views
 from manipcli.replay.rerun.story import EVENTS, VERDICT
 from manipcli.replay.rerun.timelines import TIME
 
@@ -20,15 +21,18 @@ MOST_JOINTS = 32
 MOST_LEGEND = 8
 """Curves with a legend; one of more would hide them. The name of a curve is shown under the pointer."""
 
+MOST_BESIDE = 4
+"""Pictures beside each other; more are tabs."""
+
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What a recording has to show: the first view, charts, charts by joint, and entities of pictures."""
+    """What a recording has to show: the first view, charts, charts by joint, and views of sensors."""
 
     camera: Camera
     charts: tuple[Chart, ...]
     joints: dict[str, tuple[Chart, ...]]
-    pictures: tuple[str, ...]
+    views: Views
     has_steps: bool
 
 
@@ -47,12 +51,13 @@ def layout(contents: Contents) -> rrb.Blueprint:
     )
     left: list[rrb.View | rrb.Container] = [seen]
     shares = [6.0]
-    if contents.pictures:
-        left.append(
-            rrb.Horizontal(
-                *(rrb.Spatial2DView(origin=path, name=path.removeprefix("/sensors/")) for path in contents.pictures)
-            )
-        )
+    sensors: list[rrb.View | rrb.Container] = [
+        rrb.Spatial2DView(origin=camera, contents=[path], name=_name(path, camera))
+        for path, camera in contents.views.pictures.items()
+    ]
+    sensors += (rrb.TensorView(origin=path, name=path.removeprefix("/sensors/")) for path in contents.views.tensors)
+    if sensors:
+        left.append(rrb.Horizontal(*sensors) if len(sensors) <= MOST_BESIDE else rrb.Tabs(*sensors))
         shares.append(3.0)
     if contents.has_steps:
         left.append(rrb.StateTimelineView(origin="/steps", name="steps"))
@@ -82,3 +87,8 @@ def _view(chart: Chart) -> rrb.TimeSeriesView:
 
     legend = rrb.PlotLegend(visible=len(chart.paths) <= MOST_LEGEND)
     return rrb.TimeSeriesView(origin="/", contents=list(chart.paths), name=chart.title, plot_legend=legend)
+
+
+def _name(path: str, camera: str) -> str:
+    """`kinect/depth`"""
+    return camera.rpartition("/")[2] + path.removeprefix(camera)

@@ -34,6 +34,12 @@ class Timelines:
             found.append(rr.TimeColumn(TICK, sequence=np.rint(seconds / self.period).astype(np.int64)))
         return found
 
+    def set(self, to: rr.RecordingStream, time: float) -> None:
+        """The time [s] of what is logged next."""
+        to.set_time(TIME, duration=np.timedelta64(round(time * 1e9), "ns"))
+        if self.period is not None:
+            to.set_time(TICK, sequence=round(time / self.period))
+
 
 def changes(values: Array, grain: float) -> npt.NDArray[np.intp]:
     """Indices of the rows of (T, ...) that differ from the row before, the first included, in multiples of `grain`.

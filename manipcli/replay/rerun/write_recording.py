@@ -17,16 +17,21 @@ from manipcli.replay.rerun.bodies import log_bodies
 from manipcli.replay.rerun.curves import log_curves
 from manipcli.replay.rerun.forces import log_forces
 from manipcli.replay.rerun.layout import Contents, layout
+from manipcli.replay.rerun.measured import Measured
+from manipcli.replay.rerun.sensors import log_sensors
 from manipcli.replay.rerun.story import log_story
 from manipcli.replay.rerun.timelines import Timelines
 
+NOTHING = Measured(pictures=iter(()))
 
-def write_recording(path: Path, playback: Playback) -> tuple[str, ...]:
+
+def write_recording(path: Path, playback: Playback, measured: Measured = NOTHING) -> tuple[str, ...]:
     """Writes a run.
 
     Args:
         path: the file, replaced when it is complete.
         playback: the run.
+        measured: what its sensors measured.
 
     Returns:
         What is not drawn, one line each.
@@ -55,9 +60,10 @@ def write_recording(path: Path, playback: Playback) -> tuple[str, ...]:
         to.send_recording_name(playback.name)
         log_bodies(to, playback, drawing, poses, lines, floors)
         log_forces(to, playback, Forces(playback, poses), lines)
-        charts, joints = log_curves(to, playback, lines)
+        charts, joints = log_curves(to, playback, measured.numbers, lines)
+        views = log_sensors(to, measured, lines)
         log_story(to, playback, lines)
-        contents = Contents(camera=camera, charts=charts, joints=joints, pictures=(), has_steps=bool(playback.steps))
+        contents = Contents(camera=camera, charts=charts, joints=joints, views=views, has_steps=bool(playback.steps))
         to.send_blueprint(layout(contents), make_active=True, make_default=True)
         to.disconnect()  # writes what is still waiting
     return drawing.missing

@@ -64,7 +64,10 @@ def table(
     Columns named in `numbers` are right-aligned.
     """
     right = [header in numbers for header in headers]
-    head = [element("th", name, class_="n" if is_n else None) for name, is_n in zip(headers, right, strict=True)]
+    head = [
+        element("th" if name.strip() else "td", name, class_="n" if is_n else None)
+        for name, is_n in zip(headers, right, strict=True)
+    ]
     body = [
         element(
             "tr",
@@ -76,7 +79,10 @@ def table(
         for row in rows
     ]
     whole = element("table", element("thead", element("tr", *head)), element("tbody", *body))
-    return element("div", whole, class_="scroll stacks" if stacks else "scroll")
+    # What scrolls takes the focus, so that keys scroll it.
+    return element(
+        "div", whole, class_="scroll stacks" if stacks else "scroll", tabindex="0", role="group", aria_label="table"
+    )
 
 
 def image(picture: Picture, label: str) -> Markup:
