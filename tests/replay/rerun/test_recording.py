@@ -43,6 +43,7 @@ steps:
   - wait: 0.3 s
 expect:
   - duration: {{below: 60 s}}
+  - always: {{near: {{object: block, to: start, within: 5 cm}}}}
 """
 Rows = dict[str, list[object]]
 
@@ -203,6 +204,14 @@ def test_texts_of_a_log_are_shown_as_they_are(playback: Playback, tmp_path: Path
     write_recording(path, replace(playback, name=evil, steps=steps, notes=(evil,)))
     (page,) = _read(path)["/verdict"]["TextDocument:text"][0]  # type: ignore[misc]
     assert "![" not in page and "\n# head" not in page and "<b>" not in page.replace("\\<b", "")
+
+
+def test_a_margin_is_smallest_where_the_verdict_says(playback: Playback, entities: dict[str, Rows]) -> None:
+    (margin,) = (one for one in playback.margins if one.outcome.name == "near")
+    rows = entities["/curves/margins/near"]
+    values = [value for (value,) in rows["Scalars:scalars"]]  # type: ignore[misc]
+    assert min(values) == pytest.approx(margin.outcome.relative)
+    assert _seconds(rows["time"][int(np.argmin(values))]) == pytest.approx(margin.outcome.at, abs=0.02)
 
 
 def test_a_second_run_is_another_recording(playback: Playback, written: Path, tmp_path: Path) -> None:
