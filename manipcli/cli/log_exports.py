@@ -42,9 +42,9 @@ class LogExports:
         _check_ending("--rerun", self.rerun, ".rrd")
         _check_rate(self.rate, self.rerun)
         if self.rerun is not None:
-            from manipcli.replay.rerun.installed import check_installed
+            from manipcli.replay.rerun import installed
 
-            check_installed("--rerun")
+            installed.check_installed("--rerun")
         if self.rosbag2 is not None:
             from manipcli.record.foreign.bag import write_bag
 
@@ -52,9 +52,9 @@ class LogExports:
             console.talk(f"{number_of(len(topics.all), 'topic')}, {number_of(topics.count, 'message')}")
             console.result(str(self.rosbag2))
         if self.foxglove is not None:
-            from manipcli.logs.foxglove.layout import check_installed
+            from manipcli.logs.foxglove import layout
 
-            check_installed()
+            layout.check_installed()
         if any(path is not None for path in (self.foxglove, self.glb, self.rerun)):
             from manipcli.logs.replay import open_playback
             from manipcli.replay.playback import RATE

@@ -64,4 +64,4 @@ def _output(report: CaseReport) -> Markup | None:
         file.seek(max(0, size - LONGEST))
         text = file.read().decode("utf-8", "replace")
     lines = [element("div", line) for line in text.splitlines()]
-    return element("section", element("h2", "Process output"), element("pre", *lines, class_="scroll"))
+    return element("section", element("h2", "Process output"), element("pre", *lines, class_="scroll", tabindex="0"))

@@ -79,7 +79,10 @@ def table(
         for row in rows
     ]
     whole = element("table", element("thead", element("tr", *head)), element("tbody", *body))
-    return element("div", whole, class_="scroll stacks" if stacks else "scroll")
+    # What scrolls takes the focus, so that keys scroll it.
+    return element(
+        "div", whole, class_="scroll stacks" if stacks else "scroll", tabindex="0", role="group", aria_label="table"
+    )
 
 
 def image(picture: Picture, label: str) -> Markup:

@@ -70,7 +70,7 @@ function buildViews() {
   const button = (text, title, press) => {
     const made = element(bar, "button", "", text);
     [made.type, made.title] = ["button", title];
-    made.setAttribute("aria-label", title);
+    if (!/\w/.test(text)) made.setAttribute("aria-label", title);
     made.addEventListener("click", () => { press(made); refresh(); });
     return made;
   };
