@@ -18,7 +18,7 @@ from manipcli.sweep.analysis import Analysis, Influence, Spread
 from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.page_data import page_data
 from manipcli.sweep.results import SampleResult
-from manipcli.sweep.text import NAMED, interval_text, percent
+from manipcli.sweep.text import NAMED, SAME, interval_text, percent
 
 BINS: Final = 24
 """Bars of a histogram."""
@@ -88,7 +88,10 @@ def _plots(analysis: Analysis) -> Markup | None:
     def choice(name: str, label: str) -> Markup:
         return element("label", f"{label} ", element("select", id=name))
 
-    about = "Each point is a sample: filled if it passed, a cross if not. Click one for its values and its command."
+    about = (
+        "Each point is a sample: filled if it passed, a cross if not. Click one for its values and its command. The "
+        "smallest margin is drawn within ±1 tolerance, at −1 where a step failed."
+    )
     return element(
         "section",
         heading("samples", "Samples", about),
@@ -111,6 +114,8 @@ def _plots(analysis: Analysis) -> Markup | None:
 def _influences(analysis: Analysis) -> Markup | None:
     if not analysis.influences:
         return None
+    if analysis.indistinct:
+        return element("section", heading("influence", "What matters", SAME))
     headers: tuple[str, ...]
     if analysis.sweep.sampling.design.word == "oat":
         about = "How far each number can go from its value in the task, all others as written. Margins in tolerances."
