@@ -42,16 +42,20 @@ class LogExports:
         _check_ending("--rerun", self.rerun, ".rrd")
         _check_rate(self.rate, self.rerun)
         if self.rerun is not None:
-            from manipcli.replay.rerun.installed import check_installed
+            from manipcli.replay.rerun import installed
 
-            check_installed("--rerun")
+            installed.check_installed("--rerun")
         if self.rosbag2 is not None:
             from manipcli.record.foreign.bag import write_bag
 
             topics = write_bag(log, self.rosbag2)
             console.talk(f"{number_of(len(topics.all), 'topic')}, {number_of(topics.count, 'message')}")
             console.result(str(self.rosbag2))
-        if self.glb is not None or self.rerun is not None:
+        if self.foxglove is not None:
+            from manipcli.logs.foxglove import layout
+
+            layout.check_installed()
+        if any(path is not None for path in (self.foxglove, self.glb, self.rerun)):
             from manipcli.logs.replay import open_playback
             from manipcli.replay.playback import RATE
 
@@ -61,6 +65,11 @@ class LogExports:
                 console.talk(f"the log is incomplete: {playback.lost}")
             for note in playback.notes:
                 console.talk(f"note: {note}")
+            if self.foxglove is not None:
+                from manipcli.logs.foxglove.folder import write_folder
+
+                console.not_drawn(write_folder(self.foxglove, log, playback))
+                console.result(str(self.foxglove))
             if self.glb is not None:
                 _write_glb(playback, self.glb)
             if self.rerun is not None:

@@ -6,6 +6,7 @@ line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schem
 
 from __future__ import annotations
 
+from manipcli.record.foxglove_definitions import FOXGLOVE
 from manipcli.record.parameter_schemas import PARAMETERS
 from manipcli.record.rosapi_definitions import ROSAPI
 from manipcli.record.simulation_schemas import SIMULATION
@@ -33,6 +34,7 @@ TWIST = "geometry_msgs/msg/TwistStamped"
 JOINT_JOG = "control_msgs/msg/JointJog"
 TRIGGER = "std_srvs/srv/Trigger"
 LIVE_COMMAND = "manipcli_msgs/msg/LiveCommand"
+SCENE_UPDATE = "foxglove_msgs/msg/SceneUpdate"
 
 _CONTACT = (
     "# Two touching parts: names of scene bodies, or robot/<link>; a <= b.\n"
@@ -303,6 +305,7 @@ DEFINITIONS: dict[str, str] = {
     **PARAMETERS,
     **SIMULATION,
     **ROSAPI,
+    **FOXGLOVE,
     "controller_manager_msgs/ListControllerTypes_Request": "",
     "controller_manager_msgs/ListControllerTypes_Response": "string[] types\nstring[] base_classes\n",
     "controller_manager_msgs/ListHardwareInterfaces_Request": "",

@@ -22,6 +22,10 @@ OTHER: Final = "#d7dce2"
 """Of reasons beyond the colours."""
 
 
+LEAST_SHARE: Final = 0.6
+"""Least ratio of the sides of what is shown."""
+
+
 @dataclass(frozen=True, slots=True)
 class Layer:
     """A map of numbers (rows of y, columns of x); NaN where there is none. `top`: end of the colours; None: largest."""
@@ -162,8 +166,10 @@ def _extent(found: Map) -> tuple[float, float, float, float]:
 
 
 def _limits(found: Map) -> tuple[Array, Array]:
-    """Lower and upper corner of what is shown: the grid, the robot's base, and a margin."""
+    """Lower and upper corner of what is shown: the grid, the robot's base, and a margin; never a narrow strip."""
     x0, x1, y0, y1 = _extent(found)
     points = np.array([[x0, y0], [x1, y1], found.base])
-    margin = 0.04 * float(np.ptp(points, axis=0).max())
-    return points.min(axis=0) - margin, points.max(axis=0) + margin
+    size = np.ptp(points, axis=0)
+    half = np.maximum(size, LEAST_SHARE * size.max()) / 2.0 + 0.04 * size.max()
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    return middle - half, middle + half

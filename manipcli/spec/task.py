@@ -90,6 +90,11 @@ class TaskSpec(Model):
         description="Values that `--sample N` draws, by path as for `--set`; `*` matches every name: "
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
+    sample: int | None = Field(
+        None,
+        ge=0,
+        description="Sample of `vary` that a run uses without `--sample`. Default: none, the task as written.",
+    )
     baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")
     saturation: StrictBool | Annotated[Share, Field(gt=0, le=1)] = Field(
         True,

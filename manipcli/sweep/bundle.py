@@ -49,12 +49,6 @@ class Bundle:
     task: str
     package_path: tuple[str, ...]
 
-    @property
-    def name(self) -> str:
-        """A hash of all of it."""
-        digest = hashlib.sha256(repr((self.task, sorted(self.files.items()), self.package_path)).encode())
-        return digest.hexdigest()[:16]
-
     def unpack(self, folder: Path) -> tuple[Path, tuple[Path, ...]]:
         """Writes the files below a folder; returns the task file and the folders of packages there."""
         for path, key in self.files.items():
@@ -98,11 +92,12 @@ def bundle_of(written: WrittenTask, opened: list[Path], path: Path) -> Bundle:
             message = f"'{key}' is an absolute path, which workers do not have: '{escape(file)}'"
             raise InvalidInput([Diagnostic("USE193", message, hint="write it relative to the file that names it")])
     meshes = mesh_files(written.task)
-    named = [path.absolute(), *(p for p in opened if p.suffix not in _PROGRAM and not _of_program(p)), *meshes.values()]
+    task = _plain(path)
+    named = [task, *(p for p in opened if p.suffix not in _PROGRAM and not _of_program(p)), *meshes.values()]
     links: dict[str, str] = {}
     files = {}
     contents = {}
-    for name in dict.fromkeys(Path(os.path.normpath(p)) for p in named):
+    for name in dict.fromkeys(map(_plain, named)):
         real = _followed(name, links)
         if real.is_file():
             data = real.read_bytes()
@@ -120,7 +115,7 @@ def bundle_of(written: WrittenTask, opened: list[Path], path: Path) -> Bundle:
                     marks.append(str(folder / mark))
     packages = [str(Path(os.path.realpath(folder))) for folder in written.options.get("package_path", ())]
     packages += sorted(set(_package_folders(meshes)))
-    return Bundle(contents, files, links, tuple(sorted(marks)), str(path.absolute()), tuple(packages))
+    return Bundle(contents, files, links, tuple(sorted(marks)), str(task), tuple(packages))
 
 
 def _package_folders(meshes: Mapping[str, Path]) -> Iterator[str]:
@@ -136,6 +131,11 @@ def _of_program(path: Path) -> bool:
     """Whether a file is part of manipcli or of the system, which the worker has."""
     own = Path(__file__).parents[1]
     return path.is_relative_to(own) or path.is_relative_to("/proc") or path.is_relative_to(Path(sys.prefix) / "bin")
+
+
+def _plain(path: Path) -> Path:
+    """The absolute path without `..`, as tasks are loaded."""
+    return Path(os.path.normpath(path.absolute()))
 
 
 def _followed(path: Path, links: dict[str, str]) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import uuid
+from asyncio import CancelledError
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
@@ -29,6 +30,8 @@ AHEAD: Final = 3
 """Samples that are given to the cluster per thread of its workers: enough that none waits."""
 PERIOD: Final = 0.25
 """[s] between two looks at the samples."""
+ASKING: Final = 5.0
+"""[s] limit for an answer of the scheduler."""
 CONNECTING: Final = 60.0
 """[s] limit of the time without a scheduler."""
 _VERSION: Final = "__import__('manipcli.core.version', fromlist=['__version__']).__version__"
@@ -68,10 +71,12 @@ def cluster_backend(
 
 
 class _Cluster:
-    """A connection to a scheduler, which is made once more where it is lost."""
+    """A connection to a scheduler, which is restored where it is lost."""
 
     def __init__(self, address: str, plugin: SweepPlugin, beat: Callable[[], None]) -> None:
         self._address, self._plugin, self._beat = address, plugin, beat
+        self._pending: dict[Future, int] = {}
+        self._changed = Event()
         self._client = self._connected()
 
     def close(self) -> None:
@@ -79,53 +84,71 @@ class _Cluster:
         with suppress(Exception):  # the scheduler may be gone
             self._client.cancel([*self._pending], force=True)
             self._client.unregister_worker_plugin(self._plugin.name)
-        self._client.close(timeout=5)
+        with suppress(OSError):
+            self._client.close(timeout=ASKING)
 
     def answers(self, numbers: Iterable[int]) -> Generator[Answer, None, None]:
-        """The answers of the workers, as they come; a sample that was lost is given to another worker."""
+        """The answers of the workers, as they come; a sample that was lost is given to another worker.
+
+        Raises:
+            InvalidInput: there is no scheduler any more, or a worker has another version.
+            SweepStopped: a sample cannot be run.
+        """
         todo, killed = deque(numbers), Counter[int]()
         while todo or self._pending:
-            if self._client.status in ("closed", "closing"):
-                todo.extendleft(self._pending.values())
-                self._pending.clear()
-                self._client = self._connected()
-            self._submit(todo)
+            with suppress(OSError):  # the connection is lost, which its futures show
+                self._submit(todo)
             self._changed.wait(PERIOD)
             self._changed.clear()
             self._beat()
-            for future in [each for each in self._pending if each.done()]:
-                number = self._pending.pop(future)
-                if future.status == "finished":
-                    yield self._checked(number, future.result())
-                elif future.status == "error" and not _is_killed(future.exception()):
-                    raise SweepStopped(number, f"{type(future.exception()).__name__}: {future.exception()}")
-                else:
-                    killed[number] += future.status == "error"
+            done = {each: self._pending.pop(each) for each in [*self._pending] if each.done()}
+            finished = {each: number for each, number in done.items() if each.status == "finished"}
+            try:
+                answers = dict(zip(finished, self._client.gather([*finished]), strict=True))
+            except (OSError, CancelledError, KilledWorker):
+                answers = {}
+            for future, number in done.items():
+                if future in answers:
+                    yield self._checked(number, answers[future])
+                elif future.status == "error":
+                    error = future.exception(timeout=ASKING)
+                    if not isinstance(error, KilledWorker):
+                        raise SweepStopped(number, f"{type(error).__name__}: {error}")
+                    killed[number] += 1
                     if killed[number] < ATTEMPTS:
                         todo.appendleft(number)
                     else:
                         yield Answer(SampleResult(number, "crashed", "the worker was lost with this sample"))
+                else:
+                    todo.appendleft(number)
+            if self._client.status != "running" or len(answers) < len(finished) or any(map(_is_lost, done)):
+                todo.extendleft(self._pending.values())
+                self._pending.clear()
+                with suppress(OSError):
+                    self._client.close(timeout=1.0)
+                self._client = self._connected()
 
     def _submit(self, todo: deque[int]) -> None:
+        """
+        Raises:
+            OSError: the connection is lost.
+        """
         threads = sum(self._client.nthreads().values()) if self._client.status == "running" else 0
         while todo and len(self._pending) < AHEAD * threads:
-            number = todo.popleft()
-            key = f"manipcli-{self._plugin.name}-{number}-{uuid.uuid4().hex}"
-            future = self._client.submit(run_on_worker, self._plugin.name, number, key=key, pure=False)
+            key = f"manipcli-{todo[0]}-{uuid.uuid4().hex}"
+            future = self._client.submit(run_on_worker, self._plugin.name, todo[0], key=key, pure=False)
             future.add_done_callback(lambda _: self._changed.set())
-            self._pending[future] = number
+            self._pending[future] = todo.popleft()
 
     def _connected(self) -> Client:
         """
         Raises:
             InvalidInput: there is no scheduler, or a worker has another version.
         """
-        self._pending: dict[Future, int] = {}
-        self._changed = Event()
         deadline = time.monotonic() + CONNECTING
         while True:
             try:
-                return self._connected_once(max(1.0, deadline - time.monotonic()))
+                return self._connected_once()
             except OSError as error:  # also where the connection is lost meanwhile
                 if time.monotonic() < deadline:
                     self._beat()
@@ -134,14 +157,14 @@ class _Cluster:
                 message = f"there is no scheduler at '{escape(self._address)}': {escape(str(error))}"
                 raise InvalidInput([Diagnostic("USE191", message, hint="start one with `dask scheduler`")]) from None
 
-    def _connected_once(self, timeout: float) -> Client:
+    def _connected_once(self) -> Client:
         """
         Raises:
             InvalidInput: a worker has another version.
             OSError: there is no scheduler, or the connection was lost.
         """
         try:
-            client = Client(self._address, timeout=timeout, set_as_default=False)
+            client = Client(self._address, timeout=ASKING, set_as_default=False)
         except ValueError as error:
             message = f"'{escape(self._address)}' is not the address of a scheduler: {escape(str(error))}"
             raise InvalidInput([Diagnostic("USE191", message, hint="write tcp://HOST:PORT")]) from None
@@ -163,5 +186,6 @@ class _Cluster:
         return answer
 
 
-def _is_killed(error: object) -> bool:
-    return isinstance(error, KilledWorker)
+def _is_lost(future: Future) -> bool:
+    """Whether the connection was lost: nobody else cancels."""
+    return future.status in ("cancelled", "lost")

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, Final, Self
 
 from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.lock import Taken, lock
 from manipcli.core.text import escape, number_of, shorten
 from manipcli.core.version import __version__
 from manipcli.run.run_log import mesh_files
@@ -29,6 +30,7 @@ SYNC_PERIOD: Final = 2.0
 MOST_NAMED: Final = 4
 """Number of changes shown of a changed task."""
 URDF: Final = "URDF of the robot"
+VERSION: Final = "manipcli"
 Identity = Mapping[str, str]
 
 
@@ -38,7 +40,7 @@ def identity(written: WrittenTask) -> dict[str, str]:
     simulation = task.spec.simulation
     engine = ENGINES[simulation.engine]
     found = {
-        "manipcli": __version__,
+        VERSION: __version__,
         f"version of {engine.name}": engine.version(),
         "design": str(written.design),
         URDF: hashlib.sha256(task.robot.urdf.encode()).hexdigest(),
@@ -80,30 +82,45 @@ class Journal:
 
         Raises:
             InvalidInput: `resume`, and the file is of another task or version, or is not a journal; or there is an
-                unfinished journal, without `resume` and `force`.
+                unfinished journal, without `resume` and `force`; or another sweep is writing it.
             OSError: it cannot be written.
         """
         self.path = path
         self.results: dict[int, SampleResult] = {}
         self._synced = time.monotonic()
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and (resume or not force):
-            read, length = read_journal(path)
-            if resume:
-                _refuse_changed(path, read.whose, whose)
-                self.results = {result.number: result for result in read.results}
-            elif read.results and not read.complete:
-                message = f"'{path}' has {number_of(len(read.results), 'result')} of an unfinished sweep"
-                raise InvalidInput([Diagnostic("USE183", message, hint="add --resume, or --force to start over")])
-            else:
-                length = 0
-        else:
-            length = 0
-        self._file: IO[bytes] = path.open("r+b" if length else "wb")
-        self._file.truncate(length)
-        self._file.seek(length)
+        self._file: IO[bytes] = path.open("a+b")
+        try:
+            length = self._begun(whose, resume=resume, force=force)
+            self._file.truncate(length)
+        except BaseException:
+            self._file.close()
+            raise
         if not length:
             self._write({"journal": 1, "task": dict(whose)})
+
+    def _begun(self, whose: Identity, *, resume: bool, force: bool) -> int:
+        """Reads the results of an earlier sweep; returns the number of bytes that stay.
+
+        Raises:
+            InvalidInput: see `__init__`.
+        """
+        try:
+            lock(self._file.fileno())
+        except Taken:
+            message = f"another sweep is writing '{self.path}'"
+            raise InvalidInput([Diagnostic("USE194", message, hint="wait for its end, or add --folder DIR")]) from None
+        if force and not resume:
+            return 0
+        read, length = read_journal(self.path)
+        if resume:
+            _refuse_changed(self.path, read.whose, whose)
+            self.results = {result.number: result for result in read.results}
+            return length
+        if read.results and not read.complete:
+            message = f"'{self.path}' has {number_of(len(read.results), 'result')} of an unfinished sweep"
+            raise InvalidInput([Diagnostic("USE183", message, hint="add --resume, or --force to start over")])
+        return 0
 
     def __enter__(self) -> Self:
         return self
@@ -166,7 +183,7 @@ def read_journal(path: Path) -> tuple[Read, int]:
             else:
                 results.append(SampleResult.from_json(read))
                 complete = False
-    except (ValueError, KeyError, TypeError, AttributeError, StopIteration):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         message = f"'{path}' is not a journal of a sweep: line {number} is not one of its objects"
         raise InvalidInput([Diagnostic("USE184", message, hint="name another folder with --folder")]) from None
     return Read(whose, results, complete=complete), length

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final, get_args
 
 from manipcli.conditions.robustness import EDGE
@@ -106,21 +106,34 @@ class SampleResult:
             KeyError, TypeError, ValueError: the object is not of `to_json`.
         """
         number, margins, outcome = read["sample"], read["margins"], read["outcome"]
-        if not isinstance(number, int) or not isinstance(margins, list):
+        if type(number) is not int or number < 0 or not isinstance(margins, list):
             raise TypeError("not a result")
-        word = next(word for word in WORDS if word == outcome)
-        simulated = read["simulated"]
+        word = WORDS[WORDS.index(outcome)]  # ValueError for anything else
         return SampleResult(
             number,
             word,
             str(read["cause"]),
             str(read["step"]),
-            float(simulated) if isinstance(simulated, int | float) else None,
-            tuple(Margin(*margin) for margin in margins),
+            _number(read["simulated"]),
+            tuple(map(_margin, margins)),
         )
 
 
 WORDS: Final[tuple[CaseWord, ...]] = get_args(CaseWord)
+
+
+def _number(read: object) -> float | None:
+    if read is None:
+        return None
+    if not isinstance(read, float) and type(read) is not int:
+        raise TypeError("not a number")
+    return float(read)
+
+
+def _margin(read: object) -> Margin:
+    if not isinstance(read, list) or len(read) != len(fields(Margin)) or not isinstance(read[4], bool):
+        raise TypeError("not a margin")
+    return Margin(str(read[0]), str(read[1]), _number(read[2]), _number(read[3]), read[4])
 
 
 def result_of(report: CaseReport) -> SampleResult:

@@ -10,20 +10,31 @@ from pathlib import Path
 from manipcli.batch.discovery import read_case, shown_path
 from manipcli.batch.job import Job, Settings
 from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.units import readable
 from manipcli.task.designs import Design
 from manipcli.task.load_task import WrittenTask, load_written
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A number that a sweep varies: `scene.cup.at.0` for the first component of a list; `nominal` in SI."""
+    """A number that a sweep varies: `scene.cup.at.0` for the first component of a list.
+
+    Attributes:
+        name, path, component: the name, of a component of the list at the path, or None.
+        nominal: value in the file, in the SI `unit`.
+        dimension: index among the dimensions of the design.
+    """
 
     name: str
     path: str
     component: int | None
     nominal: float
+    unit: str
     dimension: int
-    """Index among the dimensions of the design."""
+
+    def text(self, value: float) -> str:
+        """A value in a readable unit: `80 g`."""
+        return readable(value, self.unit, digits=4).replace("-", "−")
 
 
 class Sampling:
@@ -78,7 +89,7 @@ class Sampling:
             for k, nominal in enumerate(quantity.nominal):
                 own = dimension if quantity.law.together else dimension + len([j for j in free if j < k])
                 name = f"{quantity.path}.{k}" if quantity.vector else quantity.path
-                column = Column(name, quantity.path, k if quantity.vector else None, float(nominal), own)
+                column = Column(name, quantity.path, k if quantity.vector else None, float(nominal), quantity.unit, own)
                 if (quantity.values(k) > 1 or self.design.word == "oat") and (drawn is None or quantity.path in drawn):
                     columns.append(column)
             dimension += len(free)

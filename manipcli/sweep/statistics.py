@@ -57,8 +57,8 @@ class Rate:
 class Correlation:
     """A rank correlation: `rho`, of `count` samples, and the largest |rho| that chance explains, `bound`.
 
-    The bound is for the largest of all numbers of a sweep: where none of them matters, one exceeds it in at most 5 % of
-    sweeps (normal approximation of Spearman's rho, Bonferroni).
+    The bound is for the largest of all correlations of a sweep, with margin and with passing: where no number matters,
+    one of them exceeds it in at most 5 % of sweeps (normal approximation of Spearman's rho, Bonferroni).
     """
 
     rho: float

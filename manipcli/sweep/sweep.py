@@ -70,6 +70,11 @@ class Sweep:
         return Rate(sum(result.passed for result in self.results), len(self.results))
 
     @property
+    def interval(self) -> tuple[float, float] | None:
+        """Of the rate, for as many random samples; None for a design whose samples are no estimate of that."""
+        return self.rate.interval if self.sampling.design.spreads else None
+
+    @property
     def missing(self) -> tuple[int, ...]:
         """Numbers of the samples that have no result."""
         there = {result.number for result in self.results}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -15,8 +16,9 @@ from manipcli.replay.player import POLICY
 from manipcli.report.html.markup import Markup, document, element, joined, link
 from manipcli.report.html.page_parts import heading, mark, table
 from manipcli.sweep.analysis import Analysis, Influence, Spread
+from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.results import SampleResult
-from manipcli.sweep.text import NAMED, percent
+from manipcli.sweep.text import NAMED, interval_text, percent
 
 BINS: Final = 24
 """Bars of a histogram."""
@@ -51,10 +53,9 @@ def render_page(analysis: Analysis, folder: Path) -> str:
 def _head(analysis: Analysis, *, good: bool) -> Markup:
     sweep = analysis.sweep
     rate = sweep.rate
-    least, most = rate.interval
     figures = [
         ("success rate", percent(rate.share)),
-        ("95 % interval", f"{percent(least)} to {percent(most)}"),
+        *([("95 % interval", interval_text(sweep.interval))] if sweep.interval is not None else []),
         ("design", str(sweep.sampling.design)),
         ("seed", str(sweep.sampling.seed)),
         ("numbers varied", str(len(analysis.columns))),
@@ -91,11 +92,19 @@ def _plots(analysis: Analysis) -> Markup | None:
     return element(
         "section",
         heading("samples", "Samples", about),
-        element("p", choice("margin", "margin"), class_="choices"),
-        element("div", class_="small", id="small"),
-        element("h3", "Two numbers"),
-        element("p", choice("first", "across"), choice("second", "up"), class_="choices"),
-        element("div", element("div", id="map"), element("aside", id="sample"), class_="map"),
+        element(
+            "div",
+            element(
+                "div",
+                element("p", choice("margin", "margin"), class_="choices"),
+                element("div", class_="small", id="small"),
+                element("h3", "Two numbers"),
+                element("p", choice("first", "across"), choice("second", "up"), class_="choices"),
+                element("div", id="map"),
+            ),
+            element("aside", id="sample"),
+            class_="explore",
+        ),
     )
 
 
@@ -103,6 +112,11 @@ def _influences(analysis: Analysis) -> Markup | None:
     if not analysis.influences:
         return None
     headers: tuple[str, ...]
+    if analysis.sweep.sampling.design.word == "oat":
+        about = "How far each number can go from its value in the task, all others as written. Margins in tolerances."
+        found = [one.levels.cells for one in analysis.influences if one.levels is not None]
+        levels = table(HEADERS, found, numbers=HEADERS[1:])
+        return element("section", heading("influence", "What matters", about), levels)
     if analysis.influences[0].indices is not None:
         about = (
             "Share of the variance of the smallest margin (within ±1 tolerance) that a number explains alone, and with "
@@ -112,8 +126,8 @@ def _influences(analysis: Analysis) -> Markup | None:
     else:
         about = (
             "Rank correlation of each number with the smallest margin, and with whether the sample passed. Where a "
-            "step failed, the sample ranks below all others. Where no number matters, one exceeds the bound in 5 % of "
-            "sweeps."
+            "step failed, the sample ranks below all others. Where no number matters, some correlation exceeds the "
+            "bound in at most 5 % of sweeps."
         )
         headers = ("number", "nominal", "with margin", "", "with passing", " ", "by chance up to", "  ")
     rows = [_influence_row(one) for one in analysis.influences]
@@ -122,15 +136,15 @@ def _influences(analysis: Analysis) -> Markup | None:
 
 
 def _influence_row(one: Influence) -> tuple[str, ...]:
-    head = (element("code", one.column.name), f"{one.column.nominal:.4g}")
+    head = (element("code", one.column.name), one.column.text(one.column.nominal))
     cells: list[str] = []
     if one.indices is not None:
         for index in (one.indices.first, one.indices.whole):
             low, high = index.interval
-            cells += [f"{index.value:.2f}", f"{low:.2f} to {high:.2f}"]
+            cells += [f"{index.value:.2f}".replace("-", "−"), f"{low:.2f} to {high:.2f}".replace("-", "−")]
         return (*head, *cells)
     for found in (one.correlation, one.passing):
-        cells += ["–", ""] if found is None else [f"{found.rho:+.2f}", _bar(found.rho, found.bound)]
+        cells += ["–", ""] if found is None else [_signed(found.rho), _bar(found.rho, found.bound)]
     bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "–")
     return (*head, *cells, bound, "matters" if one.matters else "")
 
@@ -144,8 +158,12 @@ def _bar(rho: float, bound: float) -> Markup:
         element("i", style=f"left:{left:.1f}%;width:{50.0 * abs(rho):.1f}%"),
         class_="rho",
         role="img",
-        aria_label=f"{rho:+.2f}",
+        aria_label=_signed(rho),
     )
+
+
+def _signed(rho: float) -> str:
+    return f"{rho:+.2f}".replace("-", "−")
 
 
 def _margins(analysis: Analysis) -> Markup | None:
@@ -250,7 +268,7 @@ def _data(analysis: Analysis, folder: Path) -> dict[str, object]:
                 "margins": [result.score, *(by_name.get(spread.name) for spread in telling)],
                 "values": [analysis.values[result.number][k] for k in order],
                 "command": _command(analysis, result),
-                "log": str(log) if log.exists() else "",
+                "replay": shlex.join(("manipcli", "replay", str(log))),
                 "link": link(log, folder) if log.exists() else "",
             }
         )
@@ -258,5 +276,5 @@ def _data(analysis: Analysis, folder: Path) -> dict[str, object]:
     strongest = sorted(range(len(columns)), key=lambda k: -passing[k])[:2]
     names = [{"name": "smallest margin, in tolerances", "unit": ""}]
     names += [{"name": spread.name, "unit": spread.unit} for spread in telling]
-    numbers = [{"name": column.name, "nominal": column.nominal} for column in columns]
+    numbers = [{"name": column.name, "nominal": column.nominal, "unit": column.unit} for column in columns]
     return {"numbers": numbers, "margins": names, "samples": samples, "map": strongest}

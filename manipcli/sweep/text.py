@@ -10,6 +10,7 @@ from manipcli.core.text import listed, number_of, shorten
 from manipcli.core.units import readable
 from manipcli.report.table import table
 from manipcli.sweep.analysis import Analysis, Influence
+from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.results import SampleResult
 from manipcli.sweep.statistics import SHARES, Rate
 from manipcli.sweep.sweep import Progress
@@ -25,21 +26,28 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def rate_text(rate: Rate) -> str:
-    """`194 of 200 passed: 97.0 % (95 % interval 93.6 % to 98.6 %)`."""
-    least, most = rate.interval
-    interval = f"95 % interval {percent(least)} to {percent(most)}"
-    return f"{rate.passed} of {rate.count} passed: {percent(rate.share)} ({interval})"
+def rate_text(rate: Rate, interval: tuple[float, float] | None) -> str:
+    """`194 of 200 passed: 97.0 % (95 % interval 93.6 % to 98.6 %)`; the interval where there is one."""
+    text = f"{rate.passed} of {rate.count} passed: {percent(rate.share)}"
+    return text if interval is None else f"{text} (95 % interval {interval_text(interval)})"
+
+
+def interval_text(interval: tuple[float, float]) -> str:
+    """`93.6 % to 98.6 %`."""
+    return " to ".join(map(percent, interval))
 
 
 def progress_text(progress: Progress) -> str:
     """`120 of 200: 118 passed, 2 failed, 3.1 per second, 26 s left`."""
     failed = progress.done - progress.passed
     text = f"{progress.done} of {progress.asked}: {progress.passed} passed, {failed} failed"
-    if progress.left is None:
-        return text
-    pace = f"{progress.rate:.1f} per second" if progress.rate >= 0.95 else f"{1.0 / progress.rate:.1f} s per sample"
-    return f"{text}, {pace}, {_time(progress.left)} left"
+    return text if progress.left is None else f"{text}, {pace_text(progress.rate, progress.left, of='sample')}"
+
+
+def pace_text(rate: float, left: float, *, of: str) -> str:
+    """`3.1 per second, 26 s left`; `rate` per second, time `left` [s], `of` what."""
+    pace = f"{rate:.1f} per second" if rate >= 0.95 else f"{1.0 / rate:.1f} s per {of}"
+    return f"{pace}, {_time(left)} left"
 
 
 def render_text(analysis: Analysis) -> str:
@@ -47,9 +55,7 @@ def render_text(analysis: Analysis) -> str:
     sweep = analysis.sweep
     sampling = sweep.sampling
     least = f"design {sampling.design}, seed {sampling.seed}, {number_of(len(analysis.columns), 'number')} varied"
-    lines = [f"{sampling.task}: {rate_text(sweep.rate)}", least]
-    if sampling.design.word != "random":
-        lines.append("the interval holds for random samples; these cover the space evenly or follow its axes")
+    lines = [f"{sampling.task}: {rate_text(sweep.rate, sweep.interval)}", least]
     if sweep.missing:
         missing = listed(map(str, sweep.missing), most=NAMED)
         lines.append(f"missing: {len(sweep.missing)} of {sweep.asked} samples: {missing}")
@@ -78,7 +84,8 @@ def sample_text(result: SampleResult) -> str:
     tightest = min(known, key=lambda margin: margin.relative or 0.0, default=None)
     if tightest is None:
         return f"sample {result.number} passed"
-    return f"sample {result.number} passed: {tightest.name} by {readable(tightest.value or 0.0, tightest.unit)}"
+    amount = readable(tightest.value or 0.0, tightest.unit)
+    return f"sample {result.number} passed: {tightest.name} by {amount}, {tightest.relative:.2f} of its tolerance"
 
 
 def _margins(analysis: Analysis) -> str:
@@ -95,6 +102,9 @@ def _margins(analysis: Analysis) -> str:
 def _influences(analysis: Analysis) -> str:
     """What matters for the smallest margin."""
     headers: tuple[str, ...]
+    if analysis.sweep.sampling.design.word == "oat":
+        known = [one.levels.cells for one in analysis.influences if one.levels is not None]
+        return table(HEADERS, known, right=(HEADERS[1], *HEADERS[4:]))
     if analysis.influences[0].indices is not None:
         headers = ("number", "first-order index", "95 % interval", "total index", "95 % interval ")
         rows = [(one.column.name, *_index_cells(one)) for one in analysis.influences]
@@ -104,9 +114,9 @@ def _influences(analysis: Analysis) -> str:
     for one in analysis.influences:
         cells = ["-" if found is None else f"{found.rho:+.2f}" for found in (one.correlation, one.passing)]
         bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "-")
-        nominal = f"{one.column.nominal:.4g}"
+        nominal = one.column.text(one.column.nominal)
         bar = "█" * round(one.size * _BAR) if one.matters else ""
-        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells, bound)), bar))
+        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells)), bound, bar))
     return table(headers, rows, right=headers[1:5])
 
 
@@ -124,7 +134,6 @@ def render_json(analysis: Analysis) -> str:
     """The sweep as one JSON object."""
     sweep = analysis.sweep
     sampling = sweep.sampling
-    least, most = sweep.rate.interval
     return json.dumps(
         {
             "task": sampling.task,
@@ -134,7 +143,7 @@ def render_json(analysis: Analysis) -> str:
             "passed": sweep.rate.passed,
             "count": sweep.rate.count,
             "rate": sweep.rate.share,
-            "interval": [least, most],
+            "interval": sweep.interval,
             "missing": list(sweep.missing),
             "outcomes": dict(sorted(analysis.outcomes.items())),
             "expectations": [
@@ -165,10 +174,12 @@ def _number_object(influence: Influence) -> Mapping[str, object]:
     return {
         "name": influence.column.name,
         "nominal": influence.column.nominal,
+        "unit": influence.column.unit,
         "correlation": found.rho if found is not None else None,
         "correlation_with_passing": influence.passing.rho if influence.passing is not None else None,
         "bound": found.bound if found is not None else None,
         "first_order": None if indices is None else {"value": indices.first.value, "interval": indices.first.interval},
+        "one_at_a_time": None if influence.levels is None else influence.levels.to_json(),
         "total": None if indices is None else {"value": indices.whole.value, "interval": indices.whole.interval},
     }
 

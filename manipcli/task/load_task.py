@@ -52,8 +52,8 @@ class LoadOptions(FileOptions, total=False):
     """`FileOptions`, and the sample of the task.
 
     Attributes:
-        sample: index of a sample of `vary:`, from 0; None for the task as written. Values set by `overrides` are not
-            drawn; their `offset` or `scale` is, relative to the value set.
+        sample: index of a sample of `vary:`, from 0; None for `sample:` of the file, by default the task as written.
+            Values set by `overrides` are not drawn; their `offset` or `scale` is, relative to the value set.
     """
 
     sample: int | None
@@ -90,11 +90,12 @@ class WrittenTask:
         return drawn_sample(self.task, self.varied, number, design=self.design, overrides=overrides)
 
     def sample(self, number: int | None) -> Task:
-        """A sample; None for the task as written.
+        """A sample; None for the `sample:` of the file, or the task as written if it has none.
 
         Raises:
             InvalidInput: the sample does not exist, or a drawn value is refused.
         """
+        number = self.task.spec.sample if number is None else number
         if number is None:
             return self.task
         return draw_sample(

@@ -79,6 +79,7 @@ class Varied:
         whole: whether it is a whole number.
         how: `offset`, `scale`, or "" if the value itself is drawn.
         law: the distribution.
+        unit: SI unit of the value; "" for a plain number, and where the joint decides between two.
     """
 
     key: str
@@ -90,6 +91,7 @@ class Varied:
     whole: bool
     how: str
     law: Law
+    unit: str = ""
 
     @property
     def only_world(self) -> bool:
@@ -249,7 +251,9 @@ def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Var
     if law.word == "normal":
         law = replace(law, between=tuple(_between(leaf.bounds, value, how) for value in nominal))
         _refuse_too_rare(law, path, how)
-    return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law)
+    own = leaf.unit.dimensions if leaf.unit is not None else ()
+    unit = own[0].symbol if len(own) == 1 else ""
+    return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law, unit)
 
 
 def _refuse_too_large(law: Law, nominal: Sequence[float], how: str) -> None:

@@ -20,8 +20,8 @@ ROOT = Path(__file__).parents[2]
         ((), "USE096", "expected --foxglove or --rerun or --rosbag2 or --glb or --files"),
         (("--ros2", "out"), "USE097", "--ros2 needs a robot or a task"),
         (("--glb", "run.glb", "--seed", "1", "--set", "a=1"), "USE097", "--seed, --set need a robot or a task"),
+        (("--glb", "."), "USE082", "is a folder"),
         (("--glb", "run.gltf"), "USE098", "'run.gltf' is not a .glb file"),
-        (("--glb", "no/run.glb"), "USE082", "folder 'no' does not exist"),
     ],
 )
 def test_a_log_is_not_exported_as_something_else(

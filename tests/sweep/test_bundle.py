@@ -10,7 +10,7 @@ import pytest
 from manipcli.batch.job import Settings
 from manipcli.core.errors import InvalidInput
 from manipcli.core.opened_files import opened_by
-from manipcli.sweep.bundle import bundle_of
+from manipcli.sweep.bundle import bundle_of, bundled
 from manipcli.sweep.journal import changes, identity
 from manipcli.sweep.sampling import Sampling
 
@@ -61,3 +61,16 @@ def test_an_absolute_path_cannot_travel(tmp_path: Path) -> None:
     task.write_text(TASK.replace("..", str(ROOT)))
     with pytest.raises(InvalidInput, match="'robot' is an absolute path"):
         bundle_of(Sampling(task, Settings()).written, [], task)
+
+
+def test_a_task_that_is_named_with_dots_can_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    project = tmp_path / "project"
+    surround(project, tmp_path / "shared")
+    (project / "tasks" / "held.yaml").write_text(TASK)
+    monkeypatch.chdir(project)
+    name = Path("elsewhere/../tasks/held.yaml")
+    (project / "elsewhere").mkdir()
+    sampling = Sampling(name, Settings())
+    there, packages = bundled(sampling, name).unpack(tmp_path / "worker")
+    loaded = Sampling(there, Settings(package_path=packages)).written
+    assert changes(identity(sampling.written), identity(loaded)) == ""

@@ -86,6 +86,14 @@ def test_each_point_is_what_planning_it_alone_gives(task_file: Path) -> None:
     assert (beside.code, beside.reason) == ("TASK224", "'cup' is not above 'desk'")
 
 
+def test_the_command_of_a_point_plans_up_to_the_step(task_file: Path, tmp_path: Path, call_cli: RunCli) -> None:
+    found, _ = prepared_map(task_file, "pick_1", Ranges("0.75:1.1:2", "0"))
+    ran = [call_cli(*shlex.split(found.command(k))[1:], "--format", "json", cwd=tmp_path) for k in range(2)]
+    assert [each.code for each in ran] == [ExitCode.PASSED, ExitCode.FAILED]
+    assert {motion["step"] for motion in json.loads(ran[0].out)["motions"]} == {"pick_1"}
+    assert "pick_1" in json.loads(ran[1].out)["text"]
+
+
 def test_a_process_that_dies_costs_its_point(monkeypatch: pytest.MonkeyPatch) -> None:
     dying = """
 import json, os, sys

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import re
+import resource
 import sys
 from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
@@ -159,25 +160,64 @@ def test_an_unfinished_sweep_is_not_replaced_by_accident(sampling: Sampling, tmp
         assert journal.results == {}
 
 
-def test_a_full_disk_ends_the_sweep_and_what_was_written_counts(
-    sampling: Sampling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write = Journal._write
-    left = [3]
-
-    def full(journal: Journal, line: dict[str, object]) -> None:
-        left[0] -= 1
-        if left[0] < 0:
-            journal._file.write(b'{"sample"')  # half of a line
-            raise OSError(28, "No space left on device", str(journal.path))
-        write(journal, line)
-
-    with monkeypatch.context() as patch, pytest.raises(OSError, match="No space"):
-        patch.setattr(Journal, "_write", full)
-        swept(sampling, tmp_path, Backend(sampling), 5)
+def test_a_full_disk_ends_the_sweep_and_what_was_written_counts(sampling: Sampling, tmp_path: Path) -> None:
+    swept(sampling, tmp_path / "whole", Backend(sampling), 5)
+    lengths = [len(line) + 1 for line in (tmp_path / "whole" / "j.jsonl").read_bytes().splitlines()]
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (sum(lengths[:3]) + 30, before[1]))  # two results and part of a third
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            swept(sampling, tmp_path, Backend(sampling), 5)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     rest = Backend(sampling)
     assert len(swept(sampling, tmp_path, rest, 5).results) == 5
     assert len(rest.ran) == 3
+
+
+def test_two_sweeps_do_not_write_one_journal(sampling: Sampling, tmp_path: Path) -> None:
+    whose, path = identity(sampling.written), tmp_path / "j.jsonl"
+    with Journal(path, whose, resume=False) as first:
+        first.add(result(sampling, 0))
+        for options in ({"resume": True}, {"resume": False}, {"resume": False, "force": True}):
+            with pytest.raises(InvalidInput, match="another sweep is writing"):
+                Journal(path, whose, **options)
+        first.add(result(sampling, 1))
+    with Journal(path, whose, resume=True) as second:
+        assert [*second.results] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("sample", -1),
+        ("sample", True),
+        ("sample", 1.5),
+        ("outcome", "good"),
+        ("outcome", {}),
+        ("simulated", "1"),
+        ("simulated", False),
+        ("margins", {"near": 1}),
+        ("margins", [["near", "m", "0.1", 1.0, False]]),
+        ("margins", [["near", "m", 0.1, 1.0, 0]]),
+        ("margins", [["near", "m", 0.1]]),
+        ("margins", ["abcde"]),
+    ],
+)
+def test_a_journal_with_a_damaged_result_is_refused_with_its_line(
+    sampling: Sampling, tmp_path: Path, field: str, value: object
+) -> None:
+    lines = [{"journal": 1, "task": {}}, result(sampling, 0).to_json(), result(sampling, 1).to_json() | {field: value}]
+    path = tmp_path / "j.jsonl"
+    path.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+    with pytest.raises(InvalidInput, match="line 3 is not one of its objects"):
+        read_journal(path)
+
+
+def test_a_journal_of_deep_lists_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "j.jsonl").write_text("[" * 100_000 + "\n")
+    with pytest.raises(InvalidInput, match="line 1"):
+        read_journal(tmp_path / "j.jsonl")
 
 
 def test_the_analysis_finds_what_matters_and_the_page_has_every_sample(sampling: Sampling, tmp_path: Path) -> None:

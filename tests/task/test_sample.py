@@ -55,6 +55,20 @@ def test_what_is_set_is_not_drawn_but_an_offset_or_scale_is_about_it() -> None:
     assert (block.mass, block.friction, block.X_WO.p[0]) == (0.06, 0.4, 0.55)
 
 
+def test_a_file_names_the_sample_of_a_run_without_one(tmp_path: Path) -> None:
+    vary = "vary={simulation.settle: {grid: [0.3 s, 0.4 s, 0.5 s]}, simulation.gravity: {choice: [[0, 0, -9.7]]}}"
+
+    def settle(sample: int | None, *words: str) -> float | None:
+        task = load_task(TASK, overrides=(vary, *words), sample=sample)
+        return None if task.drawn is None else task.true.scene.gravity[2] + task.spec.simulation.settle
+
+    assert settle(None) is None
+    assert settle(None, "sample=1") == settle(1) == pytest.approx(-9.3)
+    assert settle(2, "sample=1") == settle(2) == pytest.approx(-9.2)
+    with pytest.raises(InvalidInput, match="there is no sample 1: task 'pick_place' has no `vary:`"):
+        load_task(TASK, overrides=("sample=1",))
+
+
 def test_samples_count_from_0() -> None:
     with pytest.raises(InvalidInput, match="there is no sample -1: samples count from 0"):
         _sample("{scene.block.mass: {choice: [1 kg]}}", -1)

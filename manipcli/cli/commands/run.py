@@ -39,7 +39,12 @@ def run(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the --log file if it exists.")] = False,
     embed_meshes: Annotated[
-        bool, typer.Option("--embed-meshes", help="Store the mesh files in the log, so that replay needs no packages.")
+        bool,
+        typer.Option(
+            "--embed-meshes",
+            help="Store the mesh files in the log, for replay and export on machines without the robot's packages. "
+            "Other viewers do not read them: see export --foxglove.",
+        ),
     ] = False,
     engines: Engines = None,
     check_step: CheckStep = False,

@@ -12,7 +12,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, cores, seconds
 from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, ManipcliError
 
 if TYPE_CHECKING:
     from manipcli.batch.job import Settings
@@ -111,7 +111,7 @@ def sweep(
         from manipcli.batch.job import Settings, limit
         from manipcli.sweep.analysis import Analysis
         from manipcli.sweep.journal import Journal, identity
-        from manipcli.sweep.local import SweepStopped, local_backend
+        from manipcli.sweep.local import local_backend
         from manipcli.sweep.sampling import Sampling
         from manipcli.sweep.sweep import DEFAULT, MOST, collected, read_until, run_sweep
 
@@ -146,12 +146,13 @@ def sweep(
         with Journal(path, identity(sampling.written), resume=resume, force=force) as journal:
             try:
                 swept = run_sweep(sampling, count, journal, backend, width=width, observer=lines.show)
-            except (SweepStopped, OSError, KeyboardInterrupt):
+            except (ManipcliError, OSError, KeyboardInterrupt):
                 lines.clear()
                 partly = collected(sampling, journal, count)
                 if partly.results and format_ == "text":
                     console.result(_text(Analysis(partly)))
-                console.talk(f"journal: {path}; go on with --resume")
+                if partly.results:
+                    console.talk(f"journal: {path}; go on with --resume")
                 raise
         lines.clear()
     analysis = Analysis(swept)

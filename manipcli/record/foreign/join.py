@@ -1,20 +1,24 @@
-"""A split log as one MCAP file."""
+"""Copies of logs: a split log as one MCAP file, a log with a further message."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from manipcli.record.channels import TRANSIENT_LOCAL
 from manipcli.record.faults import REPAIRABLE, BadRecording
 from manipcli.record.foreign.repair import chunk_content
-from manipcli.record.read.chunk import Places
+from manipcli.record.read.chunk import Places, walked
 from manipcli.record.read.salvage import Salvage, Stretch
 from manipcli.record.read.scan import Damage
 from manipcli.record.records import PAYLOAD
+from manipcli.record.schemas import schema_text
 from manipcli.record.write.container import Container
+from manipcli.record.write.rows import message_record
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
@@ -24,10 +28,21 @@ _AT = PAYLOAD - 9
 MAX_CHANNELS = 1 << 16
 
 
-def join(parts: Sequence[Path], output: Path) -> None:
+@dataclass(frozen=True, slots=True)
+class Added:
+    """A message that a copy has besides those of the log: of type `type` at `ns` [ns], transient local."""
+
+    topic: str
+    type: str
+    ns: int
+    data: bytes
+
+
+def join(parts: Sequence[Path], output: Path, *, added: Added | None = None) -> None:
     """Writes the messages of all parts, part by part, to one file, with attachments and metadata.
 
-    Equal channels of several parts become one. Of an unfinished last part, what is complete is kept.
+    Equal channels of several parts become one. Of an unfinished last part, what is complete is kept. `added` comes
+    after the first messages of the log.
 
     Raises:
         BadRecording: a part is not an MCAP file, is damaged, or is unfinished and not the last.
@@ -35,7 +50,7 @@ def join(parts: Sequence[Path], output: Path) -> None:
     """
     container = Container(output, overwrite=True)
     try:
-        joined = _Joined(container)
+        joined = _Joined(container, added)
         for part in parts:
             joined.add(part, last=part is parts[-1])
         container.finish()
@@ -47,8 +62,9 @@ def join(parts: Sequence[Path], output: Path) -> None:
 class _Joined:
     """The joined file while it is written: its schemas and channels by their contents."""
 
-    def __init__(self, container: Container) -> None:
+    def __init__(self, container: Container, added: Added | None) -> None:
         self._container = container
+        self._added = added
         self._begun = False
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, int, str, tuple[tuple[str, str], ...]], int] = {}
@@ -74,10 +90,23 @@ class _Joined:
                     self._container.metadata(piece.name, piece.metadata)
                 case Stretch():
                     self._chunk(path, piece, channels)
+                    self._add(path)
                 case Damage():
                     raise BadRecording(path, f"bytes {piece.start} to {piece.end}: {piece.what}", hint=REPAIRABLE)
         if salvage.scan.lost is not None and not last:
             raise BadRecording(path, f"a part before the last one is incomplete: {salvage.scan.lost}", hint=REPAIRABLE)
+
+    def _add(self, path: Path) -> None:
+        """Write the added message, once."""
+        from mcap.records import Channel, Schema
+
+        added, self._added = self._added, None
+        if added is not None:
+            schema = self._schema(Schema(0, schema_text(added.type).encode(), "ros2msg", added.type))
+            qos = {"offered_qos_profiles": TRANSIENT_LOCAL}
+            channel = self._channel(path, Channel(0, added.topic, "cdr", qos, schema), schema)
+            record = message_record(channel, 1, added.ns, added.data)
+            self._container.chunk(chunk_content(record, walked(record)[0], whole=True))
 
     def _schema(self, schema: Schema) -> int:
         from mcap.records import Schema as Record

@@ -74,19 +74,28 @@
     return whole;
   }
 
+  /** A command and a button that copies it; where the browser refuses that, it is selected. */
+  function command(text) {
+    const written = html("pre", {}, text), copy = html("button", { type: "button" }, "Copy");
+    const select = () => { getSelection().selectAllChildren(written); copy.textContent = "Selected"; };
+    copy.addEventListener("click", () => navigator.clipboard
+      ? navigator.clipboard.writeText(text).then(() => { copy.textContent = "Copied"; }, select) : select());
+    return [written, copy];
+  }
+
+  const named = (one) => one.unit ? `${one.name} [${one.unit}]` : one.name;
+
   function choose(sample) {
     chosen = sample;
     for (const [number, marks] of drawn) {
       for (const each of marks) each.classList.toggle("chosen", number === sample.number);
     }
-    const rows = (names, values) => names.map((one, k) => html("tr", {}, html("td", {}, one.name), html("td", { class: "n" }, `${short(values[k])} ${one.unit || ""}`)));
-    const copy = html("button", { type: "button" }, "Copy");
-    copy.addEventListener("click", () => navigator.clipboard.writeText(sample.command).then(() => { copy.textContent = "Copied"; }));
+    const rows = (names, values) => names.map((one, k) => html("tr", {}, html("td", {}, one.name), html("td", { class: "n" }, `${short(values[k])} ${values[k] === null ? "" : one.unit}`)));
     byId("sample").replaceChildren(
       html("h4", {}, `Sample ${sample.number}: ${sample.outcome}`),
       ...(sample.cause ? [html("p", {}, sample.cause)] : []),
-      html("pre", {}, sample.command), copy,
-      ...(sample.log ? [html("p", {}, "Replay: "), html("pre", {}, `manipcli replay ${sample.log}`), html("a", { href: sample.link }, "log")] : []),
+      ...command(sample.command),
+      ...(sample.link ? [html("p", {}, "Replay its ", html("a", { href: sample.link }, "log"), ":"), ...command(sample.replay)] : []),
       html("table", {}, html("tbody", {}, ...rows(data.numbers, sample.values), ...rows(data.margins, sample.margins))));
   }
 
@@ -95,7 +104,7 @@
     const of = Number(byId("margin").value);
     const margin = (s) => s.margins[of];
     byId("small").replaceChildren(...data.numbers.map((number, k) => html("figure", {},
-      plot(300, 200, (s) => s.values[k], margin, { zero: true, nominal: number.nominal }), html("figcaption", {}, number.name))));
+      plot(300, 200, (s) => s.values[k], margin, { zero: true, nominal: number.nominal }), html("figcaption", {}, named(number)))));
     const a = Number(byId("first").value), b = Number(byId("second").value);
     byId("map").replaceChildren(plot(620, 420, (s) => s.values[a], (s) => s.values[b],
       { nominal: data.numbers[a].nominal, up: data.numbers[b].nominal }));
@@ -103,7 +112,7 @@
   }
 
   function fill(id, names, value) {
-    byId(id).append(...names.map((one, k) => html("option", { value: k }, one.name)));
+    byId(id).append(...names.map((one, k) => html("option", { value: k }, named(one))));
     byId(id).value = String(value);
     byId(id).addEventListener("change", redraw);
   }

@@ -18,7 +18,10 @@ from manipcli.task.task import Task
 
 
 def plan_point(question: Question, number: int, overrides: tuple[str, ...]) -> PointResult:
-    """Loads the task with these overrides, and plans it up to the step."""
+    """Loads the task with these overrides, and plans it up to the step.
+
+    The manipulability is the least along motions in which the tool follows a path, and at the end of the others.
+    """
     options: FileOptions = {**question.options}
     options["overrides"] = (*question.options.get("overrides", ()), *overrides)
     try:
@@ -33,7 +36,7 @@ def plan_point(question: Question, number: int, overrides: tuple[str, ...]) -> P
     except InvalidInput as invalid:
         finding = next(one for one in invalid.findings if one.severity == "error")
         return PointResult(number, "invalid", code=finding.code, reason=finding_reason(finding), cause=finding.message)
-    near = _clearance(task, plan, question.body)
+    near = _clearance(task, plan)
     return PointResult(
         number,
         "planned",
@@ -43,22 +46,23 @@ def plan_point(question: Question, number: int, overrides: tuple[str, ...]) -> P
     )
 
 
-def _clearance(task: Task, plan: Plan, body: str) -> CollisionHit | None:
-    """The nearest pair of all motions, but for links of the robot among themselves and with the object.
+def _clearance(task: Task, plan: Plan) -> CollisionHit | None:
+    """The nearest pair of all motions, but for links of the robot among themselves and with what the steps act on.
 
-    What is inside the object belongs to it.
+    What is inside such an object belongs to it.
     """
-
     scene = task.spec.scene
+    acted_on = {getattr(step.body, "object", None) for step in task.spec.steps[: task.part.last]}
+    handled = {str(name).partition(SEPARATOR)[0] for name in acted_on if name is not None}
 
-    def is_object(name: str) -> bool:
+    def is_handled(name: str) -> bool:
         root = name.partition(SEPARATOR)[0]
         owner = group(root, scene) or root
         inside = scene[owner].inside if owner in scene else None
-        return owner == body or (inside is not None and is_object(inside))
+        return root in handled or (inside is not None and is_handled(inside))
 
     def counts(pair: Pair) -> bool:
-        return not all(name.startswith(ROBOT) or is_object(name) for name in pair)
+        return not all(name.startswith(ROBOT) or is_handled(name) for name in pair)
 
     hits = (least_clearance(plan.planner, motion, end, counts) for motion, _, end in plan.spans())
     return min((hit for hit in hits if hit is not None), key=lambda hit: hit.distance, default=None)

@@ -36,10 +36,10 @@ class PointResult:
     Attributes:
         number: of the point in its grid.
         outcome: `invalid`: the scene is impossible; `crashed`, `hung`: the process that planned it.
-        clearance: [m] least distance between robot or object and other bodies, over all planned motions; None where
-            there is nothing else.
+        clearance: [m] least distance of the robot and what it carries from other bodies, in all planned motions; None
+            where there are none.
         between: the two parts.
-        manipulability: least singular value of the tool's Jacobian; see `docs/reach.md`.
+        manipulability: least singular value of the tool's Jacobian where the tool is led, see `plan_point`.
         code, step, reason, cause: of the refusal; `reason` has no numbers.
     """
 

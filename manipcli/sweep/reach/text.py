@@ -13,6 +13,7 @@ from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.sweep.reach.question import PointResult
 from manipcli.sweep.reach.reach_map import ReachMap
+from manipcli.sweep.text import pace_text
 
 SYMBOLS: Final = "abcdefghijklmnopqrstuvwxyz"
 """Of the reasons, the commonest first; the last one is of all others."""
@@ -30,9 +31,7 @@ def progress_text(done: int, planned: int, asked: int, elapsed: float) -> str:
     text = f"{done} of {asked}: {planned} planned, {done - planned} refused"
     if not done or elapsed <= 0.0:
         return text
-    left = (asked - done) * elapsed / done
-    time = f"{left:.0f} s" if left < 100.0 else f"{left / 60.0:.0f} min"
-    return f"{text}, {done / elapsed:.1f} per second, {time} left"
+    return f"{text}, {pace_text(done / elapsed, (asked - done) * elapsed / done, of='point')}"
 
 
 def render_text(found: ReachMap) -> str:

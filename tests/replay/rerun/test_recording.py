@@ -18,6 +18,7 @@ pytest.importorskip("rerun", reason="needs the extra 'rerun'")
 
 from rerun.chunk import RrdReader
 
+from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
@@ -25,6 +26,7 @@ from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Span
 from manipcli.replay.forces import LONGEST
 from manipcli.replay.playback import Playback
+from manipcli.replay.rerun.viewer import show
 from manipcli.replay.rerun.write_recording import write_recording
 from manipcli.shapes.primitives import Box, Mesh, Shape
 
@@ -186,7 +188,7 @@ def test_steps_and_verdict_can_be_read(playback: Playback, entities: dict[str, R
 
 def test_the_file_is_sound_and_says_nothing_of_the_machine(written: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(written)], capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "rerun", "rrd", "verify", str(written)], capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0 and "warn" not in done.stderr.lower(), done.stderr
     reader = RrdReader(str(written))
@@ -212,3 +214,11 @@ def test_a_second_run_is_another_recording(playback: Playback, written: Path, tm
         for path in (written, tmp_path / "other.rrd", tmp_path / "same.rrd")
     ]
     assert ids[0] == ids[2] != ids[1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a screen that does not exist, for X")
+def test_a_viewer_that_fails_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", ":9999")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(InvalidArgument, match="ended with code"):
+        show(tmp_path / "missing.rrd")

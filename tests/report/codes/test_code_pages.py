@@ -63,7 +63,7 @@ PRESENT = [
     if page.code in TEXT or (page.code.startswith(("CTRL", "ROBOT", "TASK")) and page.code[-3:] in NUMBERS)
 ]  # fmt: skip
 """Pages of codes that are in the source: a page may be written first."""
-SLOW = ("reach", "sweep", "test", "tune")
+SLOW = ("reach", "shrink", "sweep", "test", "tune")
 """Commands whose sound examples take seconds: only the faulty ones are run."""
 SHIPPED = "manipcli check tasks/"
 """Commands about the tasks of this repository."""

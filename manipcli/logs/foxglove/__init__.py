@@ -1,0 +1,1 @@
+"""Folders for Foxglove: a log with its meshes, and a layout."""

@@ -1,0 +1,1 @@
+"""The smallest change from the task as written under which it fails."""
