@@ -133,6 +133,14 @@ class Analysis:
         return tuple(sorted(found, key=lambda influence: -influence.size))
 
     @property
+    def indistinct(self) -> bool:
+        """Whether no result differs from another, so that nothing can be said of the numbers."""
+        return all(
+            one.correlation is None and one.passing is None and one.indices is None and one.levels is None
+            for one in self.influences
+        )
+
+    @property
     def columns(self) -> tuple[Column, ...]:
         return self.sweep.sampling.columns
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from typing import Final
 
 from manipcli.core.text import listed, number_of, shorten
 from manipcli.core.units import readable
 from manipcli.report.table import table
-from manipcli.sweep.analysis import Analysis, Influence
+from manipcli.sweep.analysis import LEAST_BASE, Analysis, Influence
 from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.results import SampleResult
 from manipcli.sweep.statistics import SHARES, Rate
@@ -17,6 +18,7 @@ from manipcli.sweep.sweep import Progress
 
 NAMED = 8
 """Number of samples named for each way of failing."""
+SAME: Final = "All samples have the same margin and verdict: which number matters cannot be seen."
 _SHOWN = (0, 1, 3, 5, 6)  # of SHARES
 _BAR = 10
 
@@ -59,7 +61,7 @@ def render_text(analysis: Analysis) -> str:
     if sweep.missing:
         missing = listed(map(str, sweep.missing), most=NAMED)
         lines.append(f"missing: {len(sweep.missing)} of {sweep.asked} samples: {missing}")
-    if sweep.results:
+    if analysis.spreads:
         lines += ["", _margins(analysis)]
     if analysis.influences:
         lines += ["", _influences(analysis)]
@@ -93,7 +95,7 @@ def _margins(analysis: Analysis) -> str:
     headers = ("expectation", "met", *(names.get(SHARES[k], f"{SHARES[k]:.0%}".replace("%", " %")) for k in _SHOWN))
     rows = []
     for spread in analysis.spreads:
-        shown = [readable(spread.quantiles[k], spread.unit) for k in _SHOWN] if spread.telling else ["-"] * len(_SHOWN)
+        shown = [readable(spread.quantiles[k], spread.unit) for k in _SHOWN] if spread.telling else ["–"] * len(_SHOWN)
         met = f"{spread.met}/{len(analysis.sweep.results)}"
         rows.append((shorten(spread.name, width=48), met, *(text.replace("-", "−") for text in shown)))
     return table(headers, rows, right=headers[1:])
@@ -109,20 +111,26 @@ def _influences(analysis: Analysis) -> str:
         headers = ("number", "first-order index", "95 % interval", "total index", "95 % interval ")
         rows = [(one.column.name, *_index_cells(one)) for one in analysis.influences]
         return table(headers, rows, right=headers[1:])
+    if analysis.indistinct:
+        return SAME
     headers = ("rank correlation", "nominal", "with margin", "with passing", "by chance up to", "")
     rows = []
     for one in analysis.influences:
-        cells = ["-" if found is None else f"{found.rho:+.2f}" for found in (one.correlation, one.passing)]
-        bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "-")
+        pair = (one.correlation, one.passing)
+        cells = ["–" if found is None else f"{found.rho:+.2f}".replace("-", "−") for found in pair]
+        bound = next((f"{found.bound:.2f}" for found in pair if found is not None), "–")
         nominal = one.column.text(one.column.nominal)
         bar = "█" * round(one.size * _BAR) if one.matters else ""
-        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells)), bound, bar))
-    return table(headers, rows, right=headers[1:5])
+        rows.append((one.column.name, nominal, *cells, bound, bar))
+    shown = table(headers, rows, right=headers[1:5])
+    if analysis.sweep.sampling.design.word == "saltelli":
+        shown += f"\nIndices need {LEAST_BASE} complete base points; these are correlations."
+    return shown
 
 
 def _index_cells(influence: Influence) -> tuple[str, ...]:
     if influence.indices is None:
-        return ("-", "", "-", "")
+        return ("–", "", "–", "")
     cells: list[str] = []
     for index in (influence.indices.first, influence.indices.whole):
         low, high = index.interval

@@ -113,3 +113,13 @@ def test_one_at_a_time_shows_how_far_each_number_can_go(tmp_path: Path) -> None:
     assert re.search(r"pose.xyz.2 .* all ", text)
     broken = Analysis(Sweep(sampling, (result(0, -1.0, passed=False), *results[1:]), 16, "", 0.0, 0))
     assert [one.levels.passes for one in broken.influences if one.levels is not None] == [None] * 3
+
+
+def test_where_all_results_are_equal_nothing_is_said_of_the_numbers(tmp_path: Path) -> None:
+    sampling = cube(tmp_path, "")
+    crashed = tuple(SampleResult(k, "crashed", "crashed by signal 11") for k in range(6))
+    for results in (crashed, tuple(result(k, 1.0, passed=True) for k in range(6))):
+        text = render_text(Analysis(Sweep(sampling, results, 6, "", 0.0, 0)))
+        assert "which number matters cannot be seen" in text
+        assert "rank correlation" not in text
+        assert ("expectation " in text) == (results is not crashed)
