@@ -29,9 +29,10 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
 from manipcli.record.foreign.snapshot import joint_state, transforms
 from manipcli.record.foreign.topics import Topics, open_topics
+from manipcli.record.gaps import Gaps
 from manipcli.record.read.chunk import singly
 from manipcli.render.drawing import WORLD
-from manipcli.replay.playback import Playback
+from manipcli.replay.playback import Playback, gap_notes
 from manipcli.scene.scene import Body, Scene
 
 LEAST_STEADY = 1e-6
@@ -100,6 +101,7 @@ class _Log:
         there = {meaning.usual for name, meaning in known.items() if space is None or name in wanted}
         self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
         self.begin = begin = self._first(topics, wanted)
+        self.gaps = self._gaps(topics, wanted)
         for topic, data, places in topics.messages(wanted):
             try:
                 for ns, reader in singly(data, places):
@@ -111,6 +113,15 @@ class _Log:
         """Time of the first moving data [ns]; a description can be much older."""
         moving = [topics.all[name] for name, usual in wanted.items() if usual in (channels.JOINT_STATES, channels.TF)]
         return min((topic.first for topic in moving if topic.count), default=topics.start)
+
+    def _gaps(self, topics: Topics, wanted: Mapping[str, str]) -> Gaps:
+        """Those of the joint states, and without any those of the frames."""
+        for usual in (channels.JOINT_STATES, channels.TF):
+            names = [name for name, meaning in wanted.items() if meaning == usual and topics.all[name].count]
+            if names:
+                found = topics.all[names[0]].intervals.gaps()
+                return tuple(((start - self.begin) / 1e9, (end - self.begin) / 1e9) for start, end in found)
+        return ()
 
     def _take(self, topic: str, time: float, reader: CdrReader) -> None:
         if topic == channels.ROBOT_DESCRIPTION:
@@ -179,6 +190,9 @@ def open_other(
         raise InvalidInput([Diagnostic("REPLAY002", message, hint=hint)])
     count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))
     times = np.linspace(log.start, log.end, count + 1) if log.end > log.start else np.array([log.start])
+    for start, end in log.gaps:
+        times = np.union1d(times[(times <= start) | (times >= end)], [start, end])
+    notes += gap_notes(log.gaps)
     tree = {child: (parent, _poses(samples, times)) for (parent, child), samples in log.frames.items()}
     robot = _robot(log.urdf, notes)
     if robot is not None:
@@ -208,6 +222,7 @@ def open_other(
         lost=topics.lost,
         notes=tuple(notes),
         begin=log.begin,
+        gaps=log.gaps,
         sensed=partial(read_sensed, path, begin=log.begin, end=float(times[-1])),
     )
 
