@@ -157,10 +157,11 @@ def pages(folder: Path) -> dict[str, str]:
 
 
 def frame_rates(browser: Page, urls: Sequence[str], *, seconds: float = 3.0, rounds: int = 3) -> list[float]:
-    """Frames per second of each page while it plays, the median of some rounds that alternate."""
+    """Frames per second of each page while it plays, at least ten frames: the median of some rounds that alternate."""
     count = (
-        "new Promise((done) => { let n = 0; const end = performance.now() + %d; const next = (t) => "
-        "{ n++; if (t < end) requestAnimationFrame(next); else done(n); }; requestAnimationFrame(next); })"
+        "new Promise((done) => { let n = 0; const start = performance.now(); const next = (t) => { n++; "
+        "if (t < start + %d || n < 10) requestAnimationFrame(next); else done(1000 * n / (t - start)); }; "
+        "requestAnimationFrame(next); })"
     )
     found: list[list[float]] = [[] for _ in urls]
     for _ in range(rounds):
@@ -169,7 +170,7 @@ def frame_rates(browser: Page, urls: Sequence[str], *, seconds: float = 3.0, rou
             browser.wait_for(READY)
             browser.evaluate("document.querySelector('[data-part=loop]').checked = true")
             browser.evaluate(f"{PLAYER}.seek(0), {PLAYER}.play(true)")
-            rates.append(float(str(browser.evaluate(count % (1000.0 * seconds)))) / seconds)
+            rates.append(float(str(browser.evaluate(count % (1000.0 * seconds)))))
     return [statistics.median(rates) for rates in found]
 
 

@@ -51,6 +51,8 @@ class LogExports:
             topics = write_bag(log, self.rosbag2)
             console.talk(f"{number_of(len(topics.all), 'topic')}, {number_of(topics.count, 'message')}")
             console.result(str(self.rosbag2))
+        if self.files is not None:
+            _write_files(log, self.files, package_path=package_path, allow_outside=allow_outside)
         if self.foxglove is not None:
             from manipcli.logs.foxglove import layout
 
@@ -85,6 +87,22 @@ def _check_ending(option: str, path: Path | None, ending: str) -> None:
     """
     if path is not None and path.suffix.lower() != ending:
         raise InvalidInput([Diagnostic("USE098", f"{option} '{path}' is not a {ending} file")])
+
+
+def _write_files(log: Path, folder: Path, *, package_path: Sequence[Path], allow_outside: bool) -> None:
+    from manipcli.core.whole_file import write_whole
+    from manipcli.logs.task_files import README, readme, task_files
+    from manipcli.record.read.reading import open_recording
+
+    made = task_files(open_recording(log), log, package_path=package_path, allow_outside=allow_outside)
+    for name, data in {**made.files, README: readme(made, log)}.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data)
+    for note in made.notes:
+        console.talk(f"note: {note}")
+    console.talk(f"run it with `{made.command(folder)}`")
+    console.result(str(folder))
 
 
 def _write_glb(playback: Playback, path: Path) -> None:

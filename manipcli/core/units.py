@@ -304,11 +304,16 @@ def readable(value: float, symbol: str, *, digits: int = 3) -> str:
         return f"{value:g} {symbol}".rstrip()
     if value == 0.0:
         return f"0 {symbol}".rstrip()  # never -0
-    size = abs(float(f"{value:.{digits}g}"))  # rounded as shown: 0.9999 s is 1 s, not 1e+03 ms
-    for least, shown, factor in _READABLE.get(symbol, ()):
-        if size >= least:
-            return f"{value * factor:.{digits}g} {shown}"
-    return f"{value:.{digits}g} {symbol}".rstrip()
+    rounded = float(f"{value:.{digits}g}")  # as shown: 0.9999 s is 1 s, not 1e+03 ms
+    shown, factor = readable_unit(rounded, symbol)
+    return f"{value * factor:.{digits}g} {shown}".rstrip()
+
+
+def readable_unit(value: float, symbol: str) -> tuple[str, float]:
+    """A readable unit for values [SI unit `symbol`] up to `value`, and its factor: `("mm", 1000.0)` for 0.0042 m."""
+    return next(
+        ((shown, factor) for least, shown, factor in _READABLE.get(symbol, ()) if abs(value) >= least), (symbol, 1.0)
+    )
 
 
 def names_of(dimensions: Sequence[Dimension]) -> str:

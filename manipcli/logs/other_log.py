@@ -21,6 +21,7 @@ from manipcli.description.expanded import unread_description
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.sensed import read_sensed
+from manipcli.logs.several_robots import together
 from manipcli.model.build_robot import bare_robot
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
@@ -29,7 +30,7 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
 from manipcli.record.foreign.snapshot import joint_state, transforms
 from manipcli.record.foreign.topics import Topics, open_topics
-from manipcli.record.gaps import Gaps
+from manipcli.record.gaps import Gaps, common
 from manipcli.record.read.chunk import singly
 from manipcli.render.drawing import WORLD
 from manipcli.replay.playback import Playback, gap_notes
@@ -109,6 +110,14 @@ class _Log:
             except CdrError as error:
                 raise BadRecording(topics.path, f"{topic} cannot be read: {error}") from error
 
+    def begin_at(self, begin: int) -> None:
+        """Count all times from another one [ns]."""
+        shift, self.begin = (self.begin - begin) / 1e9, begin
+        self.start, self.end = self.start + shift, self.end + shift
+        self.gaps = tuple((start + shift, end + shift) for start, end in self.gaps)
+        for samples in (*self.joints.values(), *self.frames.values()):
+            samples.times = [time + shift for time in samples.times]
+
     def _first(self, topics: Topics, wanted: Mapping[str, str]) -> int:
         """Time of the first moving data [ns]; a description can be much older."""
         moving = [topics.all[name] for name, usual in wanted.items() if usual in (channels.JOINT_STATES, channels.TF)]
@@ -175,24 +184,64 @@ def open_other(
     """
     topics = open_topics(path)
     log = _Log(topics, space)
+    if space is None and len(log.spaces) > 1:
+        parts = {each: _Log(topics, each) for each in log.spaces}
+        moving = {each: part for each, part in parts.items() if np.isfinite(part.start)}
+        if moving:
+            begin = min(part.begin for part in moving.values())
+            for part in moving.values():
+                part.begin_at(begin)
+            start, end = min(part.start for part in moving.values()), max(part.end for part in moving.values())
+            gaps = common(*(part.gaps for part in moving.values()))
+            times = _times(start, end, rate, gaps)
+            shown = {
+                each: _playback(path, topics, part, each, times, gaps, why, package_path, allow_outside)
+                for each, part in moving.items()
+            }
+            return together(path.name, shown)
+    _check_moves(path, topics, log, space)
+    times = _times(log.start, log.end, rate, log.gaps)
+    return _playback(path, topics, log, space, times, log.gaps, why, package_path, allow_outside)
+
+
+def _times(start: float, end: float, rate: float, gaps: Gaps) -> Array:
+    """(T,) [s] of the states of a playback, from the first to the last, with the ends of gaps and none inside."""
+    count = max(1, min(int(np.ceil((end - start) * rate)), MAX_TIMES))
+    times = np.linspace(start, end, count + 1) if end > start else np.array([start])
+    for begin, until in gaps:
+        times = np.union1d(times[(times <= begin) | (times >= until)], [begin, until])
+    return times
+
+
+def _check_moves(path: Path, topics: Topics, log: _Log, space: str | None) -> None:
+    """
+    Raises:
+        InvalidInput: the log, or the robot in namespace `space`, has neither joint states nor frames.
+    """
+    if not np.isfinite(log.start):
+        subject = "the log" if space is None else f"'{space}'"
+        what = f"{subject} has neither {channels.JOINT_STATES} nor {channels.TF}"
+        message = f"{path.name}: nothing to show: {what}"
+        hint = f"topics: {listed(sorted(topics.all)) or 'none'}; plot their numbers with `manipcli plot`"
+        raise InvalidInput([Diagnostic("REPLAY002", message, hint=hint)])
+
+
+def _playback(
+    path: Path,
+    topics: Topics,
+    log: _Log,
+    space: str | None,
+    times: Array,
+    gaps: Gaps,
+    why: str,
+    package_path: Sequence[Path],
+    allow_outside: bool,
+) -> Playback:
+    """The playback of a log, or of its robot in namespace `space`, at these times (T,) [s]."""
     notes = [f"{why}: no steps, no contacts, no references and no verdict"]
     subject = "the log" if space is None else f"'{space}'"
     notes += [f"{subject} has no {name} ({TYPES[name]})" for name in log.lacks]
-    several = f"{len(log.spaces)} robots in the log: {listed(log.spaces)}" if len(log.spaces) > 1 else ""
-    notes += [f"{several}; {listed(log.unshown)} not shown"] if several else []
-    if not np.isfinite(log.start):
-        unchosen = several if space is None else ""
-        what = unchosen or f"{subject} has neither {channels.JOINT_STATES} nor {channels.TF}"
-        message = f"{path.name}: nothing to show: {what}"
-        hint = f"topics: {listed(sorted(topics.all)) or 'none'}; plot their numbers with `manipcli plot`"
-        if unchosen:
-            hint = f"select a robot with --robot, such as --robot {log.spaces[0]}"
-        raise InvalidInput([Diagnostic("REPLAY002", message, hint=hint)])
-    count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))
-    times = np.linspace(log.start, log.end, count + 1) if log.end > log.start else np.array([log.start])
-    for start, end in log.gaps:
-        times = np.union1d(times[(times <= start) | (times >= end)], [start, end])
-    notes += gap_notes(log.gaps)
+    notes += gap_notes(gaps)
     tree = {child: (parent, _poses(samples, times)) for (parent, child), samples in log.frames.items()}
     robot = _robot(log.urdf, notes)
     if robot is not None:
@@ -222,7 +271,7 @@ def open_other(
         lost=topics.lost,
         notes=tuple(notes),
         begin=log.begin,
-        gaps=log.gaps,
+        gaps=gaps,
         sensed=partial(read_sensed, path, begin=log.begin, end=float(times[-1])),
     )
 

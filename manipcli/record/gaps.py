@@ -33,6 +33,15 @@ def gaps_text(gaps: Gaps) -> str:
     return ", ".join(f"{start:.2f} to {end:.2f} s" for start, end in gaps[:_NAMED]) + more
 
 
+def common(first: Gaps, *others: Gaps) -> Gaps:
+    """Where each of these has a gap."""
+    found = first
+    for other in others:
+        both = [(max(a, c), min(b, d)) for a, b in found for c, d in other]
+        found = tuple((start, end) for start, end in both if start < end)
+    return found
+
+
 def _no_counts() -> npt.NDArray[np.int64]:
     return np.zeros(64 * _PER_OCTAVE, dtype=np.int64)
 

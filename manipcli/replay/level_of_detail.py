@@ -66,7 +66,7 @@ def interpolated_quats(times: Array, quats: Array, kept: Rows, rows: Rows) -> Ar
     start, end = quats[before], quats[after]
     near = np.where((start * end).sum(axis=-1, keepdims=True) < 0.0, -end, end)
     mixed = (1.0 - share) * start + share * near
-    return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))
 
 
 def _beside(times: Array, kept: Rows, rows: Rows) -> tuple[Rows, Rows, Array]:

@@ -53,7 +53,8 @@ def _route(path: Array, rows: Rows) -> Rows:
     while True:
 
         def errors(kept: Rows, others: Rows) -> Array:
-            return np.linalg.norm(interpolated(length, points, kept, others) - points[others], axis=1) / bound  # noqa: B023
+            apart = interpolated(length, points, kept, others) - points[others]
+            return np.asarray(np.linalg.norm(apart, axis=1) / bound)  # noqa: B023
 
         found = needed_rows(len(points), errors)
         if len(found) <= MOST:

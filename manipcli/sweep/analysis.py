@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.sweep.one_at_a_time import Levels, levels
 from manipcli.sweep.results import Margin, SampleResult
 from manipcli.sweep.sampling import Column
 from manipcli.sweep.statistics import Correlation, Indices, quantiles, rank_correlation, sobol_indices
@@ -41,18 +42,22 @@ class Influence:
         correlation: with the smallest margin.
         passing: with whether the sample passed.
         indices: of the smallest margin, for `saltelli`.
+        levels: at which it passes, for `oat`.
     """
 
     column: Column
     correlation: Correlation | None
     passing: Correlation | None
     indices: Indices | None
+    levels: Levels | None = None
 
     @property
     def size(self) -> float:
         """To sort by."""
         if self.indices is not None:
             return self.indices.whole.value
+        if self.levels is not None:
+            return -self.levels.smallest
         return max((abs(found.rho) for found in (self.correlation, self.passing) if found is not None), default=-1.0)
 
     @property
@@ -115,6 +120,8 @@ class Analysis:
     def influences(self) -> tuple[Influence, ...]:
         """The numbers with more than one value, those that matter most first."""
         varied = [k for k in range(len(self.columns)) if len({values[k] for values in self.values.values()}) > 1]
+        if self.sweep.sampling.design.word == "oat":
+            return tuple(sorted(map(self._one_at_a_time, varied), key=lambda influence: -influence.size))
         indices = self._indices
         results = [(result.smallest, result.passed) for result in self.sweep.results]
         several = sum(len(set(column)) > 1 for column in zip(*results, strict=True))  # with margin, with passing
@@ -126,6 +133,14 @@ class Analysis:
         return tuple(sorted(found, key=lambda influence: -influence.size))
 
     @property
+    def indistinct(self) -> bool:
+        """Whether no result differs from another, so that nothing can be said of the numbers."""
+        return all(
+            one.correlation is None and one.passing is None and one.indices is None and one.levels is None
+            for one in self.influences
+        )
+
+    @property
     def columns(self) -> tuple[Column, ...]:
         return self.sweep.sampling.columns
 
@@ -135,18 +150,17 @@ class Analysis:
         return Counter(result.outcome for result in self.sweep.results)
 
     def _correlations(self, k: int, *, of: int) -> tuple[Correlation | None, Correlation | None]:
-        """Of column k with smallest margin and passing, over the independent samples: A and B of `saltelli`; those in
-        which `oat` changes this number."""
+        """Of column k with smallest margin and passing, over the independent samples: A and B of `saltelli`."""
         used: Sequence[SampleResult] = self.sweep.results
-        word = self.sweep.sampling.design.word
-        if word == "saltelli":
+        if self.sweep.sampling.design.word == "saltelli":
             used = [result for result in used if result.number % (self.sweep.sampling.dimensions + 2) < 2]
-        elif word == "oat":
-            nominal = self.columns[k].nominal
-            used = [result for result in used if self.values[result.number][k] != nominal]
         x = [self.values[result.number][k] for result in used]
         results = ([result.smallest for result in used], [float(result.passed) for result in used])
         return rank_correlation(x, results[0], of=of), rank_correlation(x, results[1], of=of)
+
+    def _one_at_a_time(self, k: int) -> Influence:
+        values = {number: own[k] for number, own in self.values.items()}
+        return Influence(self.columns[k], None, None, None, levels(self.columns[k], values, self.sweep.results))
 
     @cached_property
     def _indices(self) -> dict[int, Indices]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import time
 import uuid
-from asyncio import CancelledError
+from asyncio import CancelledError as AsyncCancelled
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from pathlib import Path
 from threading import Event
@@ -28,6 +30,8 @@ from manipcli.sweep.worker import Answer, SweepPlugin, run_on_worker
 
 AHEAD: Final = 3
 """Samples that are given to the cluster per thread of its workers: enough that none waits."""
+COUNTING: Final = 1.0
+"""[s] between two looks at the workers."""
 PERIOD: Final = 0.25
 """[s] between two looks at the samples."""
 ASKING: Final = 5.0
@@ -77,6 +81,7 @@ class _Cluster:
         self._address, self._plugin, self._beat = address, plugin, beat
         self._pending: dict[Future, int] = {}
         self._changed = Event()
+        self._threads, self._counted = 0, -math.inf
         self._client = self._connected()
 
     def close(self) -> None:
@@ -105,7 +110,7 @@ class _Cluster:
             finished = {each: number for each, number in done.items() if each.status == "finished"}
             try:
                 answers = dict(zip(finished, self._client.gather([*finished]), strict=True))
-            except (OSError, CancelledError, KilledWorker):
+            except (OSError, AsyncCancelled, CancelledError, KilledWorker):
                 answers = {}
             for future, number in done.items():
                 if future in answers:
@@ -133,7 +138,9 @@ class _Cluster:
         Raises:
             OSError: the connection is lost.
         """
-        threads = sum(self._client.nthreads().values()) if self._client.status == "running" else 0
+        if time.monotonic() > self._counted + COUNTING:
+            self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
+        threads = self._threads if self._client.status == "running" else 0
         while todo and len(self._pending) < AHEAD * threads:
             key = f"manipcli-{todo[0]}-{uuid.uuid4().hex}"
             future = self._client.submit(run_on_worker, self._plugin.name, todo[0], key=key, pure=False)

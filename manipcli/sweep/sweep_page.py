@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shlex
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -13,11 +12,13 @@ from typing import Final
 from manipcli.core.text import listed, number_of
 from manipcli.core.units import readable
 from manipcli.replay.player import POLICY
-from manipcli.report.html.markup import Markup, document, element, joined, link
+from manipcli.report.html.markup import Markup, document, element, joined
 from manipcli.report.html.page_parts import heading, mark, table
 from manipcli.sweep.analysis import Analysis, Influence, Spread
+from manipcli.sweep.one_at_a_time import HEADERS
+from manipcli.sweep.page_data import page_data
 from manipcli.sweep.results import SampleResult
-from manipcli.sweep.text import NAMED, interval_text, percent
+from manipcli.sweep.text import NAMED, SAME, interval_text, percent
 
 BINS: Final = 24
 """Bars of a histogram."""
@@ -35,7 +36,7 @@ def render_page(analysis: Analysis, folder: Path) -> str:
     own, shared = files("manipcli.sweep").joinpath("page"), files("manipcli.report.html").joinpath("page")
     style = Markup(shared.joinpath("report.css").read_text("utf-8") + own.joinpath("sweep.css").read_text("utf-8"))
     script = Markup(own.joinpath("sweep.js").read_text("utf-8"))
-    data = json.dumps(_data(analysis, folder), allow_nan=False).replace("<", "\\u003c")
+    data = json.dumps(page_data(analysis, folder), allow_nan=False).replace("<", "\\u003c")
     good = analysis.sweep.rate.passed == analysis.sweep.asked
     title = f"{'✓' if good else '✗'} {analysis.sweep.sampling.task}: {percent(analysis.sweep.rate.share)}"
     return document(
@@ -87,7 +88,10 @@ def _plots(analysis: Analysis) -> Markup | None:
     def choice(name: str, label: str) -> Markup:
         return element("label", f"{label} ", element("select", id=name))
 
-    about = "Each point is a sample: filled if it passed, a cross if not. Click one for its values and its command."
+    about = (
+        "Each point is a sample: filled if it passed, a cross if not. Click one for its values and its command. The "
+        "smallest margin is drawn within ±1 tolerance, at −1 where a step failed."
+    )
     return element(
         "section",
         heading("samples", "Samples", about),
@@ -110,7 +114,14 @@ def _plots(analysis: Analysis) -> Markup | None:
 def _influences(analysis: Analysis) -> Markup | None:
     if not analysis.influences:
         return None
+    if analysis.indistinct:
+        return element("section", heading("influence", "What matters", SAME))
     headers: tuple[str, ...]
+    if analysis.sweep.sampling.design.word == "oat":
+        about = "How far each number can go from its value in the task, all others as written. Margins in tolerances."
+        found = [one.levels.cells for one in analysis.influences if one.levels is not None]
+        levels = table(HEADERS, found, numbers=HEADERS[1:])
+        return element("section", heading("influence", "What matters", about), levels)
     if analysis.influences[0].indices is not None:
         about = (
             "Share of the variance of the smallest margin (within ±1 tolerance) that a number explains alone, and with "
@@ -242,33 +253,3 @@ def _tolerances(result: SampleResult) -> str:
 
 def _command(analysis: Analysis, result: SampleResult) -> str:
     return analysis.sweep.sampling.job(result.number).command()
-
-
-def _data(analysis: Analysis, folder: Path) -> dict[str, object]:
-    """What the plots show. Numbers that matter most come first."""
-    columns = [influence.column for influence in analysis.influences]
-    order = [analysis.columns.index(column) for column in columns]
-    telling = [spread for spread in analysis.spreads if spread.telling]
-    samples = []
-    for result in analysis.sweep.results:
-        by_name = {margin.name: margin.finite for margin in result.margins}
-        log = analysis.sweep.sampling.job(result.number).log
-        samples.append(
-            {
-                "number": result.number,
-                "passed": result.passed,
-                "outcome": result.outcome,
-                "cause": result.cause,
-                "margins": [result.score, *(by_name.get(spread.name) for spread in telling)],
-                "values": [analysis.values[result.number][k] for k in order],
-                "command": _command(analysis, result),
-                "replay": shlex.join(("manipcli", "replay", str(log))),
-                "link": link(log, folder) if log.exists() else "",
-            }
-        )
-    passing = [abs(found.rho) if (found := one.passing) is not None else -1.0 for one in analysis.influences]
-    strongest = sorted(range(len(columns)), key=lambda k: -passing[k])[:2]
-    names = [{"name": "smallest margin, in tolerances", "unit": ""}]
-    names += [{"name": spread.name, "unit": spread.unit} for spread in telling]
-    numbers = [{"name": column.name, "nominal": column.nominal, "unit": column.unit} for column in columns]
-    return {"numbers": numbers, "margins": names, "samples": samples, "map": strongest}

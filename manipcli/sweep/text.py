@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from typing import Final
 
 from manipcli.core.text import listed, number_of, shorten
 from manipcli.core.units import readable
 from manipcli.report.table import table
-from manipcli.sweep.analysis import Analysis, Influence
+from manipcli.sweep.analysis import LEAST_BASE, Analysis, Influence
+from manipcli.sweep.one_at_a_time import HEADERS
 from manipcli.sweep.results import SampleResult
 from manipcli.sweep.statistics import SHARES, Rate
 from manipcli.sweep.sweep import Progress
 
 NAMED = 8
 """Number of samples named for each way of failing."""
+SAME: Final = "All samples have the same margin and verdict: which number matters cannot be seen."
 _SHOWN = (0, 1, 3, 5, 6)  # of SHARES
 _BAR = 10
 
@@ -58,7 +61,7 @@ def render_text(analysis: Analysis) -> str:
     if sweep.missing:
         missing = listed(map(str, sweep.missing), most=NAMED)
         lines.append(f"missing: {len(sweep.missing)} of {sweep.asked} samples: {missing}")
-    if sweep.results:
+    if analysis.spreads:
         lines += ["", _margins(analysis)]
     if analysis.influences:
         lines += ["", _influences(analysis)]
@@ -83,7 +86,8 @@ def sample_text(result: SampleResult) -> str:
     tightest = min(known, key=lambda margin: margin.relative or 0.0, default=None)
     if tightest is None:
         return f"sample {result.number} passed"
-    return f"sample {result.number} passed: {tightest.name} by {readable(tightest.value or 0.0, tightest.unit)}"
+    amount = readable(tightest.value or 0.0, tightest.unit)
+    return f"sample {result.number} passed: {tightest.name} by {amount}, {tightest.relative:.2f} of its tolerance"
 
 
 def _margins(analysis: Analysis) -> str:
@@ -91,7 +95,7 @@ def _margins(analysis: Analysis) -> str:
     headers = ("expectation", "met", *(names.get(SHARES[k], f"{SHARES[k]:.0%}".replace("%", " %")) for k in _SHOWN))
     rows = []
     for spread in analysis.spreads:
-        shown = [readable(spread.quantiles[k], spread.unit) for k in _SHOWN] if spread.telling else ["-"] * len(_SHOWN)
+        shown = [readable(spread.quantiles[k], spread.unit) for k in _SHOWN] if spread.telling else ["–"] * len(_SHOWN)
         met = f"{spread.met}/{len(analysis.sweep.results)}"
         rows.append((shorten(spread.name, width=48), met, *(text.replace("-", "−") for text in shown)))
     return table(headers, rows, right=headers[1:])
@@ -100,24 +104,33 @@ def _margins(analysis: Analysis) -> str:
 def _influences(analysis: Analysis) -> str:
     """What matters for the smallest margin."""
     headers: tuple[str, ...]
+    if analysis.sweep.sampling.design.word == "oat":
+        known = [one.levels.cells for one in analysis.influences if one.levels is not None]
+        return table(HEADERS, known, right=(HEADERS[1], *HEADERS[4:]))
     if analysis.influences[0].indices is not None:
         headers = ("number", "first-order index", "95 % interval", "total index", "95 % interval ")
         rows = [(one.column.name, *_index_cells(one)) for one in analysis.influences]
         return table(headers, rows, right=headers[1:])
+    if analysis.indistinct:
+        return SAME
     headers = ("rank correlation", "nominal", "with margin", "with passing", "by chance up to", "")
     rows = []
     for one in analysis.influences:
-        cells = ["-" if found is None else f"{found.rho:+.2f}" for found in (one.correlation, one.passing)]
-        bound = next((f"{found.bound:.2f}" for found in (one.correlation, one.passing) if found is not None), "-")
+        pair = (one.correlation, one.passing)
+        cells = ["–" if found is None else f"{found.rho:+.2f}".replace("-", "−") for found in pair]
+        bound = next((f"{found.bound:.2f}" for found in pair if found is not None), "–")
         nominal = one.column.text(one.column.nominal)
         bar = "█" * round(one.size * _BAR) if one.matters else ""
-        rows.append((one.column.name, *(text.replace("-", "−") for text in (nominal, *cells)), bound, bar))
-    return table(headers, rows, right=headers[1:5])
+        rows.append((one.column.name, nominal, *cells, bound, bar))
+    shown = table(headers, rows, right=headers[1:5])
+    if analysis.sweep.sampling.design.word == "saltelli":
+        shown += f"\nIndices need {LEAST_BASE} complete base points; these are correlations."
+    return shown
 
 
 def _index_cells(influence: Influence) -> tuple[str, ...]:
     if influence.indices is None:
-        return ("-", "", "-", "")
+        return ("–", "", "–", "")
     cells: list[str] = []
     for index in (influence.indices.first, influence.indices.whole):
         low, high = index.interval
@@ -174,6 +187,7 @@ def _number_object(influence: Influence) -> Mapping[str, object]:
         "correlation_with_passing": influence.passing.rho if influence.passing is not None else None,
         "bound": found.bound if found is not None else None,
         "first_order": None if indices is None else {"value": indices.first.value, "interval": indices.first.interval},
+        "one_at_a_time": None if influence.levels is None else influence.levels.to_json(),
         "total": None if indices is None else {"value": indices.whole.value, "interval": indices.whole.interval},
     }
 

@@ -17,6 +17,7 @@ of N base points; AB_j is A with dimension j of B.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -31,6 +32,7 @@ DesignWord = Literal["random", "grid", "lhs", "sobol", "oat", "saltelli"]
 WORDS: Final[tuple[DesignWord, ...]] = get_args(DesignWord)
 LARGEST: Final = 1 << 24
 """Largest N of a design."""
+_COUNT: Final = re.compile("[0-9]{1,15}")
 _BITS: Final = 30
 Coordinates = tuple[float | None, ...]
 """One per dimension; None: the value in the file."""
@@ -58,8 +60,11 @@ class Design:
         for known in WORDS:
             if word == known == "random" and not count:
                 return Design()
-            if word == known != "random" and count.isdecimal() and 0 < int(count) <= LARGEST:
-                return Design(known, int(count))
+            if word == known != "random" and _COUNT.fullmatch(count):
+                if 0 < int(count) <= LARGEST:
+                    return Design(known, int(count))
+                message = f"N of '{word}' is {count}; expected 1 to {LARGEST}"
+                raise InvalidInput([Diagnostic("USE181", message)])
         hint = did_you_mean(word, WORDS, kind="designs") if word not in WORDS else None
         if word in WORDS:
             hint = "write --design random" if word == "random" else f"write the number of points: {word}:256"
@@ -96,7 +101,7 @@ class Design:
                 if self.count & (self.count - 1):
                     below = 1 << (self.count.bit_length() - 1)
                     message = f"N of 'saltelli' is {self.count}; expected a power of two"
-                    raise InvalidInput([Diagnostic("USE181", message, hint=f"use {below} or {2 * below}")])
+                    raise InvalidInput([Diagnostic("USE181", message, hint=f"use N = {below} or N = {2 * below}")])
                 return self.count * (len(dimensions) + 2)
         return self.count
 
@@ -196,7 +201,7 @@ def _grid(count: int, dimensions: Sequence[_Dimension]) -> tuple[int, ...]:
     least = items * 2**continuous
     if count < least:
         message = f"a grid of these {len(dimensions)} numbers has at least {least} samples; N is {count}"
-        raise InvalidInput([Diagnostic("USE181", message, hint="increase N, or use lhs or sobol")])
+        raise InvalidInput([Diagnostic("USE181", message, hint=f"use N = {least} or more, or the design lhs or sobol")])
     most = 2
     while continuous and items * (most + 1) ** continuous <= count:
         most += 1
@@ -207,8 +212,9 @@ def _one_at_a_time(count: int, dimensions: Sequence[_Dimension]) -> tuple[int, .
     """Levels per dimension."""
     most = (count - 1) // len(dimensions)
     if most < 1:
-        message = f"one-at-a-time of {len(dimensions)} numbers has at least {len(dimensions) + 1} samples; N is {count}"
-        raise InvalidInput([Diagnostic("USE181", message, hint="increase N")])
+        least = 1 + len(dimensions)
+        message = f"one-at-a-time of {len(dimensions)} numbers has at least {least} samples; N is {count}"
+        raise InvalidInput([Diagnostic("USE181", message, hint=f"use N = {least} or more")])
     return _levels(dimensions, most)
 
 

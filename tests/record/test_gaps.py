@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from manipcli.record.foreign.repair import repair
 from manipcli.record.foreign.topics import open_topics
-from manipcli.record.gaps import MOST, Intervals, gaps_text
+from manipcli.record.gaps import MOST, Intervals, common, gaps_text
 from manipcli.record.read.reading import open_recording
 from manipcli.record.read.scan import Scan
 from manipcli.record.records import CHUNK
@@ -98,3 +98,10 @@ def test_a_hole_in_a_log_is_a_gap_of_its_playback_and_its_topics(
     (gap,) = open_topics(tmp_path / "good.mcap").gaps
     assert (gap.start / 1e9, gap.end / 1e9) == gaps[0]
     assert {"/joint_states", "/tf"} <= set(gap.topics)
+
+
+def test_a_common_gap_is_one_of_all() -> None:
+    one, other = ((1.0, 2.0), (4.0, 6.0)), ((1.5, 3.0), (4.5, 5.0), (5.5, 7.0))
+    assert common(one) == one
+    assert common(one, other) == common(other, one) == ((1.5, 2.0), (4.5, 5.0), (5.5, 6.0))
+    assert common(one, other, ()) == ()

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen, matrix_from_rpy, quat_from_matrix
 from manipcli.description.elements import Link
+from manipcli.logs.replay import open_playback
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, ContactPoint
+from manipcli.pipeline import run_task
 from manipcli.replay.forces import LEAST, LONGEST, Forces
 from manipcli.replay.playback import Playback
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Geometry, Sphere
 
+ROOT = Path(__file__).parents[2]
 TIMES = frozen(np.arange(6) * 0.02)
 POINT = ContactPoint((0.1, 0.0, -0.05), (0.0, 0.6, 0.8), 2.0, (0.3, 0.0, 0.0))
 
@@ -104,3 +108,35 @@ def test_weak_contacts_and_points_without_force_have_no_arrow() -> None:
         contact = Contact("ball", "desk", force, 0.0, points)
         one = replace(playback, contacts=((contact,),) * 6)
         assert len(Forces(one, one.poses()).at(0)) == (1 if len(points) == 2 else 0)
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+def test_the_arrows_on_a_body_at_rest_add_up_to_its_weight(engine: str, tmp_path: Path) -> None:
+    """Oracle: Newton's second law with an acceleration of zero, for a body on the table, one that carries another one,
+    and that one; within 1 % at each time, from 0.1 s on."""
+    task = tmp_path / "rest.yaml"
+    task.write_text(
+        f"""
+task: rest
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+simulation: {{engine: {engine}, step: 1 ms, control_period: 2 ms, seed: 1}}
+scene:
+  desk: {{box: {{size: [0.6, 1.0, 0.4]}}, pose: {{xyz: [0.85, 0, 0.2]}}, fixed: true}}
+  alone: {{box: {{size: [50 mm, 50 mm, 50 mm]}}, mass: 200 g, rests_on: desk, at: [0.75, 0.2]}}
+  below: {{box: {{size: [80 mm, 80 mm, 30 mm]}}, mass: 500 g, rests_on: desk, at: [0.75, -0.2]}}
+  above: {{box: {{size: [40 mm, 40 mm, 40 mm]}}, mass: 100 g, rests_on: below, at: [0.75, -0.2]}}
+steps:
+  - wait: 0.3 s
+"""
+    )
+    run_task(task, log=tmp_path / "rest.mcap")
+    playback = open_playback(tmp_path / "rest.mcap", package_path=[ROOT / "robots"])
+    assert playback.scene is not None
+    forces = Forces(playback, playback.poses())
+    settled = [k for k, time in enumerate(playback.times.tolist()) if time > 0.1]
+    assert len(settled) > 5
+    for name in ("alone", "below", "above"):
+        weight = -playback.scene.body(name).mass * playback.scene.gravity
+        for k in settled:
+            np.testing.assert_allclose(forces.net(name, k), weight, atol=0.01 * float(np.linalg.norm(weight)))

@@ -399,7 +399,7 @@ def test_a_robot_in_a_namespace_is_the_one_that_is_shown(tmp_path: Path) -> None
     assert moment(path, 5.5).joints == moment(tmp_path / "bag.mcap", 5.5).joints
 
 
-def test_of_several_robots_a_moment_names_which_and_a_replay_shows_none(tmp_path: Path) -> None:
+def test_of_several_robots_a_moment_names_which(tmp_path: Path) -> None:
     path = _foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"))
     joints = {joint.name: joint for joint in moment(path, 5.5).joints}
     assert list(joints) == ["r1/turn", "r1/push", "r2/turn", "r2/push"]
@@ -410,8 +410,28 @@ def test_of_several_robots_a_moment_names_which_and_a_replay_shows_none(tmp_path
     tree = {f"{robot}/{child}": f"{robot}/{parent}" for robot in ("r1", "r2") for child, parent in frames.items()}
     assert {name: pose.parent for name, pose in poses.items()} == tree
     assert [poses[f"{robot}/base"].pose.p[0] for robot in ("r1", "r2")] == [1.0, 2.0]
-    with pytest.raises(InvalidInput, match="2 robots in the log: /r1, /r2"):
-        open_playback(path)
+
+
+def test_several_robots_are_shown_together_each_as_it_is_shown_alone(tmp_path: Path) -> None:
+    path = _foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"))
+    both = open_playback(path, rate=10.0)
+    drawing, poses = draw(both.robot, both.scene), both.poses()
+    assert any("2 robots in the log: /r1, /r2; --robot /r1 shows one alone" in note for note in both.notes)
+    for space in ("r1", "r2"):
+        alone = open_playback(path, rate=10.0, space=f"/{space}")
+        np.testing.assert_array_equal(both.times, alone.times)
+        theirs = alone.poses()
+        for k, frame in enumerate(draw(alone.robot, alone.scene).frames):
+            if frame == "world":
+                continue
+            head, _, name = frame.rpartition("/")
+            mine = drawing.frames.index(f"{head}/{space}/{name}" if head else f"{space}/{name}")
+            np.testing.assert_allclose(poses.position[:, mine], theirs.position[:, k], atol=1e-12)
+            turned = abs((poses.quat_xyzw[:, mine] * theirs.quat_xyzw[:, k]).sum(axis=1))
+            np.testing.assert_allclose(turned, 1.0, atol=1e-12)
+    single = draw(alone.robot, alone.scene)
+    assert len(drawing.layer("visual")) == 2 * len(single.layer("visual"))
+    assert both.joint_names == ("r1/turn", "r1/push", "r2/turn", "r2/push")
 
 
 @pytest.mark.parametrize("one_tf", [False, True])
@@ -452,14 +472,19 @@ def test_an_overview_shows_the_joints_of_every_robot(tmp_path: Path) -> None:
     assert {f"{space}/joint_states.position[{joint}]" for space in ("r1", "r2") for joint in ("turn", "push")} <= names
 
 
-def test_a_replay_of_what_several_robots_share_says_that_it_shows_none_of_them(tmp_path: Path) -> None:
-    path = _foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"), one_tf=True)
-    shown = open_playback(path, rate=10.0)
-    assert shown.robot is None
-    assert {body.name for body in shown.scene.bodies} == {"base", "upper", "camera"}  # type: ignore[union-attr]
-    assert not [note for note in shown.notes if "/joint_states (" in note]
-    assert any("2 robots in the log: /r1, /r2" in note and "/r2/joint_states" in note for note in shown.notes)
-    assert [pose.name for pose in moment(path, 5.5).poses] == ["base", "upper", "camera"]
+def test_robots_that_share_their_frames_are_told_to_be_at_one_place(tmp_path: Path) -> None:
+    shown = open_playback(_foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"), one_tf=True), rate=10.0)
+    assert shown.robot is not None
+    assert {link.name for link in shown.robot.links} >= {"r1/base", "r2/base"}
+    assert any("/r1, /r2 are drawn at one place" in note for note in shown.notes)
+
+
+def test_without_a_description_the_frames_are_shown(tmp_path: Path) -> None:
+    shown = open_playback(_foreign(tmp_path / "frames.mcap", urdf=False, joints=()), rate=10.0)
+    assert shown.robot is None and shown.scene is not None
+    assert {body.name for body in shown.scene.bodies} == {"base", "upper", "camera"}
+    camera = [body.name for body in shown.scene.bodies].index("camera")
+    np.testing.assert_allclose(shown.body_position[:, camera, 0], 1.0 + shown.times, atol=1e-9)
 
 
 def test_steps_that_never_began_are_counted(tmp_path: Path) -> None:

@@ -235,6 +235,75 @@ def _press(page: Page, key: str, code: str, number: int) -> None:
 
 
 @pytest.mark.slow
+def test_the_camera_goes_where_the_pointer_is(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """Laws of the camera: zooming keeps the point below the pointer; a double click makes it the target; from above, x
+    of the world is up; a parallel projection has parallel lines of sight; what is followed keeps its place."""
+    path = tmp_path / "run.html"
+    path.write_text(player_page(playback), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player').player")
+    player = "document.querySelector('.mc-player').player"
+
+    def ask(script: str) -> np.ndarray:
+        return np.array(json.loads(str(browser.evaluate(f"JSON.stringify({player}.{script})"))), dtype=float)
+
+    def settled() -> None:
+        browser.wait_for(f"new Promise(done => setTimeout(() => done({player}.camera.glide === null), 50))")
+
+    left, top, wide, high = json.loads(
+        str(
+            browser.evaluate(
+                "JSON.stringify((b => [b.x, b.y, b.width, b.height])"
+                "(document.querySelector('[data-part=canvas]').getBoundingClientRect()))"
+            )
+        )
+    )
+    # Somewhere on the screen something is drawn beside the middle.
+    places = [(x, y) for x in (-0.3, -0.15, 0.15, 0.3) for y in (-0.3, 0.3, 0.0)]
+    x, y = next(place for place in places if browser.evaluate(f"{player}.pick({place[0]}, {place[1]}) !== null"))
+    mouse = {"x": left + (x + 1.0) / 2.0 * wide, "y": top + (1.0 - y) / 2.0 * high}
+    point, distance = ask(f"pick({x}, {y}).point"), ask("camera.distance")
+    for _ in range(3):
+        browser.ask("Input.dispatchMouseEvent", type="mouseWheel", deltaX=0, deltaY=-100, **mouse)
+    browser.wait_for(f"{player}.camera.distance < {0.75 * float(distance)}")
+    # A pixel of the view is 2 to 3 mm wide there, and the surface may be steep.
+    np.testing.assert_allclose(ask(f"pick({x}, {y}).point"), point, atol=0.02)
+
+    for count in (1, 2):
+        for kind in ("mousePressed", "mouseReleased"):
+            browser.ask("Input.dispatchMouseEvent", type=kind, button="left", clickCount=count, **mouse)
+    settled()
+    np.testing.assert_allclose(ask("camera.target"), point, atol=0.02)
+
+    assert browser.evaluate(f"{CLICK}('top')")
+    settled()
+    up = ask("pointAt(0, 0.5)") - ask("pointAt(0, 0)")
+    np.testing.assert_allclose(up / np.linalg.norm(up), [1.0, 0.0, 0.0], atol=1e-9)
+    assert browser.evaluate(f"{CLICK}('parallel')")
+    np.testing.assert_allclose(ask("pointAt(0.5, 0.2, 1)") - ask("pointAt(0.5, 0.2, 3)"), [0.0, 0.0, 2.0], atol=1e-9)
+
+    choose = "(e => { e.value = 'tool'; e.dispatchEvent(new Event('change')); })"
+    browser.evaluate(f"{choose}(document.querySelector('.views select'))")
+    settled()
+    tool = playback.tool_path()
+    for k in (0, len(playback.times) // 2, len(playback.times) - 1):
+        browser.evaluate(f"{player}.seek({float(playback.times[k])!r})")
+        browser.wait_for(
+            f"new Promise(done => requestAnimationFrame(() => setTimeout(() => done({player}.time >= 0), 50)))"
+        )
+        np.testing.assert_allclose(ask("camera.target"), tool[k], atol=1e-3)
+
+    # Every layer can be drawn.
+    boxes = "[...document.querySelectorAll('.layer-panel input[type=checkbox]')]"
+    assert int(str(browser.evaluate(f"{boxes}.length"))) > 10
+    browser.evaluate(f"{boxes}.forEach(box => box.click())")
+    browser.wait_for("document.querySelectorAll('.tag.frame').length > 10")
+    error = "document.querySelector('[data-part=canvas]').getContext('webgl2').getError()"
+    assert browser.evaluate(f"new Promise(done => setTimeout(() => done({error}), 500))") == 0
+    assert browser.complaints == []
+
+
+@pytest.mark.slow
 def test_the_page_of_its_own_takes_keys(browser: Page, playback: Playback, tmp_path: Path) -> None:
     """What has the focus gets its own keys; behind a click on a step they are for the time."""
     path = tmp_path / "run.html"

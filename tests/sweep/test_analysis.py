@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 from pathlib import Path
 
@@ -86,3 +87,39 @@ def test_only_samples_spread_over_the_distributions_have_an_interval(tmp_path: P
     results = tuple(result(k, 1.0, passed=k > 3) for k in range(8))
     swept = Sweep(sampling, results, 8, "", 0.0, 0)
     assert swept.interval == (Rate(4, 8).interval if has else None)
+
+
+def test_one_at_a_time_shows_how_far_each_number_can_go(tmp_path: Path) -> None:
+    """Levels at -pi, -pi/2, 0, pi/2 and pi; the second number fails at -pi/2 and passes beyond."""
+    sampling = cube(tmp_path, "oat:16")
+    results = []
+    for number in range(16):
+        x, y, z = (value - 9.0 for value in sampling.values(number))
+        margin = min(2.0 - x, 1.0 + y if y > -2.0 else 9.0, math.inf if z == 0.0 else 0.5)
+        results.append(result(number, margin, passed=margin >= 0.0))
+    analysis = Analysis(Sweep(sampling, tuple(results), 16, "", 0.0, 0))
+    found = {one.column.name[-1]: one.levels for one in analysis.influences if one.levels is not None}
+    passes = {k: [value - 9.0 for value in one.passes or ()] for k, one in found.items()}
+    assert passes == {
+        "0": pytest.approx([-math.pi, math.pi / 2.0]), "1": pytest.approx([0.0, math.pi]),
+        "2": pytest.approx([-math.pi, math.pi]),
+    }  # fmt: skip
+    assert {k: one.smallest for k, one in found.items()} == {
+        "0": pytest.approx(2.0 - math.pi), "1": pytest.approx(1.0 - math.pi / 2.0), "2": 0.5,
+    }  # fmt: skip
+    assert [one.column.name[-1] for one in analysis.influences] == ["0", "1", "2"]
+    text = render_text(analysis)
+    assert re.search(r"pose.xyz.0 +9 m +5.858 m to 12.14 m +5.858 m to 10.57 m +−1.14 +12.14 m", text)
+    assert re.search(r"pose.xyz.2 .* all ", text)
+    broken = Analysis(Sweep(sampling, (result(0, -1.0, passed=False), *results[1:]), 16, "", 0.0, 0))
+    assert [one.levels.passes for one in broken.influences if one.levels is not None] == [None] * 3
+
+
+def test_where_all_results_are_equal_nothing_is_said_of_the_numbers(tmp_path: Path) -> None:
+    sampling = cube(tmp_path, "")
+    crashed = tuple(SampleResult(k, "crashed", "crashed by signal 11") for k in range(6))
+    for results in (crashed, tuple(result(k, 1.0, passed=True) for k in range(6))):
+        text = render_text(Analysis(Sweep(sampling, results, 6, "", 0.0, 0)))
+        assert "which number matters cannot be seen" in text
+        assert "rank correlation" not in text
+        assert ("expectation " in text) == (results is not crashed)

@@ -118,7 +118,8 @@ def test_a_sample_is_the_same_alone_and_says_its_design() -> None:
     ("design", "cause"),
     [
         ("sobl:8", "'sobl:8' is not a design"), ("sobol", "is not a design"), ("random:5", "is not a design"),
-        ("lhs:0", "is not a design"), ("saltelli:48", "expected a power of two"),
+        ("lhs:0", "N of 'lhs' is 0; expected 1 to 16777216"), ("saltelli:48", "expected a power of two"),
+        ("lhs:²", "is not a design"), ("sobol:16777217", "expected 1 to 16777216"),
         ("grid:5", "has at least 6 samples; N is 5"), ("oat:2", "has at least 3 samples; N is 2"),
     ],
 )  # fmt: skip

@@ -72,7 +72,7 @@ def replay(
     ] = None,
     robot: Annotated[
         str | None,
-        typer.Option("--robot", metavar="NAMESPACE", help="Robot to show if the log has several."),
+        typer.Option("--robot", metavar="NAMESPACE", help="Show only this robot of a log with several."),
     ] = None,
     rerun: Annotated[
         bool,

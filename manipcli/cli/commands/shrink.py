@@ -125,7 +125,7 @@ def shrink(
             except (SweepStopped, RunStopped, OSError, KeyboardInterrupt):
                 lines.clear()
                 for smallest, number in best:
-                    console.result(files.text(smallest))
+                    (console.result if format_ == "text" else console.talk)(files.text(smallest))
                     with suppress(OSError):
                         files.write(smallest, number)
                 raise
@@ -202,8 +202,10 @@ class _Files:
         same = same_as_file(file, smallest.trial, self._settings)
         if same:
             console.talk(f"verified: {self._command(file)} fails with the same margins")
-        else:
-            console.error(f"{self._command(file)} does not give the same result as the search")
+        else:  # the task or the program has changed during the search
+            console.error(f"removed: {self._command(file)} does not give the result of the search")
+            file.unlink()
+            del self._written[id(smallest)]
         return same and smallest.confirmed
 
     def json(self, found: Found, budget: int) -> str:

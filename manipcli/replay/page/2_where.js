@@ -29,7 +29,7 @@ function moment(t, marks = stamps) {
     if (marks[middle] <= t) low = middle; else high = middle;
   }
   if (high === low || (marks === stamps && gapAt(t))) return [low, 0];
-  const way = (t - marks[low]) / (marks[high] - marks[low]);
+  const way = (t - marks[low]) / (marks[high] - marks[low] || 1);
   return way >= 1 ? [high, 0] : [low, Math.max(way, 0)];
 }
 

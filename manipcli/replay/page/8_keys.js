@@ -84,7 +84,7 @@ async function begin() {
   build();
   open();
   // For scripts and tests.
-  root.player = { run, seek, play, poses: (t) => poses(measured, t),
+  root.player = { run, camera, pick, pointAt, seek, play, poses: (t) => poses(measured, t),
     ghosts: (t) => ghosts.map((ghost) => poses(ghost.position, t, ghost.body)), get time() { return time; }, get playing() { return playing; } };
 }
 

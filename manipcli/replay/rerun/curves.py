@@ -52,6 +52,14 @@ def log_curves(
             if table.name.startswith(JOINT):
                 joints.setdefault(column, {})[table.name.removeprefix(JOINT)] = path, unit
         whole += (Chart(f"{table.name} [{unit}]", tuple(paths)) for unit, paths in by_unit.items())
+    margins = [
+        PlotTable("margins", (margin.outcome.name,), ("",), margin.times, margin.relative[:, None])
+        for margin in playback.margins
+    ]
+    for table in margins:
+        _log_curve(to, _path(table, table.columns[0]), table, 0, lines)
+    if margins:
+        whole.append(Chart("margins [tolerances]", tuple(_path(table, table.columns[0]) for table in margins)))
     limits = _log_limits(to, playback, lines)
     return tuple(whole), {name: _charts(of, limits.get(name, {})) for name, of in joints.items()}
 

@@ -12,6 +12,9 @@ from manipcli.core.errors import InvalidArgument
 _LOCAL = ("--bind", "127.0.0.1", "--port", "auto")
 """The viewer also listens for recordings: by default on all networks, and on a port that a second viewer shares."""
 
+_START = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
+"""`python -m rerun_cli` does not return the exit code of the viewer (0.41)."""
+
 
 def check_display() -> None:
     """
@@ -30,9 +33,10 @@ def show(path: Path) -> None:
         InvalidArgument: the viewer failed.
         KeyboardInterrupt: Ctrl-C; the viewer is closed.
     """
-    # -P: no module of the working directory; errors only, as the viewer logs its start in ten lines.
-    command = [sys.executable, "-P", "-m", "rerun_cli", *_LOCAL, str(path)]
-    viewer = subprocess.Popen(command, env={"RUST_LOG": "error", **os.environ})
+    # -P: no module of the working directory; RUST_LOG: the viewer logs its start in ten lines.
+    viewer = subprocess.Popen(
+        [sys.executable, "-P", "-c", _START, *_LOCAL, str(path)], env={"RUST_LOG": "error", **os.environ}
+    )
     try:
         code = viewer.wait()
     except KeyboardInterrupt:

@@ -113,11 +113,15 @@ class Search:
         self._bisect(COARSE)
         width = WIDEST
         while len(self._space.coordinates) > 1 and width >= NARROWEST:
+            way = self.best.way
             if self.consider(self._evaluate([*self._around(width)], "trying directions")):
                 self._bisect(COARSE)
             else:
                 width *= 0.6
+            if self.best.way != way:  # other numbers matter
+                self._each(lambda x, k: 0.0, "dropping numbers")
             self._drop_small()
+        self._each(lambda x, k: 0.0, "dropping numbers")
 
     def confirmed(self) -> Trial | None:
         """Narrows the best trial, and returns that at 0.9 of its distance, which does not fail; None without a best.

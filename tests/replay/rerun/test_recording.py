@@ -18,6 +18,7 @@ pytest.importorskip("rerun", reason="needs the extra 'rerun'")
 
 from rerun.chunk import RrdReader
 
+from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
 from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
@@ -25,6 +26,7 @@ from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Span
 from manipcli.replay.forces import LONGEST
 from manipcli.replay.playback import Playback
+from manipcli.replay.rerun.viewer import show
 from manipcli.replay.rerun.write_recording import write_recording
 from manipcli.shapes.primitives import Box, Mesh, Shape
 
@@ -41,6 +43,7 @@ steps:
   - wait: 0.3 s
 expect:
   - duration: {{below: 60 s}}
+  - always: {{near: {{object: block, to: start, within: 5 cm}}}}
 """
 Rows = dict[str, list[object]]
 
@@ -186,7 +189,7 @@ def test_steps_and_verdict_can_be_read(playback: Playback, entities: dict[str, R
 
 def test_the_file_is_sound_and_says_nothing_of_the_machine(written: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(written)], capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "rerun", "rrd", "verify", str(written)], capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0 and "warn" not in done.stderr.lower(), done.stderr
     reader = RrdReader(str(written))
@@ -203,6 +206,14 @@ def test_texts_of_a_log_are_shown_as_they_are(playback: Playback, tmp_path: Path
     assert "![" not in page and "\n# head" not in page and "<b>" not in page.replace("\\<b", "")
 
 
+def test_a_margin_is_smallest_where_the_verdict_says(playback: Playback, entities: dict[str, Rows]) -> None:
+    (margin,) = (one for one in playback.margins if one.outcome.name == "near")
+    rows = entities["/curves/margins/near"]
+    values = [value for (value,) in rows["Scalars:scalars"]]  # type: ignore[misc]
+    assert min(values) == pytest.approx(margin.outcome.relative)
+    assert _seconds(rows["time"][int(np.argmin(values))]) == pytest.approx(margin.outcome.at, abs=0.02)
+
+
 def test_a_second_run_is_another_recording(playback: Playback, written: Path, tmp_path: Path) -> None:
     moved: Array = frozen(playback.position + 1e-3)
     write_recording(tmp_path / "other.rrd", replace(playback, position=moved))
@@ -212,3 +223,11 @@ def test_a_second_run_is_another_recording(playback: Playback, written: Path, tm
         for path in (written, tmp_path / "other.rrd", tmp_path / "same.rrd")
     ]
     assert ids[0] == ids[2] != ids[1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a screen that does not exist, for X")
+def test_a_viewer_that_fails_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", ":9999")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(InvalidArgument, match="ended with code"):
+        show(tmp_path / "missing.rrd")

@@ -192,6 +192,15 @@ def test_one_change_for_each_way_of_failing(sampling: Sampling, space: Space) ->
     assert all(each.confirmed for each in found)
 
 
+def test_numbers_of_another_way_of_failing_are_dropped(sampling: Sampling, space: Space) -> None:
+    def outcome(x: Vector) -> str:
+        return "failed lift_1" if x[0] < -0.5 else "failed pick_1" if x[1] > 1.5 else "passed"
+
+    start = Start(0, (space.point([-0.6, 1.6, 0.2]), space.point([0.2, 1.7, -0.3])), ())
+    (smallest,) = shrink(space, IdealRuns(sampling, space, outcome, 30), start, seed=0)
+    assert smallest.trial.point.x == pytest.approx((-0.5, 0.0, 0.0), rel=0.01)
+
+
 def test_a_budget_is_kept_and_what_is_found_is_returned(sampling: Sampling, space: Space) -> None:
     for budget in (1, 4, 9, 15, 60):
         runs = IdealRuns(sampling, space, fails(where=lambda x: x[0] + x[2] > 1.2), budget)

@@ -1,6 +1,6 @@
 // The camera: where it is, what it projects, and its changes.
 
-const camera = { target: [...run.camera.target], distance: 1, yaw: 0, pitch: 0, parallel: false, follows: "", glide: null };
+const camera = { target: [...run.camera.target], distance: 1, yaw: 0, pitch: 0, parallel: false, follows: "", followed: null, glide: null };
 const SLOPE = Math.tan((run.camera.field * Math.PI) / 360);
 
 // The first view: yaw 0 is the front of a robot that faces along x.
@@ -18,8 +18,9 @@ function look(view = firstView()) {
 
 // Moves to another view within 0.25 s.
 function glideTo(view) {
-  if (matchMedia("(prefers-reduced-motion: reduce)").matches) { look(view); return refresh(); }
-  const { target, distance, yaw, pitch } = camera, to = { target, distance, yaw, pitch, ...view };
+  // What an unfinished change does not share with this one still comes true.
+  const { target, distance, yaw, pitch } = camera, to = { target, distance, yaw, pitch, ...(camera.glide ? camera.glide.to : {}), ...view };
+  if (matchMedia("(prefers-reduced-motion: reduce)").matches) { look(to); return refresh(); }
   // The shorter way around.
   to.yaw = yaw + Math.atan2(Math.sin(to.yaw - yaw), Math.cos(to.yaw - yaw));
   camera.glide = { from: { target, distance, yaw, pitch }, to, since: performance.now() };
@@ -89,14 +90,11 @@ function rotate(dx, dy) {
 
 // The camera keeps its place relative to what it follows.
 function follow(now) {
-  const axes = run.axes.find((axes) => axes.name === camera.follows);
-  if (!axes) { follow.at = null; return; }
-  const { p } = axisPose(axes, now);
-  if (follow.at && follow.name === camera.follows) {
-    camera.target = add(camera.target, sub(p, follow.at));
-    if (camera.glide) for (const view of [camera.glide.from, camera.glide.to]) view.target = add(view.target, sub(p, follow.at));
-  }
-  [follow.at, follow.name] = [p, camera.follows];
+  const axes = run.axes.find((axes) => axes.name === camera.follows), before = camera.followed;
+  camera.followed = axes ? { axes, p: axisPose(axes, now).p } : null;
+  if (!axes || !before || before.axes !== axes) return;
+  const step = sub(camera.followed.p, before.p);
+  for (const view of camera.glide ? [camera, camera.glide.from, camera.glide.to] : [camera]) view.target = add(view.target, step);
 }
 
 const axisPose = (axes, now) => {

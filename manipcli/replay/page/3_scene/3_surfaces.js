@@ -132,7 +132,9 @@ function furnish(canvas) {
     attribute(programs.ground, "place", 3, gl.FLOAT, false, 12);
     return made;
   };
-  [grid, ground] = [flat(lines), flat([-20, -20, z, 20, -20, z, -20, 20, z, 20, 20, z])];
+  // As far as shadows reach.
+  const [x, y] = run.extent.centre, r = 2 * run.extent.radius;
+  [grid, ground] = [flat(lines), flat([x - r, y - r, z, x + r, y - r, z, x - r, y + r, z, x + r, y + r, z])];
   if (run.path) {
     const points = array(run.path), route = array(run.route);
     // Behind its points there is room for the line to the tool.

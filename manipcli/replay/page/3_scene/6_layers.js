@@ -48,6 +48,7 @@ function buildLayers() {
     if (key === "trail") slider(group(name), "last", sizes.trail, 0.5, Math.max(run.end - run.start, 1), 0.5, (v) => `${v} s`, (v) => { sizes.trail = v; });
     if (key === "forces") slider(group(name), "length", 0, -2, 2, 0.5, (v) => `${+(2 ** v).toFixed(2)} ×`, (v) => { sizes.force = 2 ** v; });
   }
+  if (!run.drawables.length) shows.frames = true; // a log with frames only
   if (run.axes.length) buildFrames(group("frames"));
   const bar = element(part("layers"), "div", "force-scale");
   bar.dataset.part = "scale";

@@ -48,8 +48,8 @@ function label(all, now, models, t) {
     tag.className = `tag ${note.kind}`;
     if (tag.textContent !== note.text) tag.textContent = note.text;
     let [left, top] = [Math.round(Math.min(x * wide + 6, wide - 6.5 * note.text.length - 12)), Math.round((1 - y) * high + 3)];
-    // Numbers at one place are below each other, as far as there is room.
-    const full = () => note.kind !== "frame" && taken.some(([l, t]) => Math.abs(l - left) < 70 && Math.abs(t - top) < 16);
+    // Labels at one place are below each other, as far as there is room.
+    const full = () => taken.some(([l, t]) => Math.abs(l - left) < 70 && Math.abs(t - top) < 16);
     for (let row = 0; row < 3 && full(); row++) top += 16;
     const shown = at[3] > 0 && z < 1 && !(front && !own && front.depth < z) && !full();
     if (shown) taken.push([left, top]);

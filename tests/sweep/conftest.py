@@ -1,0 +1,5 @@
+"""The browser of the tests of pages."""
+
+from tests.replay.conftest import browser
+
+__all__ = ["browser"]
