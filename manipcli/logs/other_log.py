@@ -30,9 +30,10 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
 from manipcli.record.foreign.snapshot import joint_state, transforms
 from manipcli.record.foreign.topics import Topics, open_topics
+from manipcli.record.gaps import Gaps, common
 from manipcli.record.read.chunk import singly
 from manipcli.render.drawing import WORLD
-from manipcli.replay.playback import Playback
+from manipcli.replay.playback import Playback, gap_notes
 from manipcli.scene.scene import Body, Scene
 
 LEAST_STEADY = 1e-6
@@ -101,6 +102,7 @@ class _Log:
         there = {meaning.usual for name, meaning in known.items() if space is None or name in wanted}
         self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
         self.begin = begin = self._first(topics, wanted)
+        self.gaps = self._gaps(topics, wanted)
         for topic, data, places in topics.messages(wanted):
             try:
                 for ns, reader in singly(data, places):
@@ -112,6 +114,7 @@ class _Log:
         """Count all times from another one [ns]."""
         shift, self.begin = (self.begin - begin) / 1e9, begin
         self.start, self.end = self.start + shift, self.end + shift
+        self.gaps = tuple((start + shift, end + shift) for start, end in self.gaps)
         for samples in (*self.joints.values(), *self.frames.values()):
             samples.times = [time + shift for time in samples.times]
 
@@ -119,6 +122,15 @@ class _Log:
         """Time of the first moving data [ns]; a description can be much older."""
         moving = [topics.all[name] for name, usual in wanted.items() if usual in (channels.JOINT_STATES, channels.TF)]
         return min((topic.first for topic in moving if topic.count), default=topics.start)
+
+    def _gaps(self, topics: Topics, wanted: Mapping[str, str]) -> Gaps:
+        """Those of the joint states, and without any those of the frames."""
+        for usual in (channels.JOINT_STATES, channels.TF):
+            names = [name for name, meaning in wanted.items() if meaning == usual and topics.all[name].count]
+            if names:
+                found = topics.all[names[0]].intervals.gaps()
+                return tuple(((start - self.begin) / 1e9, (end - self.begin) / 1e9) for start, end in found)
+        return ()
 
     def _take(self, topic: str, time: float, reader: CdrReader) -> None:
         if topic == channels.ROBOT_DESCRIPTION:
@@ -180,20 +192,25 @@ def open_other(
             for part in moving.values():
                 part.begin_at(begin)
             start, end = min(part.start for part in moving.values()), max(part.end for part in moving.values())
-            times = _times(start, end, rate)
+            gaps = common(*(part.gaps for part in moving.values()))
+            times = _times(start, end, rate, gaps)
             shown = {
-                each: _playback(path, topics, part, each, times, why, package_path, allow_outside)
+                each: _playback(path, topics, part, each, times, gaps, why, package_path, allow_outside)
                 for each, part in moving.items()
             }
             return together(path.name, shown)
     _check_moves(path, topics, log, space)
-    return _playback(path, topics, log, space, _times(log.start, log.end, rate), why, package_path, allow_outside)
+    times = _times(log.start, log.end, rate, log.gaps)
+    return _playback(path, topics, log, space, times, log.gaps, why, package_path, allow_outside)
 
 
-def _times(start: float, end: float, rate: float) -> Array:
-    """(T,) [s] of the states of a playback, from the first to the last."""
+def _times(start: float, end: float, rate: float, gaps: Gaps) -> Array:
+    """(T,) [s] of the states of a playback, from the first to the last, with the ends of gaps and none inside."""
     count = max(1, min(int(np.ceil((end - start) * rate)), MAX_TIMES))
-    return np.linspace(start, end, count + 1) if end > start else np.array([start])
+    times = np.linspace(start, end, count + 1) if end > start else np.array([start])
+    for begin, until in gaps:
+        times = np.union1d(times[(times <= begin) | (times >= until)], [begin, until])
+    return times
 
 
 def _check_moves(path: Path, topics: Topics, log: _Log, space: str | None) -> None:
@@ -215,6 +232,7 @@ def _playback(
     log: _Log,
     space: str | None,
     times: Array,
+    gaps: Gaps,
     why: str,
     package_path: Sequence[Path],
     allow_outside: bool,
@@ -223,6 +241,7 @@ def _playback(
     notes = [f"{why}: no steps, no contacts, no references and no verdict"]
     subject = "the log" if space is None else f"'{space}'"
     notes += [f"{subject} has no {name} ({TYPES[name]})" for name in log.lacks]
+    notes += gap_notes(gaps)
     tree = {child: (parent, _poses(samples, times)) for (parent, child), samples in log.frames.items()}
     robot = _robot(log.urdf, notes)
     if robot is not None:
@@ -252,6 +271,7 @@ def _playback(
         lost=topics.lost,
         notes=tuple(notes),
         begin=log.begin,
+        gaps=gaps,
         sensed=partial(read_sensed, path, begin=log.begin, end=float(times[-1])),
     )
 

@@ -26,7 +26,7 @@ from manipcli.record.foreign.origin import is_own
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.display_sampling import sampled
-from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
+from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep, gap_notes
 
 
 def open_playback(
@@ -80,7 +80,7 @@ def _open_own(
     )
     robot, scene = meshes.robot(robot), meshes.scene(scene)
     notes = meshes.notes
-    span, contacts = samples
+    span, contacts, gaps = samples
     states = span.states
     body_position, body_quat_xyzw = states.body_position, states.body_quat_xyzw
     if TF in recording.absent:
@@ -88,7 +88,7 @@ def _open_own(
         body_position = frozen(np.broadcast_to([X_WO.p for X_WO in start], body_position.shape))
         body_quat_xyzw = frozen(np.broadcast_to([X_WO.quat_xyzw for X_WO in start], body_quat_xyzw.shape))
         notes = (*notes, f"{TF} not recorded: bodies are drawn at their start poses")
-    notes = (*notes, *(recording.unknown(topic) for topic in recording.silent))
+    notes = (*notes, *(recording.unknown(topic) for topic in recording.silent), *gap_notes(gaps))
     touching = [contact for each in contacts.found for contact in each]
     if touching and not any(contact.points for contact in touching):
         notes = (*notes, "the log has no contact points: contact forces are not drawn")
@@ -113,6 +113,7 @@ def _open_own(
         events=recording.events,
         lost=recording.lost,
         notes=notes,
+        gaps=gaps,
         period=recording.period,
         sensed=partial(read_sensed, path, begin=0, end=float(states.time[-1])),
         keep=meshes.folder,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -9,30 +10,37 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.judge.margin_curves import MarginCurve
 from manipcli.model.robot import RobotModel
+from manipcli.replay.level_of_detail import Rows, needed_rows, value_errors
 from manipcli.replay.marks import marks
-from manipcli.replay.pack import Json, Pack
+from manipcli.replay.pack import LARGEST, Json, Pack
 from manipcli.replay.playback import Playback, PlotTable
 
 Limit = tuple[float | None, float | None] | None
 """Lower and upper limit, None where there is none; None without either."""
 MARGINS = "margins"
 """Name of the table of margins."""
+SHARE = 1.0 / 500.0
+"""Largest deviation of a drawn line from the sampled values, as a share of the range of its column."""
+MOST = 200_000
+"""Most numbers of a table."""
 BRIDGED = 3.0
 """Display samples between two known margins that are joined by a line."""
 
 
 def curves_json(playback: Playback, pack: Pack) -> Json:
     """`curves` and `marks` of the head of a page."""
-    tables: list[Json] = [
-        {
-            "name": table.name,
-            "columns": table.columns,
-            "units": table.units,
-            "limits": limits(table, playback.robot),
-            "values": pack.add(table.values, "f"),
-        }
-        for table in playback.curves()
-    ]
+    tables: list[Json] = []
+    for table in playback.curves():
+        rows = _rows(playback, table.values)
+        tables.append(
+            {
+                "name": table.name,
+                "columns": table.columns,
+                "units": table.units,
+                "limits": limits(table, playback.robot),
+                **_packed(playback, rows, pack, values=table.values),
+            }
+        )
     if playback.margins:
         tables.append(_margins(playback, pack))
     return {"curves": tables, "marks": [asdict(mark) for mark in marks(playback)]}
@@ -54,17 +62,42 @@ def limits(table: PlotTable, robot: RobotModel | None) -> list[Limit]:
     return found
 
 
+def _rows(playback: Playback, values: Array, *, always: Sequence[int] = ()) -> Rows:
+    """Rows between which lines deviate by at most `SHARE` of the range of each column (T, c), or by a multiple if
+    these were more than `MOST` numbers."""
+    share = SHARE
+    always = [*always, *(playback.index(end) for gap in playback.gaps for end in gap)]
+    values = np.clip(values, -LARGEST, LARGEST)
+    while True:
+        rows = needed_rows(len(values), value_errors(playback.times, values, share), always=always)
+        if rows.size * values.shape[1] <= MOST or share >= 1.0:
+            return rows
+        share *= 2.0
+
+
+def _packed(playback: Playback, rows: Rows, pack: Pack, **tables: Array) -> Json:
+    """Times and values of the rows, with an unknown row inside each gap."""
+    times = playback.times[rows]
+    inside = np.searchsorted(times, [(start + end) / 2.0 for start, end in playback.gaps])
+    found: Json = {"times": pack.add(np.insert(times, inside, [sum(gap) / 2.0 for gap in playback.gaps]), "f")}
+    for name, values in tables.items():
+        found[name] = pack.add(np.insert(values[rows], inside, np.nan, axis=0), "f")
+    return found
+
+
 def _margins(playback: Playback, pack: Pack) -> Json:
     """The margins in their units, and `relative`: divided by the tolerances, which compares those of several units."""
     curves = playback.margins
     sampled_curves = [sampled(curve, playback.times) for curve in curves]
+    values, relative = (np.stack(columns, axis=1) for columns in zip(*sampled_curves, strict=True))
+    deciding = [playback.index(curve.outcome.at) for curve in curves if curve.outcome.at is not None]
+    rows = _rows(playback, np.concatenate([values, relative], axis=1), always=deciding)
     return {
         "name": MARGINS,
         "columns": [curve.outcome.name for curve in curves],
         "units": [curve.unit or "tolerances" for curve in curves],
         "limits": [(0.0, None)] * len(curves),
-        "values": pack.add(np.stack([margins for margins, _ in sampled_curves], axis=1), "f"),
-        "relative": pack.add(np.stack([relative for _, relative in sampled_curves], axis=1), "f"),
+        **_packed(playback, rows, pack, values=values, relative=relative),
         "since": [curve.since if np.isfinite(curve.since) else None for curve in curves],
         "tightest": [_tightest(curve) for curve in curves],
     }

@@ -9,39 +9,55 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.model.state import Contact
+from manipcli.record.gaps import LEAST, Gaps, Intervals
 from manipcli.record.recording import ContactSnapshot, Recording, Span, joined
 
 
-def sampled(recording: Recording, *, rate: float) -> tuple[Span, SampledContacts] | None:
-    """The ticks nearest to multiples of 1 / rate, and the last one; one span in memory at a time.
+def sampled(recording: Recording, *, rate: float) -> tuple[Span, SampledContacts, Gaps] | None:
+    """The ticks nearest to multiples of 1 / rate, the last one and those beside a gap; one span in memory at a time.
 
     Args:
         recording: the recording.
         rate: sampling rate [Hz]; above the rate of the recording, every tick is taken.
 
     Returns:
-        The ticks as one span without contacts, and the contacts of each tick; None for a recording without ticks.
+        The ticks as one span without contacts, the contacts of each tick, and the gaps of the recording; None for a
+        recording without ticks.
     """
     chosen: list[Span] = []
     gathered = SampledContacts()
+    intervals = Intervals()
     before = -1.0
+    last: Span | None = None
     for span in recording.spans:
         times = span.states.time
         if not len(times):
             continue
         # Index of the last multiple that a tick is nearest to, or past; a tick is taken if it grows.
         number = np.floor((times + recording.period / 2.0) * rate + 1e-9)
-        ticks = np.flatnonzero(np.diff(number, prepend=before))
+        picked = np.diff(number, prepend=before) != 0.0
         before = float(number[-1])
+        intervals.add(np.rint(times * 1e9).astype(np.int64))
+        holes = np.flatnonzero(np.diff(times) * 1e9 >= LEAST)
+        picked[holes] = picked[holes + 1] = True
+        if last is not None and (times[0] - last.states.time[0]) * 1e9 >= LEAST:
+            picked[0] = True
+            _append(chosen, gathered, last)
+        ticks = np.flatnonzero(picked)
         chosen.append(_picked(span, ticks))
         gathered.add(span.contacts, times[ticks])
         last = _picked(span, np.array([len(times) - 1]))
-    if not chosen:
+    if last is None:
         return None
-    if last.states.time[0] not in chosen[-1].states.time:
+    _append(chosen, gathered, last)
+    return joined(chosen), gathered, tuple((start / 1e9, end / 1e9) for start, end in intervals.gaps())
+
+
+def _append(chosen: list[Span], gathered: SampledContacts, last: Span) -> None:
+    """Take a tick after all taken ones, unless it is the last of these."""
+    if not len(chosen[-1].states.time) or last.states.time[0] > chosen[-1].states.time[-1]:
         chosen.append(last)
         gathered.add((), last.states.time)
-    return joined(chosen), gathered
 
 
 def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:

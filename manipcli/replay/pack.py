@@ -14,7 +14,7 @@ Reference = tuple[str, int, int]
 """Number type, offset [byte] and count of an array in the pack."""
 
 LEVEL = 9
-_LARGEST = float(np.finfo(np.float32).max)
+LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(slots=True)
@@ -28,7 +28,7 @@ class Pack:
         """`kind`: f float32, H uint16, I uint32, b int8."""
         if kind == "f":
             # Values beyond float32 are clipped.
-            values = np.clip(values, -_LARGEST, _LARGEST)
+            values = np.clip(values, -LARGEST, LARGEST)
         array = np.ascontiguousarray(values, dtype={"f": "<f4", "H": "<u2", "I": "<u4", "b": "i1"}[kind])
         data = array.tobytes()
         reference = (kind, self.length, array.size)

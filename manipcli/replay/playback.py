@@ -15,6 +15,7 @@ from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
+from manipcli.record.gaps import Gaps, gaps_text
 from manipcli.record.recording import TaskEvent
 from manipcli.render.placing import Placing, Poses
 from manipcli.replay.cause import Cause
@@ -91,6 +92,7 @@ class Playback:
         lost: why the end of the log is missing, or None.
         notes: what is missing or differs from the run, one sentence each.
         begin: log time of t = 0 [ns].
+        gaps: start and end [s] of the times without data, at which nothing is known to move; both are among `times`.
         period: of the control tick [s]; None for a log of another program.
         sensed: reads what the sensors measured, for a drawing with these frames.
         keep: owner of resources with the same lifetime: the folder of embedded meshes.
@@ -117,6 +119,7 @@ class Playback:
     lost: str | None = None
     notes: tuple[str, ...] = ()
     begin: int = 0
+    gaps: Gaps = ()
     period: float | None = None
     sensed: Callable[[Collection[str]], Sensed] = field(repr=False, default=lambda frames: Sensed())
     keep: object = field(repr=False, default=None)
@@ -219,6 +222,11 @@ class Playback:
                 values[k, pairs[contact.a, contact.b]] = contact.force
         columns = tuple(f"{a.removeprefix('robot/')} – {b.removeprefix('robot/')}" for a, b in pairs)
         return (PlotTable("contact force", columns, ("N",) * len(pairs), self.times, values),)
+
+
+def gap_notes(gaps: Gaps) -> tuple[str, ...]:
+    """What is shown in gaps, one sentence; none without gaps."""
+    return (f"no data from {gaps_text(gaps)}: the state before is held",) if gaps else ()
 
 
 def filled(values: Array) -> Array:

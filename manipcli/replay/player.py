@@ -1,7 +1,7 @@
 """HTML player of a run: one self-contained file that needs no server.
 
 `player_html` is an element of a larger page, `player_page` a whole page. The browser gets the triangles once and the
-joint positions at every time, and computes the kinematics itself.
+joint positions at the times that interpolation needs, and computes the kinematics itself.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.resources import files
 
-import numpy as np
-
 from manipcli.render.drawing import draw
 from manipcli.replay.cause import Cause
 from manipcli.replay.curves_json import curves_json
 from manipcli.replay.ghost import Ghost
+from manipcli.replay.motion_json import motion_json
 from manipcli.replay.pack import Json, Pack
 from manipcli.replay.playback import Playback
 from manipcli.replay.scene_json import scene_json
@@ -102,18 +101,10 @@ def _contents(playback: Playback, ghosts: Sequence[Ghost]) -> tuple[str, str, bo
         "causes": [_cause(cause) for cause in playback.causes],
         "joints": playback.joint_names,
         "bodies": playback.body_position.shape[1],
-        "times": pack.add(playback.times, "f"),
-        "position": pack.add(playback.stance, "f"),
-        "reference": pack.add(playback.reference_position(), "f") if playback.has_reference else None,
-        "body": pack.add(np.concatenate([playback.body_position, playback.body_quat_xyzw], axis=2), "f"),
+        **motion_json(playback, ghosts, pack),
         **scene_json(playback, drawing, pack),
         **curves_json(playback, pack),
     }
-    if ghosts:
-        head["ghosts"] = [
-            {"name": ghost.name, "position": pack.add(ghost.position, "f"), "body": pack.add(ghost.body, "f")}
-            for ghost in ghosts
-        ]
     sensed = playback.sensed(drawing.frames)
     if sensed:
         head["senses"] = sensed_json(sensed, {name: k for k, name in enumerate(drawing.frames)}, pack)

@@ -11,10 +11,10 @@ from manipcli.render.drawing import WORLD, Drawing, Layer, floors_of, ground_hei
 from manipcli.render.placing import Placing, Poses
 from manipcli.render.surface import Surface, joined
 from manipcli.replay.camera import framing
-from manipcli.replay.forces import LONGEST, Forces
 from manipcli.replay.furniture import furniture
 from manipcli.replay.pack import Json, Pack
 from manipcli.replay.playback import Playback
+from manipcli.replay.pushes_json import pushes_json
 from manipcli.scene.scene import Scene
 from manipcli.shapes.primitives import Rgba
 
@@ -35,7 +35,6 @@ def scene_json(playback: Playback, drawing: Drawing, pack: Pack) -> Json:
     start = Poses(poses.position[0], poses.quat_xyzw[0])
     camera = framing(drawing, seen, leave_out=large | floors).further(1.05)
     surfaces = _Surfaces(pack)
-    path = playback.tool_path()
     return {
         "camera": {"eye": camera.eye, "target": camera.target, "field": camera.field},
         "extent": _extent(drawing, seen, index, floors),
@@ -47,8 +46,7 @@ def scene_json(playback: Playback, drawing: Drawing, pack: Pack) -> Json:
         "collision": _drawables(drawing, "collision", index, floors, surfaces),
         "surfaces": surfaces.found,
         "inertias": _inertias(playback.robot, playback.scene, index),
-        "path": pack.add(path, "f") if len(path) > 1 else None,
-        "pushes": _pushes(playback, poses, pack),
+        "pushes": pushes_json(playback, poses, index, pack),
     }
 
 
@@ -173,23 +171,3 @@ def _inertias(robot: RobotModel | None, scene: Scene | None, index: dict[str, in
             box, X = inertia_box(inertial)
             found.append({"frame": index[frame], "mass": inertial.mass, "box": box.size, **_pose(X)} | _robot(frame))
     return found
-
-
-def _pushes(playback: Playback, poses: Poses, pack: Pack) -> Json | None:
-    """Rows of point, normal force and friction, the pair of each row, and the first row of each time."""
-    forces = Forces(playback, poses)
-    if not forces.scale:
-        return None
-    pushes_at = [forces.at(k) for k in range(len(playback.times))]
-    pushes = [push for each in pushes_at for push in each]
-    rows = [[*push.point, *push.normal, *push.friction] for push in pushes]
-    pairs = {pair: k for k, pair in enumerate(dict.fromkeys((push.on, push.other) for push in pushes))}
-    return {
-        "first": pack.add(np.cumsum([0, *map(len, pushes_at)]), "I"),
-        # Rounded to 1e-6 without -0: further digits differ between processes.
-        "rows": pack.add(np.round(np.array(rows).reshape(-1, 9), 6) + 0.0, "f"),
-        "pair": pack.add([pairs[push.on, push.other] for push in pushes], "H"),
-        "pairs": [[name.removeprefix("robot/") for name in pair] for pair in pairs],
-        "scale": forces.scale,
-        "longest": LONGEST,
-    }

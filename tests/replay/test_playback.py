@@ -98,7 +98,7 @@ def test_the_times_are_the_ticks_nearest_to_the_rate(log: Path) -> None:
     recording = read_recording(log)
     ticks = recording.states.time
     for rate in (50.0, 30.0, 7.0, 5000.0):
-        chosen_span, _ = sampled(recording, rate=rate) or pytest.fail("nothing is recorded")
+        chosen_span, *_ = sampled(recording, rate=rate) or pytest.fail("nothing is recorded")
         samples = chosen_span.states
         goals = np.arange(0.0, ticks[-1] + 1e-12, 1.0 / rate)
         nearest = {int(np.argmin(np.abs(ticks - goal))) for goal in goals} | {0, len(ticks) - 1}
@@ -275,10 +275,12 @@ def _foreign(
     spaces: tuple[str, ...] = ("",),
     one_tf: bool = False,
     without: tuple[str, ...] = (),
+    hole: tuple[float, float] = (1.0, 1.0),
 ) -> Path:
     """A second of a log as rosbag2 writes one, times since 1970; `turn` = sin(t), `push` = 0.1 t; a camera flies by.
     With `gaps` the second joint comes late, and the first is NaN for a while. `spaces`: before the names of topics, but
-    with `one_tf` not before `/tf`; the base of the n-th stands at x = 1 + n. `without`: topics that are not there."""
+    with `one_tf` not before `/tf`; the base of the n-th stands at x = 1 + n. `without`: topics that are not there.
+    `hole`: times between which there is nothing."""
     message = TYPES.types
     with path.open("wb") as file:
         writer = Writer(file)
@@ -308,6 +310,8 @@ def _foreign(
             put("/robot_description", kind, BEGIN - 5 * 10**9, message[kind](URDF))
         for k in range(101):
             t, ns = k / 100, BEGIN + k * 10**7
+            if hole[0] < t < hole[1]:
+                continue
             if joints:
                 if gaps:
                     joints = ("turn", "push") if t >= 0.5 else ("turn",)
@@ -333,6 +337,16 @@ def _foreign(
                     put("/tf", kind, ns, message[kind](transforms), (space,))
         writer.finish()
     return path
+
+
+def test_a_pause_of_the_recorder_is_a_gap(tmp_path: Path) -> None:
+    shown = open_playback(_foreign(tmp_path / "bag.mcap", hole=(0.403, 0.697)), rate=100.0)
+    assert np.array(shown.gaps) == pytest.approx(np.array([[0.4, 0.7]]))
+    k = int(np.argmax(np.diff(shown.times)))
+    assert shown.times[k : k + 2] == pytest.approx([0.4, 0.7])
+    np.testing.assert_allclose(shown.position[k : k + 2, 1], [0.04, 0.07], atol=1e-7)
+    assert "no data from 0.40 to 0.70 s: the state before is held" in shown.notes
+    assert open_playback(_foreign(tmp_path / "whole.mcap")).gaps == ()
 
 
 def test_a_log_of_another_program_is_shown(tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact, ContactPoint
 from manipcli.render.drawing import draw
+from manipcli.render.placing import Placing
+from manipcli.replay.level_of_detail import POSITION
 from manipcli.replay.playback import Phase, Playback, PlaybackStep
 from manipcli.replay.player import player_html, player_page
 from manipcli.scene.scene import Body, Scene
@@ -144,8 +146,10 @@ def test_two_of_them_stand_in_one_page(playback: Playback) -> None:
 def test_triangles_and_joints_are_those_of_the_run(playback: Playback) -> None:
     _, head, data, _ = _Elements(player_page(playback)).scripts
     told = json.loads(head)
-    np.testing.assert_allclose(_array(told["position"], data).reshape(-1, 2), playback.position, atol=1e-7)
-    np.testing.assert_allclose(_array(told["reference"], data).reshape(-1, 2)[:, 1], playback.position[:, 1], atol=1e-7)
+    rows = np.searchsorted(playback.times, _array(told["times"], data) - 1e-4)
+    np.testing.assert_allclose(_array(told["position"], data).reshape(-1, 2), playback.position[rows], atol=1e-7)
+    reference = _array(told["reference"], data).reshape(-1, 2)
+    np.testing.assert_allclose(reference[:, 1], playback.position[rows, 1], atol=1e-7)
     drawing = draw(playback.robot, playback.scene)
     visual = drawing.layer("visual")
     assert [drawing.frames[one["frame"]] for one in told["drawables"]] == [one.frame for one in visual]
@@ -170,18 +174,87 @@ def test_what_is_too_large_for_the_browser_is_as_large_as_its_numbers_get(playba
         warnings.simplefilter("error")
         _, head, data, _ = _Elements(player_page(replace(playback, effort=effort))).scripts
     (table,) = [one for one in json.loads(head)["curves"] if one["name"] == "joint effort"]
-    values = _array(table["values"], data).reshape(len(playback.times), -1)
-    assert np.isfinite(values[3]).all() and values[3].max() > 1e38
+    row = _array(table["times"], data).tolist().index(np.float32(playback.times[3]))
+    values = _array(table["values"], data).reshape(-1, len(table["columns"]))
+    assert np.isfinite(values[row]).all() and values[row].max() > 1e38
 
 
 def test_the_page_has_the_force_and_the_friction_of_each_point(playback: Playback) -> None:
     _, head, data, _ = _Elements(player_page(playback)).scripts
     pushes = json.loads(head)["pushes"]
     first, rows = _array(pushes["first"], data), _array(pushes["rows"], data).reshape(-1, 9)
-    assert first.tolist() == list(range(0, 53, 2))
-    np.testing.assert_allclose(rows[0], [1.0, 2.0, 0.5, 0.0, 0.0, 4.0, 0.5, 0.0, 0.0])
-    x = 1.01 + 0.1 * playback.times[25]
-    np.testing.assert_allclose(rows[-1], [x, 2.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.25, 0.0], atol=1e-6)
+    # They do not change relative to the ball, which carries them along.
+    assert _array(pushes["times"], data).tolist() == [0.0]
+    assert first.tolist() == [0, 2]
+    assert [draw(playback.robot, playback.scene).frames[k] for k in pushes["frames"]] == ["ball"]
+    np.testing.assert_allclose(
+        rows,
+        [[0.0, 0.0, -0.1, 0.0, 0.0, 4.0, 0.5, 0.0, 0.0], [0.01, 0.0, -0.1, 0.0, 0.0, 1.0, 0.0, 0.25, 0.0]],
+        atol=1e-6,
+    )
+
+
+def test_a_force_that_changes_is_shown_from_then_on(playback: Playback) -> None:
+    (lies,) = playback.contacts[0]
+    more = lies._replace(points=tuple(point._replace(force=2.0 * point.force) for point in lies.points))
+    run = replace(playback, contacts=((lies,),) * 10 + ((more,),) * 16)
+    _, head, data, _ = _Elements(player_page(run)).scripts
+    pushes = json.loads(head)["pushes"]
+    np.testing.assert_allclose(_array(pushes["times"], data), [0.0, playback.times[10]], atol=1e-7)
+    assert _array(pushes["rows"], data).reshape(-1, 9)[:, 5].tolist() == [4.0, 1.0, 8.0, 2.0]
+
+
+def test_a_long_page_shows_every_state_within_the_bound_and_is_small(playback: Playback) -> None:
+    """A minute in which joints and ball never rest, and forces never stay; oracle: interpolation by numpy."""
+    times = np.arange(3_000) * 0.02
+    position = np.stack([np.sin(times), 0.2 * np.sin(1.7 * times)], axis=1)
+    ball = np.tile([1.0, 2.0, 0.6, 0.0, 0.0, 0.0, 1.0], (len(times), 1, 1))
+    ball[:, 0, 0] += 0.3 * np.abs(np.sin(2.0 * times))
+    (lies,) = playback.contacts[0]
+    noise = np.random.default_rng(3).uniform(0.5, 1.5, len(times)).tolist()
+    contacts = tuple(
+        (lies._replace(points=tuple(point._replace(force=factor * point.force) for point in lies.points)),)
+        for factor in noise
+    )
+    effort = np.random.default_rng(4).normal(size=position.shape)
+    long = replace(
+        playback, times=times, position=position, velocity=np.gradient(position, times, axis=0), effort=effort,
+        reference=position + 0.01, body_position=ball[..., :3], body_quat_xyzw=ball[..., 3:], contacts=contacts,
+        contact_times=tuple((time,) for time in times.tolist()),
+    )  # fmt: skip
+    page = player_page(long)
+    assert len(page) < 5_000_000 / 10
+    _, head, data, _ = _Elements(page).scripts
+    told = json.loads(head)
+    kept = _array(told["times"], data).astype(float)
+    joints = _array(told["position"], data).reshape(-1, 2)
+    body = _array(told["body"], data).reshape(-1, 7)
+    shown = np.stack([np.interp(times, kept, column) for column in joints.T], axis=1)
+    placing = Placing(long.robot, long.scene)
+    place = np.stack([np.interp(times, kept, column) for column in body.T[:3]], axis=1)[:, None]
+    found = placing.at(shown, place, long.body_quat_xyzw)
+    apart = np.linalg.norm(found.position - long.poses().position, axis=2)
+    assert apart.max() < 1.01 * POSITION
+    assert len(kept) < 0.6 * len(times)
+
+
+def test_a_gap_is_named_and_its_ends_are_states_of_the_page(playback: Playback) -> None:
+    there = np.r_[0:8, 18:26]
+    run = replace(
+        playback, times=playback.times[there], gaps=((0.14, 0.36),), contacts=playback.contacts[:16],
+        contact_times=playback.contact_times[:16],
+        **{name: getattr(playback, name)[there] for name in
+           ("position", "velocity", "effort", "reference", "body_position", "body_quat_xyzw")},
+    )  # fmt: skip
+    _, head, data, _ = _Elements(player_page(run)).scripts
+    told = json.loads(head)
+    assert told["gaps"] == [[0.14, 0.36]]
+    assert {np.float32(0.14), np.float32(0.36)} <= set(_array(told["times"], data))
+    (table,) = [one for one in told["curves"] if one["name"] == "joint position"]
+    times, values = _array(table["times"], data), _array(table["values"], data).reshape(-1, 2)
+    inside = (times > 0.141) & (times < 0.359)
+    assert inside.sum() == 1
+    assert np.isnan(values[inside]).all() and np.isfinite(values[~inside]).all()
 
 
 def test_a_page_without_points_has_no_pushes(playback: Playback) -> None:

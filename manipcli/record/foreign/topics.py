@@ -10,14 +10,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from manipcli.record import schemas
 from manipcli.record.decode import Int
 from manipcli.record.faults import REPAIRABLE, BadRecording
+from manipcli.record.gaps import Intervals
 from manipcli.record.read.chunk import Places, chunk_places, open_chunk, walked
 from manipcli.record.read.salvage import Salvage, Stretch
 from manipcli.record.read.scan import Damage, chunk_at, guarded, readable
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
+
+STATES = (schemas.JOINT_STATE, schemas.TF_MESSAGE, schemas.CONTROLLER_STATE)
+"""Types of the topics whose gaps are reported."""
 
 
 @dataclass(slots=True)
@@ -32,6 +37,7 @@ class Topic:
         qos: profiles of its publishers, as rosbag2 writes them; "" if unknown.
         count: number of messages.
         first, last: log times [ns]; 0 without messages.
+        intervals: of its messages.
     """
 
     name: str
@@ -42,6 +48,7 @@ class Topic:
     count: int = 0
     first: int = 0
     last: int = 0
+    intervals: Intervals = field(default_factory=Intervals, repr=False)
 
     @property
     def rate(self) -> float | None:
@@ -49,7 +56,8 @@ class Topic:
         return None if self.last <= self.first else (self.count - 1) * 1e9 / (self.last - self.first)
 
     def saw(self, times: Int) -> None:
-        """Count messages."""
+        """Count messages, not none."""
+        self.intervals.add(times)
         low, high = int(times.min()), int(times.max())
         self.first = low if self.count == 0 else min(self.first, low)
         self.last = high if self.count == 0 else max(self.last, high)
@@ -73,6 +81,15 @@ class _Place:
     end: int
     chunk: bool
     channels: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class LogGap:
+    """Log times [ns] between which none of these topics has a message."""
+
+    start: int
+    end: int
+    topics: tuple[str, ...]
 
 
 @dataclass(slots=True)
@@ -111,6 +128,20 @@ class Topics:
     def end(self) -> int:
         """Log time of the last message [ns]."""
         return max((topic.last for topic in self.all.values() if topic.count), default=0)
+
+    @property
+    def gaps(self) -> tuple[LogGap, ...]:
+        """Times without messages of topics that have the states of robots, and so have messages all the time."""
+        found: list[LogGap] = []
+        of = [
+            (gap, topic.name) for topic in self.all.values() if topic.type in STATES for gap in topic.intervals.gaps()
+        ]
+        for (start, end), name in sorted(of):
+            if found and start < found[-1].end:
+                found[-1] = LogGap(start, min(end, found[-1].end), (*found[-1].topics, name))
+            else:
+                found.append(LogGap(start, end, (name,)))
+        return tuple(found)
 
     @property
     def count(self) -> int:

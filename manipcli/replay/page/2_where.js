@@ -17,15 +17,19 @@ const turn = (q, v) => {
   return add(add(v, times(t, q[3])), cross(q, t));
 };
 
-// Index of the last time not after t, and the fraction from it to the next time, 0 to 1.
-function moment(t) {
-  let low = 0, high = stamps.length - 1;
+// The gap of the log around t, [start, end]; undefined outside.
+const gapAt = (t) => run.gaps.find(([from, to]) => from < t && t < to);
+
+// Index of the last of these times that is not after t, and the fraction from it to the next time, 0 to 1; in a gap the
+// state before it is held.
+function moment(t, marks = stamps) {
+  let low = 0, high = marks.length - 1;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
-    if (stamps[middle] <= t) low = middle; else high = middle;
+    if (marks[middle] <= t) low = middle; else high = middle;
   }
-  if (high === low) return [low, 0];
-  const way = (t - stamps[low]) / (stamps[high] - stamps[low]);
+  if (high === low || (marks === stamps && gapAt(t))) return [low, 0];
+  const way = (t - marks[low]) / (marks[high] - marks[low] || 1);
   return way >= 1 ? [high, 0] : [low, Math.max(way, 0)];
 }
 

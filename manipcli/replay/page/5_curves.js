@@ -43,7 +43,7 @@ const value = (curve, k) => curve.values[k * curve.table.columns.length + curve.
 
 // Value at a time; NaN where none is known.
 function valueAt(curve, t) {
-  const [k, fraction] = moment(t);
+  const [k, fraction] = moment(t, curve.table.times);
   return between(curve.values, curve.table.columns.length, curve.c, k, fraction);
 }
 
@@ -66,16 +66,23 @@ function range() {
   return [begin, Math.min(begin + plot.span, run.end)];
 }
 
-// Lowest and highest value between rows `first` and `last`, with room around; a limit that is near is within, and that
+// The first and the last row of a curve that are needed from `begin` to `end`.
+function rowsWithin({ table }, begin, end) {
+  return [moment(begin, table.times)[0], Math.min(moment(end, table.times)[0] + 1, table.times.length - 1)];
+}
+
+// Lowest and highest value from `begin` to `end`, with room around; a limit that is near is within, and that
 // of margins always.
-function extent(shown, first, last, limit) {
+function extent(shown, begin, end, limit) {
   let low = Infinity, top = -Infinity;
-  for (const curve of shown)
+  for (const curve of shown) {
+    const [first, last] = rowsWithin(curve, begin, end);
     for (let k = first; k <= last; k++) {
       const v = value(curve, k);
       if (v < low) low = v;
       if (v > top) top = v;
     }
+  }
   if (!(low <= top)) [low, top] = [0, 1];
   const size = shown.some((curve) => curve.table.relative) ? Infinity : Math.max(top - low, 1e-9);
   for (const end of limit || []) {

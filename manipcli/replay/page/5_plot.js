@@ -43,15 +43,14 @@ const digits = (step) => Math.min(Math.max(0, -Math.floor(Math.log10(step) + 1e-
 
 // The frame of a plot [CSS pixel] and its two axes.
 function axes(pen, shown, begin, end, wide, high) {
-  const first = moment(begin)[0], last = Math.min(moment(end)[0] + 1, stamps.length - 1), limit = sharedLimit(shown);
-  const [low, top] = extent(shown, first, last, limit), dy = stride(top - low, Math.max(2, high / 45)), rows = [];
+  const limit = sharedLimit(shown), [low, top] = extent(shown, begin, end, limit), dy = stride(top - low, Math.max(2, high / 45)), rows = [];
   for (let k = Math.ceil(low / dy); k * dy <= top; k++) rows.push([k * dy, (k * dy).toFixed(k ? digits(dy) : 0)]);
   const left = 10 + Math.max(24, ...rows.map(([, text]) => pen.measureText(text).width)), right = wide - 8, upper = 20, lower = high - 20;
   const X = (t) => left + ((t - begin) / (end - begin || 1)) * (right - left);
   const Y = (v) => lower - ((v - low) / (top - low)) * (lower - upper);
   const T = (x) => begin + ((x - left) / (right - left)) * (end - begin);
   const margins = shown.some((curve) => curve.table.relative);
-  return { rows, margins, begin, end, wide, high, first, last, low, top, left, right, upper, lower, limit, X, Y, T };
+  return { rows, margins, begin, end, wide, high, low, top, left, right, upper, lower, limit, X, Y, T };
 }
 
 function within(pen, { left, right, high }) {
@@ -70,21 +69,22 @@ function drawStill(pen, at, shown) {
   drawAxes(pen, at, shown);
   pen.save();
   within(pen, at);
-  for (const [from, to] of run.gaps || []) hatch(pen, at.X(from), at.X(to), at);
+  for (const [from, to] of run.gaps) hatch(pen, at.X(from), at.X(to), at);
   for (const step of run.steps) upright(pen, at.X(step.start), at, colour("--faint"), 0.7, [2, 3]);
   drawLimit(pen, at);
   for (const curve of shown) {
     // Before it counts, a margin is thin.
-    const k = curve.since ? Math.min(Math.max(moment(curve.since)[0], at.first), at.last) : at.first;
+    const [first, last] = rowsWithin(curve, at.begin, at.end);
+    const k = curve.since ? Math.min(Math.max(moment(curve.since, curve.table.times)[0], first), last) : first;
     pen.strokeStyle = colour(`--series-${curve.series}`);
-    pen.setLineDash(curve.dashed || k > at.first ? [4, 3] : []);
-    pen.lineWidth = k > at.first ? 0.8 : curve.dashed ? 1.2 : 1.5;
-    if (k > at.first) {
-      drawCurve(pen, at, curve, at.first, k);
+    pen.setLineDash(curve.dashed || k > first ? [4, 3] : []);
+    pen.lineWidth = k > first ? 0.8 : curve.dashed ? 1.2 : 1.5;
+    if (k > first) {
+      drawCurve(pen, at, curve, first, k);
       pen.setLineDash([]);
       pen.lineWidth = 2;
     }
-    drawCurve(pen, at, curve, k, at.last);
+    drawCurve(pen, at, curve, k, last);
     pen.setLineDash([]);
   }
   for (const curve of shown) if (curve.tightest) drawTightest(pen, at, curve, shown.length === 1);
@@ -158,7 +158,7 @@ function drawCurve(pen, { X, Y, left, right }, curve, first, last) {
   let on = false, column = -1, low = 0, top = 0;
   const flush = () => { if (column >= 0) { pen.lineTo(column, Y(low)); pen.lineTo(column, Y(top)); } column = -1; };
   for (let k = first; k <= last; k++) {
-    const v = value(curve, k), x = X(stamps[k]);
+    const v = value(curve, k), x = X(curve.table.times[k]);
     if (Number.isNaN(v)) { flush(); on = false; continue; }
     if (!on) pen.moveTo(x, Y(v));
     else if (!dense) pen.lineTo(x, Y(v));

@@ -82,7 +82,7 @@ function buildTrack() {
     for (const phase of step.phases)
       element(piece, "div", "phase").style.left = `${(100 * (phase.start - step.start)) / (step.end - step.start || 1)}%`;
   });
-  for (const [from, to] of run.gaps || []) put("gap", from, to).title = `no data from ${from.toFixed(2)} to ${to.toFixed(2)} s`;
+  for (const [from, to] of run.gaps) put("gap", from, to).title = `no data from ${from.toFixed(2)} to ${to.toFixed(2)} s`;
   for (const mark of run.marks) {
     if (mark.kind === "contact") continue;
     const piece = put("event", mark.time);

@@ -14,8 +14,8 @@ function stepBeside(way) {
 }
 
 function sampleBeside(way) {
-  const [k, fraction] = moment(time), next = way < 0 && fraction > 1e-6 ? k : k + way;
-  seek(stamps[Math.min(Math.max(next, 0), stamps.length - 1)]);
+  const at = (time - run.start) / (run.step || 1), next = way > 0 ? Math.floor(at + 1e-4) + 1 : Math.ceil(at - 1e-4) - 1;
+  seek(run.start + next * run.step);
 }
 
 function buildKeys() {
@@ -23,7 +23,7 @@ function buildKeys() {
   shortcut("space", "play or pause", [" "], () => play(!playing));
   shortcut("← →", "0.1 s back or on; with shift 1 s", ["ArrowLeft", "ArrowRight"],
     (event) => seek(time + (event.key === "ArrowRight" ? 1 : -1) * (event.shiftKey ? 1 : 0.1)));
-  shortcut(", .", "one recorded sample back or on", [",", "."], (event) => sampleBeside(event.key === "." ? 1 : -1));
+  shortcut(", .", `one sample (${+(1000 * run.step).toFixed(1)} ms) back or on`, [",", "."], (event) => sampleBeside(event.key === "." ? 1 : -1));
   shortcut("p n", "previous or next step", ["p", "n"], (event) => stepBeside(event.key === "n" ? 1 : -1));
   shortcut("home end", "start or end of the run", ["Home", "End"], (event) => seek(event.key === "Home" ? run.start : run.end));
   if (failures.length) shortcut("f", failures.length > 1 ? "next failure" : "failure", ["f"], showNextFailure);
@@ -65,9 +65,11 @@ async function begin() {
   measured = array(run.position);
   wanted = run.reference ? array(run.reference) : null;
   bodies = array(run.body);
-  ghosts = (run.ghosts || []).map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
+  ghosts = run.ghosts.map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
   if (run.pushes) [pushFirst, pushes, pushPair] = ["first", "rows", "pair"].map((name) => array(run.pushes[name]));
+  if (run.pushes) pushTimes = array(run.pushes.times);
   for (const table of run.curves) {
+    table.times = array(table.times);
     table.values = array(table.values);
     if (table.relative) table.relative = array(table.relative);
   }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from manipcli.core.text import listed
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import BlockOutcome, StepOutcome
 from manipcli.record.attachments import INERTIALS
@@ -78,6 +79,9 @@ def render_text(info: LogInfo) -> str:
         for topic in _by_name(found)
     ]
     lines.append(table(["topic", "type", "messages", "rate", "until"], rows, right=["messages", "rate", "until"]))
+    if found.gaps:
+        gaps = [[_after(gap.start, found), _after(gap.end, found), listed(gap.topics)] for gap in found.gaps]
+        lines += ["", table(["gap from", "to", "no messages of"], gaps, right=["gap from", "to"])]
     if found.attachments:
         lines += [
             "",
@@ -126,6 +130,10 @@ def render_json(info: LogInfo) -> str:
                     "last": _seconds(topic.last, topic),
                 }
                 for topic in _by_name(found)
+            ],
+            "gaps": [
+                {"start": _seconds(gap.start, found), "end": _seconds(gap.end, found), "topics": list(gap.topics)}
+                for gap in found.gaps
             ],
             "attachments": [
                 {"name": attachment.name, "media_type": attachment.media_type, "size": attachment.size}
@@ -196,4 +204,8 @@ def _seconds(ns: int, of: Topic | Topics) -> Json:
 
 def _until(topic: Topic, found: Topics) -> str:
     """Time of the last message from the beginning of the log, since other programs count from 1970."""
-    return f"{(topic.last - found.start) / 1e9:.2f} s" if topic.count else ""
+    return _after(topic.last, found) if topic.count else ""
+
+
+def _after(time: int, found: Topics) -> str:
+    return f"{(time - found.start) / 1e9:.2f} s"

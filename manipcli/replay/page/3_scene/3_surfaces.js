@@ -136,8 +136,9 @@ function furnish(canvas) {
   const [x, y] = run.extent.centre, r = 2 * run.extent.radius;
   [grid, ground] = [flat(lines), flat([x - r, y - r, z, x + r, y - r, z, x - r, y + r, z, x + r, y + r, z])];
   if (run.path) {
-    const points = array(run.path);
-    path = { vao: gl.createVertexArray(), count: points.length / 3 - 1, buffer: buffer(points) };
+    const points = array(run.path), route = array(run.route);
+    // Behind its points there is room for the line to the tool.
+    path = { vao: gl.createVertexArray(), count: points.length / 3 - 1, points, route: { count: route.length / 3 - 1, buffer: buffer(route) }, buffer: buffer(new Float32Array([...points, 0, 0, 0, 0, 0, 0])) };
   }
   furnishShadows();
 }

@@ -63,6 +63,16 @@ function through(what) {
   gl.depthFunc(gl.LEQUAL);
 }
 
+// The forces at a time, at points that the parts have carried along: { p, normal, friction, pair }.
+function pushesAt(now, t) {
+  const k = moment(t, pushTimes)[0], found = [];
+  for (let j = pushFirst[k]; j < pushFirst[k + 1]; j++) {
+    const [x, y, z, ...forces] = pushes.subarray(9 * j, 9 * j + 9), { p } = now[run.pushes.frames[pushPair[j]]];
+    found.push({ p: add(p, [x, y, z]), normal: forces.slice(0, 3), friction: forces.slice(3), pair: pushPair[j] });
+  }
+  return found;
+}
+
 // The arrow of a force [N] at a point: it begins there, or ends there if it pushes from outside.
 function push(point, force, before, colour) {
   const size = Math.hypot(...force), length = Math.min(size * run.pushes.scale, run.pushes.longest) * sizes.force;
@@ -96,9 +106,9 @@ function drawGround(all) {
 }
 
 function drawPath(all, t, ratio, size) {
-  const to = programs.lines, [now] = moment(t), piece = (first, last, width, alpha) => {
+  const to = programs.lines, [now, way] = moment(t), piece = (first, last, width, alpha, from = path) => {
     if (last <= first) return;
-    gl.bindBuffer(gl.ARRAY_BUFFER, path.buffer);
+    gl.bindBuffer(gl.ARRAY_BUFFER, from.buffer);
     attribute(to, "a", 3, gl.FLOAT, false, 12, 12 * first, 1);
     attribute(to, "b", 3, gl.FLOAT, false, 12, 12 * first + 12, 1);
     gl.uniform1f(to.width, width * ratio);
@@ -110,8 +120,16 @@ function drawPath(all, t, ratio, size) {
   gl.uniform2f(to.window, ...size);
   gl.bindVertexArray(path.vao);
   gl.depthMask(false);
-  if (shows.path) piece(0, path.count, 1.2, 0.35);
-  if (shows.trail) piece(moment(Math.max(t - sizes.trail, run.start))[0], Math.min(now, path.count), 3, 1);
+  if (shows.path) piece(0, path.route.count, 1.2, 0.35, path.route);
+  if (shows.trail) {
+    piece(moment(Math.max(t - sizes.trail, run.start))[0], Math.min(now, path.count), 3, 1);
+    if (way > 0) {
+      const ends = [0, way].flatMap((fraction) => [0, 1, 2].map((c) => between(path.points, 3, c, now, fraction)));
+      gl.bindBuffer(gl.ARRAY_BUFFER, path.buffer);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 12 * (path.count + 1), new Float32Array(ends));
+      piece(path.count + 1, path.count + 2, 3, 1);
+    }
+  }
   gl.depthMask(true);
 }
 
@@ -176,11 +194,9 @@ function draw(t) {
     });
   }
   if (shows.forces && run.pushes) {
-    const k = moment(t)[0];
-    for (let j = pushFirst[k]; j < pushFirst[k + 1]; j++) {
-      const [x, y, z, ...forces] = pushes.subarray(9 * j, 9 * j + 9);
-      push([x, y, z], forces.slice(0, 3), 1, NORMAL);
-      push([x, y, z], forces.slice(3), 0, FRICTION);
+    for (const { p, normal, friction } of pushesAt(now, t)) {
+      push(p, normal, 1, NORMAL);
+      push(p, friction, 0, FRICTION);
     }
   }
   drawClear(last, back);

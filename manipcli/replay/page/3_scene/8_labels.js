@@ -1,16 +1,16 @@
 // Labels over the scene: names of frames, numbers of forces and masses, and the scale of the forces.
 
 // The forces at a time, one for each pair of parts: their sum, and where it acts.
-function pairForces(t) {
+function pairForces(now, t) {
   if (!run.pushes) return [];
-  const k = moment(t)[0], found = new Map();
-  for (let j = pushFirst[k]; j < pushFirst[k + 1]; j++) {
-    const row = pushes.subarray(9 * j, 9 * j + 9), weight = Math.hypot(row[3], row[4], row[5]);
-    const pair = found.get(pushPair[j]) || { force: [0, 0, 0], p: [0, 0, 0], weight: 0, names: run.pushes.pairs[pushPair[j]] };
-    pair.force = add(pair.force, [row[3] + row[6], row[4] + row[7], row[5] + row[8]]);
-    pair.p = add(pair.p, times([row[0], row[1], row[2]], weight));
+  const found = new Map();
+  for (const push of pushesAt(now, t)) {
+    const weight = Math.hypot(...push.normal);
+    const pair = found.get(push.pair) || { force: [0, 0, 0], p: [0, 0, 0], weight: 0, names: run.pushes.pairs[push.pair] };
+    pair.force = add(pair.force, add(push.normal, push.friction));
+    pair.p = add(pair.p, times(push.p, weight));
     pair.weight += weight;
-    found.set(pushPair[j], pair);
+    found.set(push.pair, pair);
   }
   return [...found.values()].map(({ force, p, weight, names }) => ({ force, p: times(p, 1 / weight), names }));
 }
@@ -29,7 +29,7 @@ function notes(now, t) {
     if (whole) found.push({ p: whole.p, text: `robot ${kilograms(whole.mass)}`, kind: "mass" });
   }
   if (shows.forces && shows.numbers)
-    for (const { force, p, names } of pairForces(t)) found.push({ p, text: `${newtons(Math.hypot(...force))} on ${names[0]} from ${names[1]}`, kind: "force" });
+    for (const { force, p, names } of pairForces(now, t)) found.push({ p, text: `${newtons(Math.hypot(...force))} on ${names[0]} from ${names[1]}`, kind: "force" });
   return found;
 }
 
