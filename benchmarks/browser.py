@@ -72,6 +72,8 @@ class Page:
             case {"method": "Runtime.exceptionThrown", "params": {"exceptionDetails": details}}:
                 self.complaints.append(str(details))
             case {"method": "Log.entryAdded", "params": {"entry": {"level": str(level), "text": str(text)}}}:
+                if "GL Driver Message (OpenGL, Performance" in text:
+                    return  # of the renderer on the processor, where reading depths waits for the picture
                 self.messages.append(text)
                 if level == "error":
                     self.complaints.append(text)

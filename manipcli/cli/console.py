@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -69,17 +68,9 @@ def result_is_terminal() -> bool:
     return _is_terminal(sys.stdout)
 
 
-def result_bytes(file: BinaryIO) -> None:
-    """Writes the rest of a file to stdout unchanged.
-
-    Raises:
-        OSError: not all of it could be written, also where the reader closed the pipe.
-    """
-    stream = sys.stdout
-    if stream is None or stream.closed:
-        return
-    with _through(stream, whole=True):
-        shutil.copyfileobj(file, stream.buffer)
+def stdout_for_bytes() -> BinaryIO:
+    """Another handle of stdout, without a buffer: it stays stdout while output of a library is redirected."""
+    return os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0)
 
 
 def error(text: str) -> None:
@@ -153,18 +144,15 @@ def _write(stream: TextIO | None, text: str) -> None:
 
 
 @contextmanager
-def _through(stream: TextIO, *, whole: bool = False) -> Iterator[None]:
-    """Flushes what the block writes, so that a full disk or a closed pipe is found here and not at exit.
-
-    `whole`: a closed pipe is an error.
-    """
+def _through(stream: TextIO) -> Iterator[None]:
+    """Flushes what the block writes, so that a full disk or a closed pipe is found here and not at exit."""
     try:
         yield
         stream.flush()
     except OSError as error:
         error.filename = STDOUT if stream is sys.stdout else "standard error"
         _abandon(stream)
-        if whole or not isinstance(error, BrokenPipeError):
+        if not isinstance(error, BrokenPipeError):
             raise
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 from _thread import interrupt_main
 from collections.abc import Iterator
@@ -45,6 +46,7 @@ class _Feed(threading.Thread):
 
     def __init__(self, path: Path) -> None:
         super().__init__(daemon=True)
+        self._stdout = console.stdout_for_bytes()
         self._names = (path, path.with_name(f"{path.name}{PARTIAL}"))
         self._finished = threading.Event()
         self._error: OSError | None = None
@@ -54,12 +56,13 @@ class _Feed(threading.Thread):
             if self._finished.wait(PERIOD):
                 return
         try:
-            with file:
+            with file, self._stdout:
                 waiting = True
                 while waiting:
                     waiting = not self._finished.wait(PERIOD)  # then what was written last is still copied
-                    console.result_bytes(file)
+                    shutil.copyfileobj(file, self._stdout)
         except OSError as error:
+            error.filename = console.STDOUT
             self._error = error
             if not self._finished.is_set():
                 interrupt_main()

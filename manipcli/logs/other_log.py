@@ -6,7 +6,7 @@ Missing data is listed in the notes: joints that are not in `/joint_states` are 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -14,12 +14,13 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.errors import Diagnostic, InvalidInput
-from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.text import did_you_mean, listed
 from manipcli.description.elements import Joint
 from manipcli.description.expanded import unread_description
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.logs.mesh_search import MeshSearch
+from manipcli.logs.sampled_poses import Poses, Samples, poses_at, root_of
 from manipcli.logs.sensed import read_sensed
 from manipcli.logs.several_robots import together
 from manipcli.model.build_robot import bare_robot
@@ -36,51 +37,8 @@ from manipcli.render.drawing import WORLD
 from manipcli.replay.playback import Playback, gap_notes
 from manipcli.scene.scene import Body, Scene
 
-LEAST_STEADY = 1e-6
-"""[m], or quaternion component: a frame that moves less is fixed."""
 MAX_TIMES = 200_000
 """Most states of a playback, more than an hour at the usual rate."""
-
-
-@dataclass(slots=True)
-class _Samples:
-    """A signal over time: times [s] and rows of numbers."""
-
-    times: list[float]
-    rows: list[Sequence[float]]
-
-    def at(self, times: Array) -> Array:
-        """(T, c) interpolated linearly; constant before the first and after the last sample."""
-        known, rows = np.array(self.times), np.array(self.rows, dtype=np.float64)
-        order = np.argsort(known, kind="stable")
-        return np.stack([np.interp(times, known[order], column[order]) for column in rows.T], axis=1)
-
-    def observed(self, times: Array) -> Array:
-        """As `at`, with NaN before the first sample."""
-        found = self.at(times)
-        found[times < min(self.times)] = np.nan
-        return found
-
-
-@dataclass(frozen=True, slots=True)
-class _Poses:
-    """Poses of a frame over time: `p` (T, 3) [m], `q` (T, 4) xyzw."""
-
-    p: Array
-    q: Array
-
-    def __matmul__(self, other: _Poses) -> _Poses:
-        return _Poses(self.p + rotate(self.q, other.p), quat_product(self.q, other.q))
-
-    def inverse(self) -> _Poses:
-        back = self.q * np.array([-1.0, -1.0, -1.0, 1.0])
-        return _Poses(-rotate(back, self.p), back)
-
-    @property
-    def steady(self) -> bool:
-        """Whether the frame is fixed."""
-        turned = np.minimum(np.abs(self.q - self.q[:1]), np.abs(self.q + self.q[:1]))
-        return bool(np.ptp(self.p, axis=0).max() < LEAST_STEADY and turned.max() < LEAST_STEADY)
 
 
 class _Log:
@@ -88,8 +46,8 @@ class _Log:
 
     def __init__(self, topics: Topics, space: str | None) -> None:
         self.urdf = ""
-        self.joints: dict[str, _Samples] = {}
-        self.frames: dict[tuple[str, str], _Samples] = {}
+        self.joints: dict[str, Samples] = {}
+        self.frames: dict[tuple[str, str], Samples] = {}
         self.start, self.end = np.inf, -np.inf
         known = meant({name: topic.type for name, topic in topics.all.items()})
         self.spaces = namespaces(known.values())
@@ -150,13 +108,13 @@ class _Log:
         names, runs = joint_state(reader)
         whole = (run if len(run) == len(names) else [np.nan] * len(names) for run in runs)
         for name, *row in zip(names, *whole, strict=True):
-            samples = self.joints.setdefault(name, _Samples([], []))
+            samples = self.joints.setdefault(name, Samples([], []))
             samples.times.append(time)
             samples.rows.append(row)
 
     def _transforms(self, time: float, reader: CdrReader) -> None:
         for parent, child, row in transforms(reader):
-            samples = self.frames.setdefault((parent, child), _Samples([], []))
+            samples = self.frames.setdefault((parent, child), Samples([], []))
             if samples.rows and sum(a * b for a, b in zip(row[3:], samples.rows[-1][3:], strict=True)) < 0.0:
                 row[3:] = [-value for value in row[3:]]  # same rotation, in the hemisphere of the previous quaternion
             samples.times.append(time)
@@ -242,7 +200,7 @@ def _playback(
     subject = "the log" if space is None else f"'{space}'"
     notes += [f"{subject} has no {name} ({TYPES[name]})" for name in log.lacks]
     notes += gap_notes(gaps)
-    tree = {child: (parent, _poses(samples, times)) for (parent, child), samples in log.frames.items()}
+    tree = {child: (parent, poses_at(samples, times)) for (parent, child), samples in log.frames.items()}
     robot = _robot(log.urdf, notes)
     if robot is not None:
         meshes = MeshSearch(path, package_path=package_path, allow_outside=allow_outside)
@@ -281,13 +239,6 @@ def _no_robot(path: Path, space: str, spaces: Sequence[str]) -> Diagnostic:
     return Diagnostic("REPLAY003", f"{path.name}: no robot in '{space}'", hint=hint)
 
 
-def _poses(samples: _Samples, times: Array) -> _Poses:
-    rows = samples.at(times)
-    length = np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
-    q = np.where(length > 0.0, rows[:, 3:] / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
-    return _Poses(rows[:, :3], q)
-
-
 def _robot(urdf: str, notes: list[str]) -> RobotModel | None:
     """The robot of a URDF text; None if it is invalid, with its first error added to `notes`."""
     if not urdf:
@@ -303,22 +254,9 @@ def _robot(urdf: str, notes: list[str]) -> RobotModel | None:
     return bare_robot(parts)
 
 
-def _chain(frame: str, tree: Mapping[str, tuple[str, _Poses]]) -> tuple[str, _Poses | None]:
-    """The root frame above a frame, and the pose of the frame in it; None if the frame is the root."""
-    pose: _Poses | None = None
-    seen = {frame}
-    while frame in tree:
-        frame, above = tree[frame]
-        pose = above if pose is None else above @ pose
-        if frame in seen:
-            break
-        seen.add(frame)
-    return frame, pose
-
-
-def _placed(robot: RobotModel, tree: Mapping[str, tuple[str, _Poses]], notes: list[str]) -> RobotModel:
+def _placed(robot: RobotModel, tree: Mapping[str, tuple[str, Poses]], notes: list[str]) -> RobotModel:
     """The robot at its base pose; a mobile robot is shown at the origin, and its surroundings move."""
-    top, pose = _chain(robot.root, tree)
+    top, pose = root_of(robot.root, tree)
     if pose is None:
         return robot
     if pose.steady:
@@ -331,7 +269,7 @@ def _joint(
     name: str,
     log: _Log,
     robot: RobotModel | None,
-    tree: Mapping[str, tuple[str, _Poses]],
+    tree: Mapping[str, tuple[str, Poses]],
     times: Array,
     unknown: dict[str, list[str]],
 ) -> Array:
@@ -357,22 +295,22 @@ def _joint(
     return found
 
 
-def _angle(joint: Joint, pose: _Poses) -> Array:
+def _angle(joint: Joint, pose: Poses) -> Array:
     """(T,) positions of a joint from the pose of its child link in its parent: X_PC = X_PJ X_JC(position)."""
-    inside = _Poses(joint.X_PJ.p[None], joint.X_PJ.quat_xyzw[None]).inverse() @ pose
+    inside = Poses(joint.X_PJ.p[None], joint.X_PJ.quat_xyzw[None]).inverse() @ pose
     if joint.type == "prismatic":
         return np.asarray(inside.p @ joint.axis)
     return np.unwrap(2.0 * np.arctan2(inside.q[:, :3] @ joint.axis, inside.q[:, 3]))
 
 
-def _scene(robot: RobotModel | None, tree: Mapping[str, tuple[str, _Poses]], count: int) -> tuple[Scene, Array, Array]:
+def _scene(robot: RobotModel | None, tree: Mapping[str, tuple[str, Poses]], count: int) -> tuple[Scene, Array, Array]:
     """Frames other than robot links as bodies without a shape, and their poses (T, m, 3) and (T, m, 4) xyzw."""
     links = {link.name for link in robot.links} if robot is not None else set()
-    base = _chain(robot.root, tree)[1] if robot is not None else None
+    base = root_of(robot.root, tree)[1] if robot is not None else None
     back = base.inverse() if base is not None and not base.steady else None
     bodies, p, q = [], [np.zeros((count, 0, 3))], [np.zeros((count, 0, 4))]
     for frame in tree:
-        _, pose = _chain(frame, tree)
+        _, pose = root_of(frame, tree)
         if frame in links or pose is None:
             continue
         shown = pose if back is None else back @ pose
