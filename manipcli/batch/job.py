@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from manipcli.core.errors import Diagnostic, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.judge.measured_run import MeasuredRun
 from manipcli.report.html.markup import link
 from manipcli.report.run_report import RunReport
@@ -22,8 +22,15 @@ FOLDER = Path("runs") / "test"
 
 
 def limit(seconds: float) -> float:
-    """A time limit [s] from the value of an option, where 0 means never."""
-    return seconds if seconds > 0.0 else math.inf
+    """A time limit [s] from the value of an option, where 0 means never.
+
+    Raises:
+        InvalidInput: it is negative.
+    """
+    if seconds < 0.0:
+        message = f"a time limit of {seconds:g} s is negative"
+        raise InvalidInput([Diagnostic("USE050", message, hint="write 30 s, or 0 for never")])
+    return seconds or math.inf
 
 
 def own_stem(file: Path) -> str:

@@ -25,6 +25,8 @@ from manipcli.spec.resolved import plain_data
 from manipcli.sweep.results import SampleResult
 from manipcli.task.load_task import WrittenTask
 
+FORMAT: Final = 1
+"""Version of the format."""
 SYNC_PERIOD: Final = 2.0
 """[s] of wall time between two writes to the disk itself."""
 MOST_NAMED: Final = 4
@@ -97,7 +99,7 @@ class Journal:
             self._file.close()
             raise
         if not length:
-            self._write({"journal": 1, "task": dict(whose)})
+            self._write({"journal": FORMAT, "task": dict(whose)})
 
     def _begun(self, whose: Identity, *, resume: bool, force: bool) -> int:
         """Reads the results of an earlier sweep; returns the number of bytes that stay.
@@ -177,6 +179,8 @@ def read_journal(path: Path) -> tuple[Read, int]:
         for number, line in enumerate(data[:length].splitlines(), 1):
             read = json.loads(line)
             if number == 1:
+                if read["journal"] != FORMAT:
+                    raise ValueError("another format")
                 whose = {str(key): str(value) for key, value in read["task"].items()}
             elif "complete" in read:
                 complete = True

@@ -113,6 +113,15 @@ def test_a_sweep_ends_at_the_same_sample_whatever_came_first(sampling: Sampling,
     assert n < 400
 
 
+def test_a_journal_of_another_format_is_refused(sampling: Sampling, tmp_path: Path) -> None:
+    path, whose = tmp_path / "j.jsonl", identity(sampling.written)
+    with Journal(path, whose, resume=False) as journal:
+        run_sweep(sampling, 1, journal, Backend(sampling))
+    path.write_text(path.read_text().replace('"journal": 1', '"journal": 99', 1))
+    with pytest.raises(InvalidInput, match="line 1 is not one of its objects"):
+        Journal(path, whose, resume=True)
+
+
 def test_a_journal_cut_at_any_byte_keeps_its_whole_lines(sampling: Sampling, tmp_path: Path) -> None:
     path, whose = tmp_path / "j.jsonl", {"manipcli": "1"}
     with Journal(path, whose, resume=False) as journal:

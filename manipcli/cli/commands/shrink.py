@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 FOLDER = Path("runs") / "shrink"
 SWEEPS = Path("runs") / "sweep" / "random"
 """Folder of the journals of sweeps of random samples."""
+SAMPLES = 20
+"""Samples in which failures are looked for."""
 PERIOD = 0.1
 """[s] between two drawings of the live line."""
 QUIET_PERIOD = 20.0
@@ -43,8 +45,14 @@ def shrink(
         ),
     ] = None,
     samples: Annotated[
-        int, typer.Option("--samples", metavar="N", min=0, help="Look for failures among samples 0 to N-1 first.")
-    ] = 20,
+        int | None,
+        typer.Option(
+            "--samples",
+            metavar="N",
+            min=0,
+            help="Look for failures among samples 0 to N-1 first [default: 20, at most half of the budget].",
+        ),
+    ] = None,
     budget: Annotated[
         int, typer.Option("--budget", metavar="RUNS", min=5, help="Run the task at most RUNS times, samples included.")
     ] = 100,
@@ -103,7 +111,7 @@ def shrink(
             silence=limit(seconds(silence)),
             timeout=limit(seconds(timeout)),
         )
-        wish = Wish(sample, samples if sample is None else 0, budget, all_, refused)
+        wish = Wish(sample, _samples(sample, samples, budget), budget, all_, refused)
         with scratch(FOLDER) as folder:
             settings = replace(settings, folder=folder)
             sampling = Sampling(path, settings)
@@ -141,6 +149,22 @@ def shrink(
         return ExitCode.PASSED if whole and all(whole) else ExitCode.FAILED
 
 
+def _samples(sample: int | None, samples: int | None, budget: int) -> int:
+    """Number of samples to look for failures in.
+
+    Raises:
+        InvalidInput: it is given together with a sample, or takes more than half of the budget.
+    """
+    if samples is None:
+        return 0 if sample is not None else min(SAMPLES, budget // 2)
+    if sample is not None:
+        raise InvalidInput([Diagnostic("USE189", "--samples has no effect with --sample", hint="remove one of them")])
+    if samples > budget // 2:
+        message = f"--samples {samples} takes more than half of --budget {budget}"
+        raise InvalidInput([Diagnostic("USE202", message, hint=f"write --budget {2 * samples}, or fewer samples")])
+    return samples
+
+
 class _Files:
     """The files of the changes: one, or with `--all` one for each way of failing."""
 
@@ -164,8 +188,10 @@ class _Files:
         self._out = output or path.with_name(f"{path.stem}-shrunk.yaml")
         self._sampling, self._space, self._settings, self._every_way = sampling, space, settings, every_way
         self._written: dict[int, Path] = {}
-        option = "--output"
-        check_outputs((option, self._out), reads=(path,))
+        if self._out.suffix not in (".yaml", ".yml"):
+            message = f"'{self._out}' is not a .yaml or .yml file"
+            raise InvalidInput([Diagnostic("USE203", message, hint=f"write -o {self._out.with_suffix('.yaml')}")])
+        check_outputs(("--output", self._out), reads=(path,))
         for file in [self._out] if not every_way else sorted(self._out.parent.glob(f"{self._out.stem}-*.yaml")):
             if file.exists() and not force:
                 message = f"'{file}' exists"

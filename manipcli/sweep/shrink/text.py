@@ -67,7 +67,8 @@ def numbers(space: Space, smallest: Smallest) -> str:
     rows = []
     for k, each in enumerate(space.coordinates):
         x = smallest.trial.point.x[k]
-        values = [f"{space.value(k, point):.6g}" for point in (space.origin, smallest.trial.point)]
+        ends = (space.origin, smallest.trial.point)
+        values = [readable(space.value(k, point), each.quantity.unit, digits=6) for point in ends]
         cells = (*values, f"{x:+.3f}") if x else (values[0], "as written", "0")
         rows.append((each.name, *(cell.replace("-", "−") for cell in cells)))
     headers = ("number", "as written", "fails at", "spreads")

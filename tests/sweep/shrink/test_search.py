@@ -333,3 +333,31 @@ def test_shrink_as_a_command(sampling: Sampling, call_cli: RunCli, tmp_path: Pat
     again = call_cli(*words, cwd=tmp_path)
     assert again.code == 4
     assert "'held-shrunk.yaml' exists" in again.err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("-o", "x.txt"), "USE203"),
+        (("--samples", "40", "--budget", "50"), "USE202"),
+        (("--sample", "1", "--samples", "3"), "USE189"),
+        (("--timeout=-3",), "USE050"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused_before_any_run(
+    words: tuple[str, ...], told: str, sampling: Sampling, call_cli: RunCli, tmp_path: Path
+) -> None:
+    ran = call_cli("shrink", sampling.written.path, *words, cwd=tmp_path)
+    assert ran.code == 4
+    assert f"error[{told}]" in ran.err
+
+
+def test_a_task_that_fails_as_written_is_told_whatever_the_budget(
+    sampling: Sampling, call_cli: RunCli, tmp_path: Path
+) -> None:
+    (tmp_path / "held.yaml").write_text(
+        sampling.written.path.read_text().replace("fixed: true, pose: {xyz: [0.6", "fixed: true, pose: {xyz: [0.7")
+    )
+    ran = call_cli("shrink", "held.yaml", "--budget", "5", "-n", "2", cwd=tmp_path)
+    assert ran.code == 1
+    assert "does not pass as written, so there is nothing to shrink" in ran.out
