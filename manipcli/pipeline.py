@@ -209,7 +209,8 @@ def run_task(
         task, plan, where, progress, None, overwrite=force or log is None, embed_meshes=embed_meshes
     )
     timing = replace(timing, load=loading, plan=planning + timing.plan)
-    return RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
+    size = where.stat().st_size if where.is_file() else None
+    return RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task), log_size=size)
 
 
 def compare_runs(

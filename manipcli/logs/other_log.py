@@ -34,11 +34,9 @@ from manipcli.record.foreign.topics import Topics, open_topics
 from manipcli.record.gaps import Gaps, common
 from manipcli.record.read.chunk import singly
 from manipcli.render.drawing import WORLD
+from manipcli.replay.display_sampling import regular_times
 from manipcli.replay.playback import Playback, gap_notes
 from manipcli.scene.scene import Body, Scene
-
-MAX_TIMES = 200_000
-"""Most states of a playback, more than an hour at the usual rate."""
 
 
 class _Log:
@@ -151,24 +149,15 @@ def open_other(
                 part.begin_at(begin)
             start, end = min(part.start for part in moving.values()), max(part.end for part in moving.values())
             gaps = common(*(part.gaps for part in moving.values()))
-            times = _times(start, end, rate, gaps)
+            times = regular_times(start, end, rate, gaps)
             shown = {
                 each: _playback(path, topics, part, each, times, gaps, why, package_path, allow_outside)
                 for each, part in moving.items()
             }
             return together(path.name, shown)
     _check_moves(path, topics, log, space)
-    times = _times(log.start, log.end, rate, log.gaps)
+    times = regular_times(log.start, log.end, rate, log.gaps)
     return _playback(path, topics, log, space, times, log.gaps, why, package_path, allow_outside)
-
-
-def _times(start: float, end: float, rate: float, gaps: Gaps) -> Array:
-    """(T,) [s] of the states of a playback, from the first to the last, with the ends of gaps and none inside."""
-    count = max(1, min(int(np.ceil((end - start) * rate)), MAX_TIMES))
-    times = np.linspace(start, end, count + 1) if end > start else np.array([start])
-    for begin, until in gaps:
-        times = np.union1d(times[(times <= begin) | (times >= until)], [begin, until])
-    return times
 
 
 def _check_moves(path: Path, topics: Topics, log: _Log, space: str | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from manipcli.record.foreign.field_units import joint_units
 from manipcli.record.foreign.snapshot import snapshot
 from manipcli.record.foreign.topics import Topics, open_topics
 from manipcli.record.messages import WORLD
+from manipcli.record.read.excerpt import open_excerpt
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
 from manipcli.report.logs.snapshot import JointMoment, Moment, PoseMoment
@@ -34,6 +36,11 @@ def moment(path: Path, time: float) -> Moment:
     Raises:
         InvalidInput: the file is not a log, is damaged, or ends before `time`.
     """
+    excerpt = open_excerpt(path, time) if time >= 0.0 else None
+    if excerpt is not None and time <= excerpt.duration + ROUNDING:
+        # Without an answer in the excerpt, all is read.
+        with contextlib.suppress(BadRecording, Thinned):
+            return _ours(path, time, excerpt.recording, excerpt.end)
     found = open_topics(path, damaged=True)
     if not 0.0 <= time <= found.duration + ROUNDING:
         message = f"{time:g} s is outside the log {path.name}, which is 0 s to {found.duration:.3f} s"
@@ -41,7 +48,7 @@ def moment(path: Path, time: float) -> Moment:
     if RECORD not in found.metadata:
         return _others(path, found, time, why="not written by manipcli")
     try:
-        return _ours(path, time)
+        return _ours(path, time, open_recording(path))
     except Thinned:
         return _others(path, found, time, why=LEFT_OUT)
 
@@ -64,8 +71,8 @@ def step_ends(path: Path) -> dict[str, float]:
     }
 
 
-def _ours(path: Path, time: float) -> Moment:
-    recording = open_recording(path)
+def _ours(path: Path, time: float, recording: Recording, last: float | None = None) -> Moment:
+    """`last`: time of the last state [s], if the spans of the recording end before."""
     missing = [] if recording.lost is None else [recording.lost]
     missing += [recording.unknown(topic) for topic in (TF, CONTACTS, EVENTS) if recording.unknown(topic)]
     span, k, touched, end = _at(recording.spans, time)
@@ -101,7 +108,7 @@ def _ours(path: Path, time: float) -> Moment:
         log=str(path),
         asked=time,
         time=now,
-        end=end,
+        end=end if last is None else last,
         step="" if step is None else step.step,
         verb="" if step is None else step.verb,
         phase=phase,

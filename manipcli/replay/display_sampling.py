@@ -12,6 +12,9 @@ from manipcli.model.state import Contact
 from manipcli.record.gaps import LEAST, Gaps, Intervals
 from manipcli.record.recording import ContactSnapshot, Recording, Span, joined
 
+MAX_TIMES = 200_000
+"""Most states of a playback, more than an hour at the usual rate."""
+
 
 def sampled(recording: Recording, *, rate: float) -> tuple[Span, SampledContacts, Gaps] | None:
     """The ticks nearest to multiples of 1 / rate, the last one and those beside a gap; one span in memory at a time.
@@ -58,6 +61,15 @@ def _append(chosen: list[Span], gathered: SampledContacts, last: Span) -> None:
     if not len(chosen[-1].states.time) or last.states.time[0] > chosen[-1].states.time[-1]:
         chosen.append(last)
         gathered.add((), last.states.time)
+
+
+def regular_times(start: float, end: float, rate: float, gaps: Gaps) -> Array:
+    """(T,) [s] of the states of a playback, from the first to the last, with the ends of gaps and none inside."""
+    count = max(1, min(int(np.ceil((end - start) * rate)), MAX_TIMES))
+    times = np.linspace(start, end, count + 1) if end > start else np.array([start])
+    for begin, until in gaps:
+        times = np.union1d(times[(times <= begin) | (times >= until)], [begin, until])
+    return times
 
 
 def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:

@@ -24,3 +24,13 @@ def quantity(value: float, unit: str) -> str:
     size = abs(number)
     digits = f"{number:.0f}" if size >= 100 else f"{number:.1f}" if size >= 1 else f"{number:z.2g}"
     return f"{digits} {name}".rstrip()
+
+
+def data_size(size: int) -> str:
+    """`15.4 MB`, in powers of ten."""
+    value, unit = float(size), "B"
+    for unit in ("B", "kB", "MB", "GB"):
+        if value < 1000.0 or unit == "GB":
+            break
+        value /= 1000.0
+    return f"{size} B" if unit == "B" else f"{value:.1f} {unit}"

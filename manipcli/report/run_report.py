@@ -34,6 +34,7 @@ class RunReport:
         timing: wall time of each stage.
         log: path of the log; None if nothing was run or the log was not kept.
         warnings: warnings from before the run, about its files and gains.
+        log_size: size of the log [byte]; None if it is unknown.
         meshes: mesh files of robot and scene by their URI in the log, to draw the run.
     """
 
@@ -42,6 +43,7 @@ class RunReport:
     log: str | None = None
     warnings: tuple[Diagnostic, ...] = ()
     meshes: Mapping[str, Path] = field(default_factory=dict)
+    log_size: int | None = None
 
     @property
     def wall_time(self) -> float:

@@ -12,7 +12,7 @@ from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, one_line
 from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report.display_quantity import quantity
+from manipcli.report.display_quantity import data_size, quantity
 from manipcli.report.located import LOCATED, located_rows
 from manipcli.report.nesting import MARKS, block_line, nested
 from manipcli.report.rounds import first_of_rounds, round_of_finding
@@ -20,6 +20,8 @@ from manipcli.report.run_report import RunReport
 from manipcli.report.table import table
 
 PASS, FAIL = "✓", "✗"
+LARGE = 50_000_000
+"""Size from which a log is reported as large [byte]."""
 
 
 def render_run(report: RunReport, *, verbose: bool = False) -> str:
@@ -31,7 +33,7 @@ def render_run(report: RunReport, *, verbose: bool = False) -> str:
         f"{report.verdict.simulated_time:.2f} s simulated, {report.wall_time:.2f} s real "
         f"({report.real_time_factor:.1f} x real time while simulating)"
     )
-    lines = [*_verdict(report.verdict, speed), f"log: {report.log}"]
+    lines = [*_verdict(report.verdict, speed), *_large_log(report), f"log: {report.log}"]
     if verbose:
         timing = report.timing
         lines.append(
@@ -39,6 +41,16 @@ def render_run(report: RunReport, *, verbose: bool = False) -> str:
             f"simulate {timing.simulate:.2f} s, judge {timing.judge:.2f} s"
         )
     return "\n".join(lines)
+
+
+def _large_log(report: RunReport) -> list[str]:
+    """The size of a large log, and what makes the next one smaller."""
+    if report.log_size is None or report.log_size < LARGE:
+        return []
+    rate = ""
+    if report.verdict.simulated_time > 0.0:
+        rate = f", {data_size(round(60.0 * report.log_size / report.verdict.simulated_time))} per minute"
+    return [f"size of the log: {data_size(report.log_size)}{rate}; `record: {{rates: ...}}` in the task thins it"]
 
 
 def render_session(report: RunReport, failure: str, *, judged: bool = False) -> str:

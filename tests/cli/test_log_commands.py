@@ -103,7 +103,7 @@ def test_a_folder_is_no_log_and_no_place_for_one(
         assert "folder" in capsys.readouterr().err, command
     for command in (["run", str(task), "--log", folder], ["repair", str(log), "--output", folder]):
         assert main(command) == 4
-        assert "folder" in capsys.readouterr().err, command
+        assert "s a directory" in capsys.readouterr().err, command
     assert main(["repair", folder]) == 4
     assert not [*tmp_path.iterdir()]
 

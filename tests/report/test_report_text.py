@@ -72,6 +72,18 @@ def test_a_pass_says_how_much_there_was_to_spare() -> None:
     assert text.endswith("log: runs/pour.mcap")
 
 
+def test_a_large_log_is_reported_with_its_size_and_what_thins_it() -> None:
+    """Oracle: 180 MB in 90 s are 120 MB in a minute."""
+    report = RunReport(replace(PASSED, simulated_time=90.0), Timing(simulate=1.0), log="a.mcap", log_size=180_000_000)
+    lines = render_run(report).splitlines()
+    assert lines[-2:] == [
+        "size of the log: 180.0 MB, 120.0 MB per minute; `record: {rates: ...}` in the task thins it",
+        "log: a.mcap",
+    ]
+    assert "size of the log" not in render_run(replace(report, log_size=1_000_000))
+    assert "size of the log" not in render_run(replace(report, log_size=None))
+
+
 def test_a_pass_with_nothing_to_spare_is_a_pass() -> None:
     outcome = ExpectationOutcome("no_collision", "passed", 0.0, "N", None, "never touched")
     assert "passes: never touched" in render_verdict(replace(PASSED, expectations=(outcome,)), "x")

@@ -16,9 +16,9 @@ from manipcli.record.faults import PARTIAL, BadRecording, CopyFailed, RecordingF
 from manipcli.record.read.chunk import Places, walked
 from manipcli.record.read.salvage import Salvage, Stretch
 from manipcli.record.read.scan import Damage
-from manipcli.record.records import PAYLOAD
+from manipcli.record.records import LIBRARY, PAYLOAD
 from manipcli.record.write.block import ChunkContent
-from manipcli.record.write.container import LIBRARY, Container
+from manipcli.record.write.container import Container
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema

@@ -7,7 +7,7 @@ the spans reads the ticks.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ from manipcli.record.read.chunk import indexed, open_chunk, singly, walked
 from manipcli.record.read.contacts import have_points
 from manipcli.record.read.scan import MAX_NAMED, Record, Scan, guarded
 from manipcli.record.read.spans import FileSpans
-from manipcli.record.recording import BeliefSnapshot, Recording, TaskEvent
+from manipcli.record.recording import EMBEDDED, BeliefSnapshot, Recording, TaskEvent
 from manipcli.record.records import ATTACHMENT, CHANNEL, CHUNK, HEADER, MESSAGE, METADATA, SCHEMA
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def open_recording(path: Path, *, being_written: bool = False, contact_points: b
         BadRecording: not a recording of manipcli, of a later format, damaged, or too large; also while
             iterating over the spans. A file without its end is read up to there, with the reason in `lost`.
     """
-    reader = _Reader(path, contact_points=contact_points)
+    reader = RecordReader(path, contact_points=contact_points)
     scan = Scan(path, being_written=being_written)
     for record, indexes in scan.pieces():
         if record.opcode == CHUNK:
@@ -64,7 +64,7 @@ def read_recording(path: Path, *, being_written: bool = False) -> Recording:
     return open_recording(path, being_written=being_written).whole()
 
 
-class _Reader:
+class RecordReader:
     """State while reading the records of a file."""
 
     def __init__(self, path: Path, *, contact_points: bool) -> None:
@@ -158,19 +158,19 @@ class _Reader:
         self._chunks.append(record.offset)
         of = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
         if not indexes or "" in of.values():
-            guarded(self._path, record, lambda record: self._opened(record, {}))
+            guarded(self._path, record, lambda record: self.messages(record, {}))
             return
         needed = {
             channel: raw for channel, raw in indexes.items() if of[channel] == topics.EVENTS or believes(of[channel])
         }
         if needed:
-            guarded(self._path, record, lambda record: self._opened(record, needed))
+            guarded(self._path, record, lambda record: self.messages(record, needed))
         self._heard.update(of[channel] for channel, entries in indexes.items() if entries)
         for channel, entries in indexes.items():
             if of[channel] == topics.JOINT_STATES and entries:
                 self._newest = int.from_bytes(entries[-16:-8], "little")
 
-    def _opened(self, record: Record, needed: Mapping[int, bytes]) -> None:
+    def messages(self, record: Record, needed: Mapping[int, bytes]) -> None:
         """Read the messages of the indexes `needed`; without indexes, search the chunk."""
         data = open_chunk(self._path, record)
         places = indexed(data, needed, whole=False)
@@ -199,6 +199,20 @@ class _Reader:
                 f"not a recording of manipcli: no metadata record '{RECORD}' before its messages",
             )
         return self._contents
+
+    def heard(self, channels: Iterable[int]) -> None:
+        """Note channels with messages, also in chunks that are not read."""
+        self._heard.update(self._channels[channel][0] for channel in channels if channel in self._channels)
+
+    @property
+    def meshes(self) -> frozenset[str]:
+        """Names of the attachments that are embedded meshes, by the metadata read so far."""
+        return frozenset(self._metadata.get(EMBEDDED, {}).values())
+
+    def taken_events(self) -> tuple[TaskEvent, ...]:
+        """The events read since the last call."""
+        found, self._events = tuple(self._events), []
+        return found
 
     def recording(self, lost: str | None) -> Recording:
         """The recording of the records that were read."""

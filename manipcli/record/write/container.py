@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from manipcli.core.lock import Taken, lock
 from manipcli.record.faults import PARTIAL, RecordingFailed, RecordingRefused
-from manipcli.record.records import MAGIC, MESSAGE_INDEX
+from manipcli.record.records import LIBRARY, MAGIC, MESSAGE_INDEX
 from manipcli.record.write.block import ChunkContent
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from mcap.records import Channel as ChannelRecord
 
 PROFILE = "ros2"
-LIBRARY = "manipcli"
 COMPRESSION_LEVEL = -1
 """zstd level: 25 % faster than level 1 for 1 % more bytes."""
 _INDEX_HEAD = struct.Struct("<BQHI")

@@ -11,6 +11,7 @@ from manipcli.judge.verdict import BlockOutcome, StepOutcome
 from manipcli.record.attachments import INERTIALS
 from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
+from manipcli.report.display_quantity import data_size
 from manipcli.report.inertials import recorded_inertials
 from manipcli.report.json import Json, dumps, number, saturated_object, step_object
 from manipcli.report.logs.engine_choice import engine_choices
@@ -178,16 +179,6 @@ def _length(info: LogInfo) -> str:
         release = f" {versions[engine]}" if engine in versions else ""
         text += f"; engine {engine}{release}, seed {run.get('seed', '')}, manipcli {versions.get('manipcli', '')}"
     return text
-
-
-def data_size(size: int) -> str:
-    """`15.4 MB`, in powers of ten."""
-    value, unit = float(size), "B"
-    for unit in ("B", "kB", "MB", "GB"):
-        if value < 1000.0 or unit == "GB":
-            break
-        value /= 1000.0
-    return f"{size} B" if unit == "B" else f"{value:.1f} {unit}"
 
 
 def _rate(rate: float | None) -> str:
