@@ -57,10 +57,12 @@ def test_the_player_has_the_ghosts_it_is_given(fall: Playback) -> None:
         parsed: dict[str, object] = json.loads(found[1])
         return parsed
 
-    assert "ghosts" not in head(player_html(fall))
-    ghosts = head(player_html(fall, ghosts=[ghost_of("mujoco", fall, fall)]))["ghosts"]
-    assert isinstance(ghosts, list)
-    count = len(fall.times)
+    assert head(player_html(fall))["ghosts"] == []
+    shown = head(player_html(fall, ghosts=[ghost_of("mujoco", fall, fall)]))
+    ghosts, times = shown["ghosts"], shown["times"]
+    assert isinstance(ghosts, list) and isinstance(times, list)
+    count = times[2]
+    assert 1 < count <= len(fall.times)
     assert [(ghost["name"], ghost["position"][2], ghost["body"][2]) for ghost in ghosts] == [
         ("mujoco", count * len(fall.joint_names), count * 7)
     ]
