@@ -54,6 +54,7 @@ def _route(path: Array, rows: Rows) -> Rows:
 
         def errors(kept: Rows, others: Rows) -> Array:
             apart = interpolated(length, points, kept, others) - points[others]
+            # Called at once, in the same turn of the loop.
             return np.asarray(np.linalg.norm(apart, axis=1) / bound)  # noqa: B023
 
         found = needed_rows(len(points), errors)

@@ -164,6 +164,7 @@ class _Search:
         for chunk in reversed([one for one in self._with(topics.EVENTS) if one.message_start_time <= ns]):
             record, indexes = chunk_at(self._path, self._file, chunk.chunk_start_offset)
             channel = self._topics[topics.EVENTS]
+            # Called at once, in the same turn of the loop.
             guarded(self._path, record, lambda record: self._reader.messages(record, {channel: indexes[channel]}))  # noqa: B023
             found = self._reader.taken_events() + found
             if any(event.kind in ("step_started", "step_ended") and event.time * 1e9 <= ns + 0.5 for event in found):

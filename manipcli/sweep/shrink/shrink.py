@@ -145,6 +145,7 @@ def shrink(
             (trial.point for trial in runs.trials.values() if fails(trial) and trial.way == way),
             key=lambda point: point.distance,
         )
+        # mypy has no type for a lambda whose argument has a default.
         search = Search(space, runs, lambda trial, way=way: fails(trial) and trial.way == way, seed=seed)  # type: ignore[misc]
         smallest = _searched(search, runs, replace(start, points=tuple(points)), way, found)
         assert smallest is not None
