@@ -20,10 +20,11 @@ from manipcli.batch.process import run_job
 from manipcli.core.geometry import Array
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
+from manipcli.model.hand.measure import BLOCK
 from manipcli.model.kinematics import Kinematics
 from manipcli.onboard.home import CLEARANCES, HomeSearch
 from manipcli.onboard.reachable import ABOVE, Spots, reachable_spots
-from manipcli.onboard.robot_draft import BLOCK, NOTHING_TO_HOLD_WITH, RobotDraft
+from manipcli.onboard.robot_draft import NOTHING_TO_HOLD_WITH, RobotDraft
 from manipcli.onboard.writer import Entry, Value, written
 from manipcli.report.suite.suite import Case
 

@@ -13,9 +13,9 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, listed, number_of
 from manipcli.description.elements import Joint
 from manipcli.description.srdf import Srdf, SrdfGroup
+from manipcli.model.hand.closure import HandShape, tip_distance
+from manipcli.model.hand.parts import Arm, Hand, RobotParts
 from manipcli.model.robot import RobotModel
-from manipcli.onboard.closure import HandShape, tip_distance
-from manipcli.onboard.parts import Arm, Hand, RobotParts
 
 _STATED: Final = "stated in the SRDF"
 LEAST_TRAVEL: Final = 5e-3

@@ -8,10 +8,10 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
+from manipcli.model.hand.closure import Closure, HandShape
+from manipcli.model.hand.parts import RobotParts
+from manipcli.model.hand.shape_points import ShapePoints
 from manipcli.model.kinematics import Kinematics
-from manipcli.onboard.closure import Closure, HandShape
-from manipcli.onboard.parts import RobotParts
-from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.writer import Entry
 
 HAND_HEIGHT: Final = 0.1

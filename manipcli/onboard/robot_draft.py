@@ -12,31 +12,23 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
 from manipcli.description.elements import Joint
-from manipcli.model.collision import CollisionChecker
 from manipcli.model.configuration import with_mimics, zero_configuration
+from manipcli.model.hand.closure import Closure, HandShape
+from manipcli.model.hand.measure import measure_hand
+from manipcli.model.hand.parts import Hand, RobotParts, guess_parts
+from manipcli.model.hand.shape_points import ShapePoints
+from manipcli.model.hand.tool_frame import ToolFrame
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel, Tool
-from manipcli.onboard.closure import Closure, HandShape, guess_closure, knuckles_only
 from manipcli.onboard.from_srdf import StatedParts
 from manipcli.onboard.home import CLEARANCES, Home, HomeSearch, guess_home
 from manipcli.onboard.limits import ProposedLimits, propose_limits
 from manipcli.onboard.mount import guess_mount, hung_up
-from manipcli.onboard.parts import Hand, RobotParts, guess_parts
 from manipcli.onboard.robot_entries import group_entries, limit_entries, pose_entries
-from manipcli.onboard.shape_points import ShapePoints
-from manipcli.onboard.tool_frame import ToolFrame, guess_tool_frame
 from manipcli.onboard.writer import Entry, Value
 from manipcli.scene.scene import Scene
 
-BLOCK: Final = 0.04
-"""[m] Edge of the block that a hand is asked to pick."""
 NOTHING_TO_HOLD_WITH: Final = "the fingers have no collision shapes, so that they cannot hold anything"
-OVERLAP: Final = 1e-3
-"""[m] Fingers that close stop before they overlap by more."""
-OVERLAP_PALM: Final = 5e-3
-"""[m] The same with the palm, whose hull is larger than it is."""
-PALM: Final = -1
-STEPS: Final = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,19 +149,8 @@ def _hand(
     touching = [link for link in links if robot.link(link).collisions]
     if not touching:
         notes.append(f"{NOTHING_TO_HOLD_WITH}; add their meshes, or <collision> shapes to the description")
-    closure = guess_closure(shape)
-    if stated is not None and (ends := stated.ends(shape)) is not None:
-        stops = replace(closure, opened=ends[0], closed=ends[1], evidence="states of the SRDF: ")
-        options: list[Closure | None] = [stops]
-    else:
-        options = [closure, knuckles_only(shape, closure)]
-    found = []
-    for option in filter(None, options):
-        stopped = replace(option, closed=_before_overlap(robot, kinematics, shape, option))
-        found.append((stopped, guess_tool_frame(shape, stopped, width=BLOCK)))
-    closure, frame = max(
-        found, key=lambda pair: (pair[1].narrowest < BLOCK, float(pair[1].X_PT.p @ pair[1].X_PT.R[:, 2]))
-    )
+    ends = stated.ends(shape) if stated is not None else None
+    closure, frame = measure_hand(shape, ends)
     if len(bare) == len(links):
         why = "the fingers have no shapes to measure: which end opens the hand is not known"
         frame = replace(frame, evidence="between the frames of the fingers, which have no shapes to measure")
@@ -177,31 +158,6 @@ def _hand(
     wide, narrow = readable(frame.widest, "m"), readable(frame.narrowest, "m")
     why = f"{closure.evidence}the gap between the fingers is at most {wide}, at least {narrow}"
     return replace(closure, evidence=why), frame, shape
-
-
-def _before_overlap(robot: RobotModel, kinematics: Kinematics, shape: HandShape, closure: Closure) -> Array:
-    """(m) The closed hand, or where it stops because its fingers would overlap each other or the palm."""
-    finger_of = {link: k for k, links in enumerate(closure.fingers) for link in links}
-    part_of = dict.fromkeys((shape.hand.palm, *shape.hand.fixed), PALM) | finger_of
-    query = CollisionChecker(kinematics, Scene((), (), np.array([0.0, 0.0, -9.81]))).at()
-
-    def overlapping(q: Array) -> set[frozenset[str]]:
-        found = set()
-        for hit in query.every(q):
-            a, b = hit.a.removeprefix("robot/"), hit.b.removeprefix("robot/")
-            parts = {part_of.get(a), part_of.get(b)}
-            if len(parts) == 2 and None not in parts and hit.distance < -(OVERLAP_PALM if PALM in parts else OVERLAP):
-                found.add(frozenset((a, b)))
-        return found
-
-    at_first = overlapping(shape.whole(closure.opened))
-    last = closure.opened
-    for share in np.linspace(0.0, 1.0, STEPS + 1):
-        here = (1.0 - share) * closure.opened + share * closure.closed
-        if overlapping(shape.whole(here)) - at_first:
-            return last if share > 0.2 else closure.closed
-        last = here
-    return closure.closed
 
 
 def _within_hand(robot: RobotModel, hand: Hand | None) -> tuple[tuple[str, str], ...]:

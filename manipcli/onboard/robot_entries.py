@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from manipcli.core.text import listed
+from manipcli.model.hand.closure import Closure
+from manipcli.model.hand.parts import Arm, RobotParts
 from manipcli.model.robot import RobotModel
-from manipcli.onboard.closure import Closure
 from manipcli.onboard.from_srdf import StatedParts
 from manipcli.onboard.home import Home
 from manipcli.onboard.limits import ProposedLimits
-from manipcli.onboard.parts import Arm, RobotParts
 from manipcli.onboard.writer import Entry, Value
 
 

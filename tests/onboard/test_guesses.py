@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 
 from manipcli.model.build_robot import build_robot
 from manipcli.model.configuration import zero_configuration
+from manipcli.model.hand.closure import HandShape, guess_closure
+from manipcli.model.hand.parts import RobotParts, guess_parts
+from manipcli.model.hand.shape_points import ShapePoints
+from manipcli.model.hand.tool_frame import INSIDE, ToolFrame, guess_tool_frame
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.onboard.closure import HandShape, guess_closure
 from manipcli.onboard.first_task import TaskSearch
 from manipcli.onboard.limits import propose_limits
 from manipcli.onboard.onboard import floor_scene
-from manipcli.onboard.parts import RobotParts, guess_parts
 from manipcli.onboard.robot_draft import NOTHING_TO_HOLD_WITH, RobotDraft, draft_robot
-from manipcli.onboard.shape_points import ShapePoints
-from manipcli.onboard.tool_frame import INSIDE, ToolFrame, guess_tool_frame
 from manipcli.onboard.writer import Entry, block
 from manipcli.spec.robot import RobotSpec
 from tests.onboard import small_robots as small

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.units import readable
-from manipcli.onboard.closure import SLAB, STEPS, Closure, HandShape
+from manipcli.model.hand.closure import STEPS, Closure, HandShape
+from manipcli.model.hand.gap import INSIDE, closing_axis, gap_between
 
-INSIDE: Final = 0.012
-"""[m] The frame is so far inside the finger tips."""
 BESIDE: Final = 0.006
 """[m] A fixed jaw is so far from the object before the other closes: more than the clearance of plans."""
-PAST: Final = 0.005
-"""[m] The frame is at most so far beyond the tip of the shorter finger."""
 SNAP: Final = np.cos(np.radians(20.0))
 """Axes nearer than 20 deg to an axis of the palm are that axis."""
 
@@ -44,7 +41,9 @@ def guess_tool_frame(shape: HandShape, closure: Closure, *, width: float) -> Too
     """The frame, for an object of this width [m]."""
     R = _axes(shape, closure)
     shares = np.linspace(0.0, 1.0, STEPS + 1)
-    between = [_between(shape, closure, share, R) for share in shares]
+    between = [
+        gap_between(shape, closure, (1.0 - share) * closure.opened + share * closure.closed, R) for share in shares
+    ]
     gaps = np.array([gap.width for gap in between])
     room = 2.0 * BESIDE if shape.hand.fixed else 0.0
     wanted = min(width + room, 0.6 * float(gaps.max()) + room)
@@ -63,16 +62,7 @@ def guess_tool_frame(shape: HandShape, closure: Closure, *, width: float) -> Too
 
 def _axes(shape: HandShape, closure: Closure) -> Array:
     """R_PT (3, 3)."""
-    moved = []
-    for finger in closure.fingers:
-        step = shape.tip(finger, closure.closed) - shape.tip(finger, closure.opened)
-        moved.append(step - (step @ closure.out) * closure.out)
-    d = np.array(moved)
-    if shape.hand.fixed or len(d) == 1:
-        y = d[0]
-    else:
-        values, vectors = np.linalg.eigh(d.T @ d)
-        y = d[0] if values[-2] > 0.9 * values[-1] else vectors[:, -1]
+    y = closing_axis(shape, closure)
     z = _snapped(closure.out)
     y = y - (y @ z) * z
     if float(np.linalg.norm(y)) < 1e-9:
@@ -88,41 +78,3 @@ def _axes(shape: HandShape, closure: Closure) -> Array:
 def _snapped(axis: Array) -> Array:
     k = int(np.argmax(np.abs(axis)))
     return np.sign(axis[k]) * np.eye(3)[k] if abs(axis[k]) >= SNAP else axis
-
-
-class _Gap(NamedTuple):
-    """[m] Width between the fingers; `p` (3,) the middle of their tips; how far out the tips are, and `p` may be."""
-
-    width: float
-    p: Array
-    far: float
-    room: float = 0.0
-
-
-def _between(shape: HandShape, closure: Closure, share: float, R: Array) -> _Gap:
-    """The gap of the fingers at a share of their way, in axes R."""
-    positions = (1.0 - share) * closure.opened + share * closure.closed
-    sides: tuple[list[Array], list[Array]] = ([], [])
-    sets = [shape.points(links, positions) @ R for links in closure.fingers]
-    if shape.hand.fixed:
-        sets.append(shape.points(shape.hand.fixed, positions) @ R)
-    opened = [shape.points(links, closure.opened) @ R for links in closure.fingers]
-    if shape.hand.fixed:
-        opened.append(shape.points(shape.hand.fixed, closure.opened) @ R)
-    tops = [points[points[:, 2] >= points[:, 2].max() - SLAB] for points in opened]
-    middles = np.array([top[:, 1].mean() for top in tops])
-    centre = (middles.max() + middles.min()) / 2.0
-    for points, middle in zip(sets, middles, strict=True):
-        sides[int(middle > centre)].append(points)
-    if not sides[0] or not sides[1]:
-        every = np.vstack(sets)
-        top = every[every[:, 2] >= every[:, 2].max() - SLAB]
-        far = float(every[:, 2].max())
-        return _Gap(0.0, np.array([*top[:, :2].mean(axis=0), far - INSIDE]), far)
-    low, high = (np.vstack(side) for side in sides)
-    short, long = sorted((float(low[:, 2].max()), float(high[:, 2].max())))
-    low, high = (side[side[:, 2] >= short - SLAB] for side in (low, high))
-    inner = float(low[:, 1].max()), float(high[:, 1].min())
-    x = (float(low[:, 0].mean()) + float(high[:, 0].mean())) / 2.0
-    z = min(long - INSIDE, short + PAST)
-    return _Gap(inner[1] - inner[0], np.array([x, (inner[0] + inner[1]) / 2.0, z]), long, short + PAST - z)

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.model.configuration import with_mimics
+from manipcli.model.hand.parts import Hand
+from manipcli.model.hand.shape_points import ShapePoints
 from manipcli.model.kinematics import Kinematics
-from manipcli.onboard.parts import Hand
-from manipcli.onboard.shape_points import ShapePoints
 
 SLAB: Final = 0.02
 """[m] Length of a finger that counts as its tip."""

@@ -20,9 +20,9 @@ from manipcli.core.text import number_of
 from manipcli.core.units import readable
 from manipcli.description.elements import Joint
 from manipcli.model.configuration import zero_configuration
+from manipcli.model.hand.shape_points import ShapePoints
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.onboard.shape_points import ShapePoints
 
 DEEPEST: Final = 5
 """Most independent joints in series in a finger."""
