@@ -13,8 +13,8 @@ SIZE = "500x400"
 
 
 def test_the_picture_of_the_readme_is_there_and_small() -> None:
-    picture = ROOT / "docs" / "pour.png"
-    assert "](docs/pour.png)" in (ROOT / "README.md").read_text(encoding="utf-8")
+    picture = ROOT / "docs" / "pictures" / "pour.png"
+    assert "](docs/pictures/pour.png)" in (ROOT / "README.md").read_text(encoding="utf-8")
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert picture.stat().st_size < 400_000
 
@@ -24,7 +24,7 @@ def test_the_pour_is_drawn_from_its_log_as_the_readme_shows_it(pour_run, call_cl
     drawn = tmp_path / "pour.png"
     ran = call_cli("replay", pour_run.log, "--sheet", drawn, "--size", SIZE, cwd=ROOT)
     assert (ran.code, ran.err) == (0, "")
-    with Image.open(drawn) as picture, Image.open(ROOT / "docs" / "pour.png") as shown:
+    with Image.open(drawn) as picture, Image.open(ROOT / "docs" / "pictures" / "pour.png") as shown:
         assert picture.size == shown.size
         # Six tiles, each with a pale green cup and a white arm somewhere.
         pixels = np.asarray(picture.convert("RGB"), dtype=int)

@@ -1,1 +1,1 @@
-"""What differs between the engines with physics: measures both and writes docs/engines.md."""
+"""What differs between the engines with physics: measures both and writes docs/explanation/engines.md."""

@@ -1,7 +1,7 @@
-"""python -m benchmarks.engines [PART ...]: measures both engines and renews the tables and figures of docs/engines.md.
+"""python -m benchmarks.engines [PART ...]: measures both engines and renews docs/explanation/engines.md.
 
-The parts are `laws`, `vice`, `cup`, `cost` and `tasks`; all without one. Each table is between
-`<!-- begin of PART -->` and `<!-- end of PART -->`; the text around it stays.
+Its tables and figures are renewed, the text around them stays. The parts are `laws`, `vice`, `cup`, `cost` and
+`tasks`; all without one. Each table is between `<!-- begin of PART -->` and `<!-- end of PART -->`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from benchmarks.engines.laws import law_rows, laws
 from benchmarks.engines.tasks import task_rows
 from benchmarks.engines.worlds import NAMES
 
-PAGE: Final = pictures.DOCS / "engines.md"
+PAGE: Final = pictures.DOCS / "explanation" / "engines.md"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -1,4 +1,4 @@
-"""Figures of docs/engines.md: a light cube in a vice, the cup of the pour, a dropped ball."""
+"""Figures of docs/explanation/engines.md: a light cube in a vice, the cup of the pour, a dropped ball."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
 
 
 def vice_picture() -> None:
-    """docs/engines_vice.svg."""
+    """docs/pictures/engines_vice.svg."""
     creeps, forces = [], []
     for variant in (*PYBULLET, MUJOCO):
         height, force = vice(variant, 0.01, 40.0, 2.0)
@@ -32,7 +32,7 @@ def vice_picture() -> None:
 
 
 def slip_picture(runs: dict[str, Carried]) -> None:
-    """docs/engines_slip.svg, of pours by what they are called."""
+    """docs/pictures/engines_slip.svg, of pours by what they are called."""
     curves = tuple(Curve(label, label, "", run.times, 1e3 * run.slip) for label, run in runs.items())
     first = next(iter(runs.values()))
     title = "Pour with a cup of 300 g, friction 0.5: motion of the cup in the hand"
@@ -42,7 +42,7 @@ def slip_picture(runs: dict[str, Carried]) -> None:
 
 
 def drop_picture() -> None:
-    """docs/engines_drop.svg: from 10 ms before the impact, 90 ms."""
+    """docs/pictures/engines_drop.svg: from 10 ms before the impact, 90 ms."""
     heights, forces = [], []
     for name, label in NAMES.items():
         height, force = drop(name)
@@ -57,4 +57,4 @@ def _curve(label: str, values: Array, start: float, period: float) -> Curve:
 
 
 def _draw(name: str, chart: Chart) -> None:
-    (DOCS / name).write_bytes(figure.render(chart, figure.kind_of(Path(name))))
+    (DOCS / "pictures" / name).write_bytes(figure.render(chart, figure.kind_of(Path(name))))

@@ -26,7 +26,7 @@ from manipcli.task.robot_file import read_robot
 from manipcli.task.vocabulary import task_spec
 
 ROOT = Path(__file__).parents[2]
-EXAMPLE = runpy.run_path(str(ROOT / "docs" / "write_steps.py"))["example"]
+EXAMPLE = runpy.run_path(str(ROOT / "docs" / "scripts" / "write_steps.py"))["example"]
 HEAD = "task: t\nrobot: r\ncontrollers: c\nsteps:\n"
 KEPT = {
     "upright": {"upright": "10 deg"},

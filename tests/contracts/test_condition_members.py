@@ -70,6 +70,6 @@ def test_the_schema_offers_every_word_under_one_of() -> None:
 
 
 def test_the_page_of_conditions_is_that_of_the_registry() -> None:
-    written = runpy.run_path(str(ROOT / "docs" / "write_conditions.py"))["page"]()
-    told = "run docs/write_conditions.py"
-    assert (ROOT / "docs" / "conditions.md").read_text(encoding="utf-8") == f"{written}\n", told
+    written = runpy.run_path(str(ROOT / "docs" / "scripts" / "write_conditions.py"))["page"]()
+    told = "run docs/scripts/write_conditions.py"
+    assert (ROOT / "docs" / "reference" / "conditions.md").read_text(encoding="utf-8") == f"{written}\n", told

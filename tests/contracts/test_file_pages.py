@@ -18,7 +18,8 @@ from manipcli.spec.load import load_controllers_text, load_robot_text, load_task
 from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import controllers_spec, task_spec
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "reference"
+SCRIPTS = Path(__file__).parents[2] / "docs" / "scripts"
 PAGES = ("task.md", "robot.md", "controllers.md")
 HEAD = "task: t\nrobot: r\ncontrollers: c\nsteps: [wait: 1 s]\n"
 
@@ -33,9 +34,9 @@ def examples(page: str) -> list[str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_its_tables_are_those_of_the_models(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(DOCS)
-    renewed = runpy.run_path(str(DOCS / "write_tables.py"))["renewed"]
-    assert renewed(text(page)) == text(page), "run docs/write_tables.py"
+    monkeypatch.syspath_prepend(SCRIPTS)
+    renewed = runpy.run_path(str(SCRIPTS / "write_tables.py"))["renewed"]
+    assert renewed(text(page)) == text(page), "run docs/scripts/write_tables.py"
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -16,7 +16,7 @@ from manipcli.spec.load import load_task_text
 from manipcli.task.vocabulary import task_spec
 
 DOCS = Path(__file__).parents[2] / "docs"
-WRITTEN = runpy.run_path(str(DOCS / "write_steps.py"))
+WRITTEN = runpy.run_path(str(DOCS / "scripts" / "write_steps.py"))
 HEAD = "task: t\nrobot: r\ncontrollers: c\nsteps:\n"
 
 
@@ -32,8 +32,8 @@ def test_it_says_what_it_does(member: StepMember[Any]) -> None:
 
 
 def test_the_page_of_steps_is_that_of_the_registry() -> None:
-    told = "run docs/write_steps.py"
-    assert (DOCS / "steps.md").read_text(encoding="utf-8") == f"{WRITTEN['page']()}\n", told
+    told = "run docs/scripts/write_steps.py"
+    assert (DOCS / "reference" / "steps.md").read_text(encoding="utf-8") == f"{WRITTEN['page']()}\n", told
 
 
 def test_every_field_has_a_type_and_a_meaning() -> None:

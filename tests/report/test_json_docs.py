@@ -1,4 +1,4 @@
-"""docs/json.md names the keys that programs get, all of them and no others."""
+"""docs/reference/json.md names the keys that programs get, all of them and no others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite.suite import Case, CaseReport, Suite, Trouble
 from manipcli.report.suite.suite_json import render_suite
 
-DOCS = Path(__file__).parents[2] / "docs" / "json.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "json.md"
 STEP = StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9, attempts=(Attempt("done", 0.0, 6.1),))
 NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1, relative=-0.5)
 WRONG = Diagnostic("TASK201", "unknown key", Place("a.yaml", 3, 5))

@@ -7,10 +7,10 @@ proportional to M / m: light bodies, and light bodies below heavy ones, need man
 body per iteration.
 
 The number is an upper limit: a step ends at a residual of 1e-7, which resting and free bodies reach in about ten.
-Measured on held bodies (grip force and creep; docs/engines.md): from 50 g on, 100 iterations give the forces of 1000
-within their variation, 50 do not. A cup of 5 to 20 g, which a hand presses with 34 N, slips by 0.8 to 3.6 mm in 9 s
-with 200 iterations and by 0.2 to 0.4 mm with 1000. The contents of a cup are not pressed: 20 loose balls of 2 g have
-the same forces with 100 and 1000.
+Measured on held bodies (grip force and creep; docs/explanation/engines.md): from 50 g on, 100 iterations give the
+forces of 1000 within their variation, 50 do not. A cup of 5 to 20 g, which a hand presses with 34 N, slips by 0.8 to
+3.6 mm in 9 s with 200 iterations and by 0.2 to 0.4 mm with 1000. The contents of a cup are not pressed: 20 loose balls
+of 2 g have the same forces with 100 and 1000.
 """
 
 from __future__ import annotations

@@ -190,7 +190,9 @@ def test_every_page_is_whole(page: CodePage) -> None:
 
 def test_the_docs_are_those_of_the_pages() -> None:
     for code, page in PAGES.items():
-        assert (ROOT / "docs" / "codes" / f"{code}.md").read_text(encoding="utf-8") == render_markdown(page)
+        assert (ROOT / "docs" / "reference" / "codes" / f"{code}.md").read_text(encoding="utf-8") == render_markdown(
+            page
+        )
 
 
 def test_the_command_prints_a_page(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""The examples of docs/structure.md load, and the page names every word and type."""
+"""The examples of docs/reference/structure.md load, and the page names every word and type."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manipcli.spec.structure.params import TYPES
 from manipcli.spec.structure.words import WORDS
 from manipcli.task.vocabulary import task_spec
 
-PAGE = (Path(__file__).parents[3] / "docs" / "structure.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "structure.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 HEAD = "task: t\nrobot: r\ncontrollers: c\n"
 BODY = "{box: {size: [1 cm, 1 cm, 1 cm]}, mass: 1, pose: {}}"

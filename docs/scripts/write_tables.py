@@ -1,10 +1,10 @@
-"""Writes what docs/task.md, robot.md, controllers.md and sensors.md have from the code: tables and controllers.
+"""Writes the tables and controllers of task.md, robot.md, controllers.md and sensors.md in docs/reference/.
 
 A table of fields is below a line `<!-- fields of BLOCK -->`; the blocks are models in `manipcli/spec/`. The sections of
 controllers are between `<!-- begin of controllers -->` and `<!-- end of controllers -->`: each is the docstring of the
 member's module and the fields of its spec. The text around them stays.
 
-python docs/write_tables.py
+python docs/scripts/write_tables.py
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ from manipcli.spec.base import about
 from manipcli.spec.controllers import ControllerSpec, GainsSpec
 from manipcli.task.vocabulary import task_spec
 
-PAGES: Final = tuple(Path(__file__).with_name(name) for name in ("task.md", "robot.md", "controllers.md", "sensors.md"))
+FOLDER: Final = Path(__file__).parents[1] / "reference"
+PAGES: Final = tuple(FOLDER / name for name in ("task.md", "robot.md", "controllers.md", "sensors.md"))
 _MODULES: Final = (
     *(task, clearance, robot, controllers, reactions, vary, baseline, agree, plan, inertials),
     *(sensors, mounted_sensor),

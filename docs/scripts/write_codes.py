@@ -1,6 +1,6 @@
-"""Writes docs/codes/: a page for each code, and their list.
+"""Writes docs/reference/codes/: a page for each code, and their list.
 
-python docs/write_codes.py
+python docs/scripts/write_codes.py
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from manipcli.report.codes.code_page import code_pages, render_markdown
 
-FOLDER = Path(__file__).with_name("codes")
+FOLDER = Path(__file__).parents[1] / "reference" / "codes"
 
 
 def pages() -> dict[Path, str]:
