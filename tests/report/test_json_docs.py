@@ -110,11 +110,11 @@ def test_keys_of_what_is_checked() -> None:
 
 @pytest.mark.slow
 def test_keys_of_the_self_collision_matrix(capsys: pytest.CaptureFixture[str]) -> None:
-    robot = DOCS.parents[1] / "robots" / "differential_wrist" / "robot.yaml"
+    robot = DOCS.parents[2] / "robots" / "differential_wrist" / "robot.yaml"
     assert main(["check", str(robot), "--collisions", "--format", "json"]) == 0
     assert set(_documented(list(_rows())[6])) == set(_written(json.loads(capsys.readouterr().out)))
 
 
 def test_keys_of_what_is_planned(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", str(DOCS.parents[1] / "examples" / "02_pick_a_block" / "task.yaml"), "--format", "json"]) == 0
+    assert main(["plan", str(DOCS.parents[2] / "examples" / "02_pick_a_block" / "task.yaml"), "--format", "json"]) == 0
     assert set(_documented(list(_rows())[4])) == set(_written(json.loads(capsys.readouterr().out)))
