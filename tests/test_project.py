@@ -148,8 +148,8 @@ def _named_paths(text: str) -> Iterator[str]:
     for part in [*code, *re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))]:
         for word in part.split():
             is_path = re.fullmatch(r"\.?\w[\w.-]*(/[\w.-]+)+/?|\w+/|\w+\.(py|md|toml)", word)
-            # ROS types (`geometry_msgs/WrenchStamped`) look like paths; results and environments are not kept.
-            if is_path and not word.startswith((".venv/", "runs/")) and "_msgs/" not in word:
+            # ROS types (`geometry_msgs/WrenchStamped`) look like paths; results, sites and environments are not kept.
+            if is_path and not word.startswith((".venv/", "runs/", "build/")) and "_msgs/" not in word:
                 yield word
 
 
