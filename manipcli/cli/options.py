@@ -11,6 +11,7 @@ import typer
 
 from manipcli.cli.log_files import opened
 from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.core.text import number_of
 
 OutputFormat = Literal["text", "json"]
 
@@ -116,6 +117,30 @@ def hertz(word: str) -> float:
     if not 0.0 < value < 1e9:
         raise InvalidInput([Diagnostic("USE072", f"'{word}' is not a frequency above 0 and below 1 GHz")])
     return value
+
+
+def pose_numbers(word: str) -> tuple[float, ...]:
+    """x, y, z [m], or these and roll, pitch, yaw [rad], of a pose on the command line.
+
+    Raises:
+        InvalidInput: it is not a pose.
+    """
+    from manipcli.core.units import ANGLE, LENGTH, UnitError, to_si
+
+    parts = [part.strip() for part in word.split(",")]
+    hint = "write x, y, z, or x, y, z, roll, pitch, yaw: '0, 0, 45 mm' or '0, 0, 0.045, 0, 0, 90 deg'"
+    if len(parts) not in (3, 6):
+        message = f"'{word}' is not a pose: {number_of(len(parts), 'value')}"
+        raise InvalidInput([Diagnostic("INIT003", message, hint=hint)])
+    found = []
+    for k, part in enumerate(parts):
+        try:
+            value = float(part) if part[-1:].isdecimal() else to_si(part, ANGLE if k >= 3 else LENGTH)
+        except (ValueError, UnitError) as error:
+            cause = error.cause if isinstance(error, UnitError) else f"'{part}' is not a number"
+            raise InvalidInput([Diagnostic("INIT003", f"'{word}' is not a pose: {cause}", hint=hint)]) from error
+        found.append(value)
+    return tuple(found)
 
 
 def xacro_arguments(words: list[str]) -> dict[str, str]:

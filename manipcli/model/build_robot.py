@@ -240,6 +240,25 @@ def _grouped(findings: Sequence[Diagnostic]) -> list[Diagnostic]:
     return [dataclasses.replace(first, message=message, hint=hint), *(each for each in findings if each not in missing)]
 
 
+def is_mount(parts: Parts) -> bool:
+    """Whether the root is only where a description alone is mounted: a bare frame `world` with one fixed joint.
+
+    Published grippers have it, and so have arms: without it, the names of both need no prefix.
+    """
+    root = next(link for link in parts.links if link.name == parts.root)
+    below = [joint for joint in parts.joints if joint.parent == root.name]
+    bare = not (root.visuals or root.collisions or root.inertial)
+    return root.name == "world" and bare and len(below) == 1 and below[0].type == "fixed"
+
+
+def without_root(parts: Parts) -> tuple[Parts, Joint]:
+    """The description below its mount, and the joint between the two."""
+    above = next(joint for joint in parts.joints if joint.parent == parts.root)
+    links = tuple(link for link in parts.links if link.name != parts.root)
+    joints = tuple(joint for joint in parts.joints if joint is not above)
+    return dataclasses.replace(parts, root=above.child, links=links, joints=joints), above
+
+
 class _Body:
     """Links and joints while descriptions are welded together."""
 
@@ -250,13 +269,17 @@ class _Body:
         self.transmissions = transmissions
 
     def weld(self, reporter: Reporter, spec: AttachSpec, parts: Parts, k: int) -> None:
-        """Attaches prefixed parts to link `spec.parent` by a fixed joint `<prefix><root>_attach`."""
+        """Attaches prefixed parts, below a mount, to link `spec.parent` by a fixed joint `<prefix><root>_attach`."""
         prefix = spec.prefix
         names = [link.name for link in self.links]
         if spec.parent not in names:
             message = f"link '{spec.parent}' is not in the description"
             reporter.error("ROBOT302", message, ("attach", k, "parent"), hint=did_you_mean(spec.parent, names))
             return
+        X_PA = spec.pose.transform.by_angles
+        if is_mount(parts):
+            parts, above = without_root(parts)
+            X_PA = (X_PA @ above.X_PJ).by_angles
         taken = {f"link '{name}'" for name in names} | {f"joint '{joint.name}'" for joint in self.joints}
         added = [f"link '{prefix}{link.name}'" for link in parts.links]
         added += [f"joint '{prefix}{joint.name}'" for joint in parts.joints]
@@ -272,7 +295,7 @@ class _Body:
                 type="fixed",
                 parent=spec.parent,
                 child=prefix + parts.root,
-                X_PJ=spec.pose.transform.by_angles,
+                X_PJ=X_PA,
                 axis=frozen([1.0, 0.0, 0.0]),
                 limits=JointLimits(),
             )

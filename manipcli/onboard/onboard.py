@@ -12,7 +12,7 @@ from manipcli.onboard.controllers_file import ControllersGuess, WrittenControlle
 from manipcli.onboard.first_task import FirstTask, TaskSearch
 from manipcli.onboard.from_srdf import stated_parts
 from manipcli.onboard.robot_draft import RobotDraft, draft_robot
-from manipcli.onboard.source import read_source
+from manipcli.onboard.source import HandSource, read_source
 from manipcli.onboard.summary import summary
 from manipcli.onboard.writer import Entry, block, checks, written
 from manipcli.scene.build_scene import build_scene
@@ -34,6 +34,7 @@ class Request:
         package_path, allow_outside: see `build_robot`.
         srdf: a MoveIt SRDF, for groups, poses, end effectors and pairs of links that touch.
         controllers: a controllers file to use instead of a guess.
+        hand: a hand from another description, to attach.
     """
 
     description: str
@@ -43,6 +44,7 @@ class Request:
     allow_outside: bool = False
     srdf: Path | None = None
     controllers: Path | None = None
+    hand: HandSource | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +77,7 @@ def onboard(request: Request, *, on_progress: Callable[[str], None] = lambda _: 
         request.folder,
         package_path=request.package_path,
         allow_outside=request.allow_outside,
+        hand=request.hand,
     )
     on_progress("looking for the arm, the hand and a start")
     stated = None
@@ -154,11 +157,11 @@ def floor_scene() -> Scene:
 
 
 def _head(request: Request) -> list[str]:
+    hand = f" --hand {Path(request.hand.description).name}" if request.hand is not None else ""
     return [
         f"{SCHEMA}schemas/robot.json",
-        f"Written by `manipcli init --robot {Path(request.description).name}`. Each guess has its evidence above it; "
-        "please look at",
-        "those marked CHECK.",
+        f"Written by `manipcli init --robot {Path(request.description).name}{hand}`.",
+        "Each guess has its evidence above it; please look at those marked CHECK.",
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,9 +16,12 @@ from manipcli.description.lint.examine import examine
 from manipcli.description.packages import NotFound, Packages, may_name, own_root
 from manipcli.description.urdf.link import MISSING_VISUAL
 from manipcli.description.urdf.urdf import Parts
-from manipcli.model.build_robot import build_robot
+from manipcli.model.build_robot import bare_robot, build_robot, is_mount, without_root
 from manipcli.model.inertials import massless_bodies
+from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
+from manipcli.onboard.parts import guess_parts
+from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.writer import Entry, plain
 from manipcli.spec.inertials import WATER
 from manipcli.spec.load import read_bytes
@@ -52,6 +55,40 @@ class Source:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class HandSource:
+    """A hand of another description.
+
+    Attributes:
+        description: a path, or `package://NAME/...`.
+        arguments: of the xacro file.
+        parent: link of the arm that carries it. Default: the last link of the arm.
+        pose: of its root in the parent: x, y, z [m], and roll, pitch, yaw [rad] if it is rotated. Default: identity.
+    """
+
+    description: str
+    arguments: Mapping[str, str]
+    parent: str | None = None
+    pose: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """A description that was read; `prefix`: of its names in the robot."""
+
+    path: Path
+    packages: Packages
+    parts: Parts
+    findings: tuple[Diagnostic, ...]
+    prefix: str = ""
+
+    @property
+    def name(self) -> str:
+        """That of the file, or of the robot in it."""
+        stem = self.path.name.partition(".")[0]
+        return self.parts.name if stem in GENERIC and self.parts.name else stem
+
+
 def read_source(
     description: str,
     arguments: Mapping[str, str],
@@ -59,6 +96,7 @@ def read_source(
     *,
     package_path: tuple[Path, ...],
     allow_outside: bool,
+    hand: HandSource | None = None,
 ) -> Source:
     """Reads a description, and mends by the robot file what it can mend.
 
@@ -67,23 +105,23 @@ def read_source(
         arguments: of the xacro file.
         folder: of the project.
         package_path, allow_outside: see `build_robot`.
+        hand: a hand from another description, to attach.
 
     Raises:
         InvalidInput: what no robot file mends.
     """
-    path = _located(description, package_path)
-    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    checked = tuple(check for check in CHECKS if check.severity == "error" or check.code == TOO_HEAVY)
-    examination = examine(path, packages=packages, arguments=arguments, checks=checked)
-    parts = examination.parts
-    if parts is None:
-        raise InvalidInput(examination.findings)
-    if parts.root and not any(joint.independent for joint in parts.joints):
-        message = f"no joint of '{path.name}' moves: there is nothing to command"
-        raise InvalidInput([Diagnostic("INIT002", message, Place(str(path), 0, 0))])
-    name = parts.name if path.name.partition(".")[0] in GENERIC and parts.name else path.name.partition(".")[0]
-    mended, notes = _mended(parts, examination.findings)
-    outer = _outer_packages(path, packages, allow_outside)
+    arm = _read(description, arguments, package_path, allow_outside)
+    if not any(joint.independent for joint in arm.parts.joints):
+        message = f"no joint of '{arm.path.name}' moves: there is nothing to command"
+        raise InvalidInput([Diagnostic("INIT002", message, Place(str(arm.path), 0, 0))])
+    read = [arm]
+    attached: dict[str, Entry] = {}
+    if hand is not None:
+        other = _read(hand.description, hand.arguments, package_path, allow_outside)
+        read.append(replace(other, prefix=_prefix(arm.parts, other.parts)))
+        attached = _attached(hand, arm.parts, read[1].prefix)
+    mended, notes = _mended(read)
+    outer = {name: place for each in read for name, place in _outer_packages(each, allow_outside).items()}
     root = own_root(folder / "robot.yaml") or Path(os.path.realpath(folder))
     notes += [
         f"package '{name}' is outside the project and has no package.xml: commands need --allow-outside, or "
@@ -91,14 +129,10 @@ def read_source(
         for name, place in outer.items()
         if not may_name(place, name, root)
     ]
-    spec = RobotSpec.model_validate(
-        {
-            "robot": name,
-            "description": str(path),
-            "args": dict(arguments),
-            **{key: plain(entry) for key, entry in mended.items()},
-        }
-    )
+    head = {"robot": Entry(arm.name)}
+    tail = ({"args": Entry(dict(arguments))} if arguments else {}) | mended
+    anywhere = head | {"description": Entry(str(arm.path))} | _attach(attached, str(read[-1].path)) | tail
+    spec = RobotSpec.model_validate({key: plain(entry) for key, entry in anywhere.items()})
     robot, findings = build_robot(
         spec, file=folder / "robot.yaml", package_path=package_path, allow_outside=allow_outside
     )
@@ -107,16 +141,71 @@ def read_source(
         notes.append(
             f"the description has {number_of(warned, 'warning')}: `manipcli check-urdf` of the file lists them"
         )
-    head = {"robot": Entry(name)}
-    tail = ({"args": Entry(dict(arguments))} if arguments else {}) | mended
+    placed = _placed(description, arm.path, folder)
+    of_hand = _attach(attached, _placed(hand.description, read[1].path, folder)) if hand is not None else {}
     return Source(
-        name,
+        arm.name,
         robot,
-        path,
-        head | _placed(description, path, outer, folder) | tail,
-        head | {"description": Entry(str(path))} | tail,
+        arm.path,
+        head | {"description": Entry(placed)} | _packages(outer, folder) | of_hand | tail,
+        anywhere,
         tuple(notes),
     )
+
+
+def _read(description: str, arguments: Mapping[str, str], package_path: tuple[Path, ...], allow_outside: bool) -> _Read:
+    """
+    Raises:
+        InvalidInput: what no robot file mends.
+    """
+    path = _located(description, package_path)
+    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+    checked = tuple(check for check in CHECKS if check.severity == "error" or check.code == TOO_HEAVY)
+    examination = examine(path, packages=packages, arguments=arguments, checks=checked)
+    parts = examination.parts
+    if parts is None or not parts.root:
+        raise InvalidInput(examination.findings)
+    return _Read(path, packages, parts, tuple(examination.findings))
+
+
+def _prefix(arm: Parts, hand: Parts) -> str:
+    """`hand_`, where both descriptions have a link or a joint of the same name."""
+    if is_mount(hand):
+        hand, _ = without_root(hand)
+    same_link = {link.name for link in arm.links} & {link.name for link in hand.links}
+    same_joint = {joint.name for joint in arm.joints} & {joint.name for joint in hand.joints}
+    return "hand_" if same_link or same_joint else ""
+
+
+def _attached(hand: HandSource, arm: Parts, prefix: str) -> dict[str, Entry]:
+    """The entries of `attach` but for the description."""
+    found: dict[str, Entry] = {}
+    if hand.arguments:
+        found["args"] = Entry(dict(hand.arguments))
+    if hand.parent is not None:
+        found["parent"] = Entry(hand.parent)
+    else:
+        bare = bare_robot(arm)
+        kinematics = Kinematics(bare)
+        guessed = guess_parts(bare, ShapePoints(kinematics), kinematics).arm
+        tip = guessed.tip if guessed is not None else arm.root
+        why = f"the hand is on '{tip}', the last link of the arm, in its frame: --hand-at and --hand-pose change that"
+        found["parent"] = Entry(tip, why, True)
+    if hand.pose is not None:
+        found["pose"] = Entry({"xyz": list(hand.pose[:3])} | ({"rpy": list(hand.pose[3:])} if hand.pose[3:] else {}))
+    if prefix:
+        found["prefix"] = Entry(prefix, "names of the hand are also names of the arm")
+    return found
+
+
+def _attach(attached: Mapping[str, Entry], description: str) -> dict[str, Entry]:
+    """`attach` of the robot file; {} without a hand."""
+    if not attached:
+        return {}
+    row: dict[str, Plain] = {"description": description}
+    row |= {key: plain(entry) for key, entry in attached.items()}
+    doubts = [entry for entry in attached.values() if entry.why]
+    return {"attach": Entry([row], "; ".join(entry.why for entry in doubts), any(entry.check for entry in doubts))}
 
 
 def _located(description: str, package_path: tuple[Path, ...]) -> Path:
@@ -134,11 +223,11 @@ def _located(description: str, package_path: tuple[Path, ...]) -> Path:
         raise InvalidInput([Diagnostic("USE101", error.message, hint=error.hint)]) from error
 
 
-def _outer_packages(path: Path, packages: Packages, allow_outside: bool) -> dict[str, Path]:
+def _outer_packages(read: _Read, allow_outside: bool) -> dict[str, Path]:
     """The packages that are only found with `--package-path`."""
-    alone = Packages(path, allow_outside=allow_outside)
+    alone = Packages(read.path, allow_outside=allow_outside)
     found = {}
-    for name, folder in packages.found.items():
+    for name, folder in read.packages.found.items():
         try:
             same = alone.root(name) == folder
         except NotFound:
@@ -148,8 +237,8 @@ def _outer_packages(path: Path, packages: Packages, allow_outside: bool) -> dict
     return found
 
 
-def _placed(description: str, path: Path, outer: Mapping[str, Path], folder: Path) -> dict[str, Entry]:
-    """`description` and `packages` for a robot file in the folder."""
+def _placed(description: str, path: Path, folder: Path) -> str:
+    """The description as a robot file in the folder names it."""
     here = os.path.realpath(folder)
     relative = description if "://" in description else os.path.relpath(path, here)
     portable = Packages(path).portable(path)
@@ -159,23 +248,30 @@ def _placed(description: str, path: Path, outer: Mapping[str, Path], folder: Pat
                 relative = portable  # an installed package: the same on another machine
         except NotFound:
             pass
-    found = {"description": Entry(relative)}
-    if outer:
-        rows: dict[str, Plain] = {name: os.path.relpath(root, here) for name, root in sorted(outer.items())}
-        found["packages"] = Entry(rows, "as given by --package-path")
-    return found
+    return relative
 
 
-def _mended(parts: Parts, findings: Sequence[Diagnostic]) -> tuple[dict[str, Entry], list[str]]:
-    """`inertials` and `collision` of the robot file, where the description lacks something."""
+def _packages(outer: Mapping[str, Path], folder: Path) -> dict[str, Entry]:
+    """`packages` for a robot file in the folder."""
+    here = os.path.realpath(folder)
+    rows: dict[str, Plain] = {name: os.path.relpath(root, here) for name, root in sorted(outer.items())}
+    return {"packages": Entry(rows, "as given by --package-path")} if rows else {}
+
+
+def _mended(read: Sequence[_Read]) -> tuple[dict[str, Entry], list[str]]:
+    """`inertials` and `collision` of the robot file, where the descriptions lack something."""
     found: dict[str, Entry] = {}
     notes: list[str] = []
-    unusable = [link.name for link in parts.links if link.unusable is not None]
-    massive = {link.name for link in parts.links if link.inertial is not None}
-    massless = sorted(massless_bodies(parts.joints, massive))
-    heavy = [
-        name for name in _named(finding for finding in findings if finding.code == TOO_HEAVY) if name not in unusable
-    ]
+    links = [replace(link, name=each.prefix + link.name) for each in read for link in each.parts.links]
+    findings = [finding for each in read for finding in each.findings]
+    unusable = [link.name for link in links if link.unusable is not None]
+    massless, dense = [], []
+    for each in read:
+        massive = {link.name for link in each.parts.links if link.inertial is not None}
+        massless += [each.prefix + name for name in sorted(massless_bodies(each.parts.joints, massive))]
+        named = _named(finding for finding in each.findings if finding.code == TOO_HEAVY)
+        dense += [each.prefix + name for name in named]
+    heavy = [name for name in dense if name not in unusable]
     if unusable or massless or heavy:
         lacking = list(dict.fromkeys((*unusable, *massless, *heavy)))
         why = f"missing or impossible in the description: {listed(lacking, most=6)}; from the volume of their shapes"
@@ -187,7 +283,7 @@ def _mended(parts: Parts, findings: Sequence[Diagnostic]) -> tuple[dict[str, Ent
         notes.append(
             f"inertials of {number_of(len(lacking), 'link')} are estimated; `manipcli check robot.yaml` shows the table"
         )
-    missing = [link for link in parts.links if link.missing]
+    missing = [link for link in links if link.missing]
     if missing:
         rows: dict[str, Plain] = {link.name: "from_visual" if link.visuals else "none" for link in missing}
         bare = [name for name, how in rows.items() if how == "none"]

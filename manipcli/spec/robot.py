@@ -223,7 +223,10 @@ class AttachSpec(Model):
     description: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
     args: Arguments = Field({}, description="Arguments of the xacro file.")
     parent: str = Field(description="The link that it is welded to.")
-    pose: PoseSpec = Field(PoseSpec(), description="Pose of its root link in `parent`. Default: identity.")
+    pose: PoseSpec = Field(
+        PoseSpec(),
+        description="Pose of its root link in `parent`; an empty root link `world` is left out. Default: identity.",
+    )
     prefix: Annotated[str, AfterValidator(_begins_names)] = Field(
         "",
         description="Prefix of its link and joint names: letters, digits, `_`, `.`, `/`, `-`. Default: none.",

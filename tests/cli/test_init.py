@@ -34,7 +34,10 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
 def test_its_files_are_sound(project: Path) -> None:
     files = sorted(str(path) for kind in ("tasks", "robots", "controllers") for path in (project / kind).iterdir())
     assert main(["check", *files]) == 0
-    assert (project / "README.md").read_text().startswith("# my demo\n")
+    readme = (project / "README.md").read_text()
+    assert readme.startswith("# my demo\n")
+    named = re.findall(r"`((?:tasks|robots|controllers)\S*?\.yaml)`", readme)
+    assert {*named} == {"tasks/pick_place.yaml", "robots/panda.yaml", "controllers/panda.yaml"}
 
 
 def test_every_yaml_file_names_a_schema_that_is_there(project: Path) -> None:

@@ -89,6 +89,12 @@ def test_a_hand_alone_opens_and_closes(folder: Path) -> None:
         (["--robot", "whole.urdf", "--arg", "a=b"], "USE045", "expected NAME:=VALUE"),
         (["--robot", "still.urdf"], "INIT002", "no joint of 'still.urdf' moves"),
         (["--srdf", "whole.srdf"], "USE089", "--srdf has no effect"),
+        (["--hand", "hand.urdf"], "USE089", "--hand has no effect"),
+        (["--robot", "bare.urdf", "--hand-at", "l6"], "USE089", "--hand-at has no effect: it belongs to --hand"),
+        (["--robot", "bare.urdf", "--hand", "hnd.urdf"], "USE101", "did you mean 'hand.urdf'?"),
+        (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-at", "l66"], "ROBOT302", "did you mean 'l6'?"),
+        (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "0 0 1 cm"], "INIT003", "1 value"),
+        (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "0, 0, 1 kg"], "INIT003", "'1 kg' is a mass"),
     ],
 )
 def test_bad_input_is_named_and_nothing_is_written(

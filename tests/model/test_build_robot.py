@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import InvalidInput
+from manipcli.core.geometry import Transform
 from manipcli.description.lint.examine import examine
 from manipcli.description.packages import Packages
 from manipcli.model.build_robot import build_robot, rebuild_robot
@@ -94,6 +95,22 @@ def test_two_hands_need_prefixes(file: Path) -> None:
     twice = [{"description": "hand.urdf", "parent": "flange"}, {"description": "hand.urdf", "parent": "wrist"}]
     assert "link 'palm' already exists" in messages(file, attach=twice)
     assert "did you mean 'flange'" in messages(file, attach=[{"description": "hand.urdf", "parent": "flang"}])
+
+
+def test_an_empty_root_world_is_only_where_a_hand_is_mounted(file: Path) -> None:
+    above = joint("mount", "fixed", "world", "palm", '<origin xyz="0.1 0 0" rpy="0 0 1.5"/>')
+    mounted = HAND.replace(link("palm"), link("world", "") + link("palm") + above)
+    file.with_name("mounted.urdf").write_text(mounted)
+    pose = {"xyz": [0, 0, 0.2], "rpy": [0, 0.3, 0]}
+    robot = build(file, attach=[{"description": "mounted.urdf", "parent": "flange", "pose": pose}])
+    weld = robot.joint("palm_attach")
+    assert (weld.parent, weld.child) == ("flange", "palm")
+    wanted = Transform.of(xyz=[0, 0, 0.2], rpy=[0, 0.3, 0]) @ Transform.of(xyz=[0.1, 0, 0], rpy=[0, 0, 1.5])
+    np.testing.assert_allclose(weld.X_PJ.matrix, wanted.matrix, atol=1e-12)
+    assert "world" not in [each.name for each in robot.links]
+    file.with_name("heavy.urdf").write_text(mounted.replace(link("world", ""), link("world")))
+    robot = build(file, attach=[{"description": "heavy.urdf", "parent": "flange"}])
+    assert robot.joint("world_attach").parent == "flange"  # a body of its own
 
 
 def test_a_chain_is_the_independent_joints_on_the_way(file: Path) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from manipcli.model.kinematics import Kinematics
 from manipcli.onboard.first_task import FirstTask
-from manipcli.onboard.source import read_source
+from manipcli.onboard.source import HandSource, read_source
 from manipcli.onboard.summary import summary
 from tests.onboard import small_robots as small
 
@@ -56,3 +58,40 @@ def test_a_link_denser_than_metal_is_estimated(tmp_path: Path) -> None:
     assert inertials.check and "denser than any metal" in inertials.why
     volume = (0.2 - 0.08) * 0.05 * 0.05
     assert source.robot.link("l2").inertial.mass == pytest.approx(1000.0 * volume, rel=0.01)
+
+
+def test_an_arm_and_a_hand_of_two_files_are_the_robot_of_one(tmp_path: Path) -> None:
+    hand = (small.palm("p"), small.gripper("p"))
+    (tmp_path / "whole.urdf").write_text(
+        small.robot(small.arm(LINKS), small.palm("p", parent="l6"), small.gripper("p"))
+    )
+    (tmp_path / "arm.urdf").write_text(small.robot(small.arm(LINKS)))
+    world = ['<link name="world"/><joint name="at" type="fixed"><parent link="world"/><child link="p"/></joint>']
+    (tmp_path / "hand.urdf").write_text(small.robot(*hand, world))
+    given = {"package_path": (), "allow_outside": False}
+    whole = read_source(str(tmp_path / "whole.urdf"), {}, tmp_path, **given).robot
+    pose = (small.LINK, 0.0, 0.0)
+    source = read_source(
+        str(tmp_path / "arm.urdf"), {}, tmp_path, hand=HandSource(str(tmp_path / "hand.urdf"), {}, pose=pose), **given
+    )
+    assert source.entries["attach"].value == [
+        {"description": "hand.urdf", "parent": "l6", "pose": {"xyz": [small.LINK, 0.0, 0.0]}}
+    ]
+    assert source.entries["attach"].check and "'l6'" in source.entries["attach"].why
+    assert source.robot.joint_names == whole.joint_names
+    q = np.array([0.3, -0.5, 1.2, 0.4, 0.8, 0.1, 0.01, 0.02])
+    for link in ("l6", "p", "left", "right"):
+        one, other = (Kinematics(robot).forward(q, link).matrix for robot in (source.robot, whole))
+        np.testing.assert_allclose(one, other, atol=1e-12)
+
+
+def test_a_hand_with_names_of_the_arm_gets_a_prefix(tmp_path: Path) -> None:
+    bare = '<mass value="0.5"/>'
+    (tmp_path / "arm.urdf").write_text(small.robot(small.arm(LINKS)))
+    hand = small.robot(small.palm("l3"), small.gripper("l3"))
+    (tmp_path / "hand.urdf").write_text(hand.replace(bare, '<mass value="5000"/>'))
+    hands = HandSource(str(tmp_path / "hand.urdf"), {}, "l5", (0.0, 0.0, 0.1, 0.0, 0.0, 1.5))
+    source = read_source(str(tmp_path / "arm.urdf"), {}, tmp_path, package_path=(), allow_outside=False, hand=hands)
+    assert source.robot.joint("hand_l3_attach").parent == "l5"
+    assert source.entries["inertials"].value["links"].keys() == {"hand_l3", "hand_left", "hand_right"}
+    assert not source.entries["attach"].check  # the user named the link

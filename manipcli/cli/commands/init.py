@@ -12,7 +12,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.new_project import enter, notes, refuse_conflicts, write_files
-from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
+from manipcli.cli.options import AllowOutside, PackagePath, pose_numbers, xacro_arguments
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
@@ -48,6 +48,26 @@ def init(
         list[str] | None,
         typer.Option("--arg", metavar="NAME:=VALUE", help="Argument of the xacro file; repeatable."),
     ] = None,
+    hand: Annotated[
+        str | None,
+        typer.Option("--hand", metavar="FILE", help="Attach this hand to it: another URDF or xacro file."),
+    ] = None,
+    hand_arg: Annotated[
+        list[str] | None,
+        typer.Option("--hand-arg", metavar="NAME:=VALUE", help="Argument of the hand's xacro file; repeatable."),
+    ] = None,
+    hand_at: Annotated[
+        str | None,
+        typer.Option("--hand-at", metavar="LINK", help="Link that carries the hand [default: the arm's last link]."),
+    ] = None,
+    hand_pose: Annotated[
+        str | None,
+        typer.Option(
+            "--hand-pose",
+            metavar="X,Y,Z[,R,P,Y]",
+            help="Pose of the hand's root in that link: '0, 0, 45 mm, 0, 0, 90 deg' [default: the same frame].",
+        ),
+    ] = None,
     srdf: Annotated[
         Path | None,
         typer.Option("--srdf", metavar="FILE", help="Take groups, poses and touching links from this MoveIt SRDF."),
@@ -70,7 +90,8 @@ def init(
     kept; if another of the files exists, nothing is written.
     """
     if robot is None:
-        for word, value in (("--arg", arg), ("--srdf", srdf), ("--controllers", controllers)):
+        words = (("--arg", arg), ("--hand", hand), ("--srdf", srdf), ("--controllers", controllers))
+        for word, value in words:
             if value:
                 raise InvalidInput([Diagnostic("USE089", f"{word} has no effect: {NO_ROBOT}", hint="add --robot FILE")])
         write_files(folder, _common(folder) | _example() | _schemas() | _wheel(), force=force)
@@ -78,9 +99,16 @@ def init(
         _print_notes(folder)
         console.talk(f"next: {enter(folder)}manipcli test")
         return ExitCode.PASSED
+    for word, value in (("--hand-arg", hand_arg), ("--hand-at", hand_at), ("--hand-pose", hand_pose)):
+        if value and hand is None:
+            raise InvalidInput(
+                [Diagnostic("USE089", f"{word} has no effect: it belongs to --hand", hint="add --hand FILE")]
+            )
     refuse_conflicts(folder, [*COMMON, "robot.yaml", "controllers.yaml", *SCHEMAS], force=force)
     from manipcli.onboard.onboard import Request, onboard
+    from manipcli.onboard.source import HandSource
 
+    pose = None if hand_pose is None else pose_numbers(hand_pose)
     request = Request(
         robot,
         folder,
@@ -89,6 +117,7 @@ def init(
         allow_outside=allow_outside,
         srdf=srdf,
         controllers=controllers,
+        hand=None if hand is None else HandSource(hand, xacro_arguments(hand_arg or []), hand_at, pose),
     )
     live = console.is_live()
     made = onboard(request, on_progress=lambda what: console.redraw(what) if live else None)
@@ -113,7 +142,7 @@ def _common(folder: Path, *, robot: str = "robots/panda.yaml", task: str = "task
     found = _installation()
     words = {
         b"INSTALL": found.requirement.encode() if found is not None else b"",
-        b"CONTROLLERS": robot.replace("robot", "controllers", 1).encode(),
+        b"CONTROLLERS": re.sub("^robots?", "controllers", robot).encode(),
         b"ROBOT": robot.encode(),
         b"TASK": Path(task).stem.encode(),
         b"PROJECT": name,
