@@ -17,11 +17,11 @@ from manipcli.description.packages import NotFound, Packages, may_name, own_root
 from manipcli.description.urdf.link import MISSING_VISUAL
 from manipcli.description.urdf.urdf import Parts
 from manipcli.model.build_robot import bare_robot, build_robot, is_mount, without_root
+from manipcli.model.hand.parts import guess_parts
+from manipcli.model.hand.shape_points import ShapePoints
 from manipcli.model.inertials import massless_bodies
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.onboard.parts import guess_parts
-from manipcli.onboard.shape_points import ShapePoints
 from manipcli.onboard.writer import Entry, plain
 from manipcli.spec.inertials import WATER
 from manipcli.spec.load import read_bytes
