@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,7 +26,8 @@ from manipcli.logs.measure_run import measured_run
 from manipcli.logs.part_of import part_until, task_part
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
-from manipcli.model.robot import LinkInertial, RobotModel
+from manipcli.model.hand.tool_hand import ToolHand, tool_hand
+from manipcli.model.robot import LinkInertial, RobotModel, Tool
 from manipcli.model.self_collision import SelfCollisionMatrix
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
@@ -59,13 +60,13 @@ from manipcli.task.vocabulary import meanings
 __all__ = [
     "Diagnostic",
     "Plan",
+    "RobotFacts",
     "Task",
     "bare_task",
     "check_files",
     "compare_runs",
     "controllers_of",
     "explain_task",
-    "inertials",
     "judge_log",
     "kind_of",
     "load_sight",
@@ -73,6 +74,7 @@ __all__ = [
     "meanings",
     "plan_task",
     "refused",
+    "robot_facts",
     "ros2_files",
     "run_task",
     "schema",
@@ -86,15 +88,29 @@ __all__ = [
 ]
 
 
-def inertials(
-    path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
-) -> tuple[LinkInertial, ...]:
-    """Where the inertials of a robot file's links come from, if not from its description.
+@dataclass(frozen=True, slots=True)
+class RobotFacts:
+    """What a robot file results in, beyond what it states.
+
+    Attributes:
+        inertials: where the inertials of links come from, if not from the description.
+        tool: the tool frame as stated.
+        hand: the hand at the tool frame; None without fingers.
+    """
+
+    inertials: tuple[LinkInertial, ...]
+    tool: Tool | None
+    hand: ToolHand | None
+
+
+def robot_facts(path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False) -> RobotFacts:
+    """The facts about the robot of a file.
 
     Raises:
         InvalidInput: all errors of the file.
     """
-    return load_sight(path, package_path=package_path, allow_outside=allow_outside).robot.inertials
+    robot = load_sight(path, package_path=package_path, allow_outside=allow_outside).robot
+    return RobotFacts(robot.inertials, robot.tool, tool_hand(robot))
 
 
 def explain_task(path: Path, **options: Unpack[FileOptions]) -> tuple[Explanation, tuple[Diagnostic, ...]]:

@@ -37,8 +37,13 @@ def render_errors(
     return dumps({**_object(None, findings, verdict=verdict), **(known or {})})
 
 
-def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, strict: bool = False) -> str:
-    """The JSON object of checked files; `failed` if a finding is an error, with `strict` also if one is a warning."""
+def render_findings(
+    findings: Sequence[Diagnostic], files: Sequence[str], *, strict: bool = False, more: Mapping[str, Json] = {}
+) -> str:
+    """The JSON object of checked files; `failed` if a finding is an error, with `strict` also if one is a warning.
+
+    `more`: further keys.
+    """
     failing = ("error", "warning") if strict else ("error",)
     failed = any(finding.severity in failing for finding in findings)
     return dumps(
@@ -46,6 +51,7 @@ def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, str
             "verdict": "failed" if failed else "passed",
             "files": list(files),
             "findings": plain(findings),
+            **more,
         }
     )
 

@@ -20,12 +20,15 @@ from manipcli.judge.measured_run import MeasuredRun, Variant
 from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.logs import plot as chart
+from manipcli.model.hand.tool_hand import tool_hand
 from manipcli.report.agreement.agreement_json import render_json
 from manipcli.report.agreement.compared_runs import ComparedRuns
 from manipcli.report.json import render_findings, render_run
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite.suite import Case, CaseReport, Suite, Trouble
 from manipcli.report.suite.suite_json import render_suite
+from manipcli.report.tool_hand import tool_object
+from manipcli.task.load_view import load_sight
 
 DOCS = Path(__file__).parents[2] / "docs" / "reference" / "json.md"
 STEP = StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9, attempts=(Attempt("done", 0.0, 6.1),))
@@ -105,7 +108,10 @@ def test_keys_of_what_can_be_plotted(monkeypatch: pytest.MonkeyPatch, capsys: py
 
 
 def test_keys_of_what_is_checked() -> None:
-    assert set(_documented(list(_rows())[3])) == set(_written(json.loads(render_findings([WRONG], ["a.yaml"]))))
+    robot = load_sight(DOCS.parents[2] / "robots" / "panda" / "robot.yaml").robot
+    tool = tool_object(robot.tool, tool_hand(robot))
+    text = render_findings([WRONG], ["a.yaml"], more={"tool": tool})
+    assert set(_documented(list(_rows())[3])) == set(_written(json.loads(text)))
 
 
 @pytest.mark.slow

@@ -52,7 +52,7 @@ def check(
     """
     from manipcli import pipeline
     from manipcli.cli.progress import PlanningProgress
-    from manipcli.report import json, text
+    from manipcli.report import json, text, tool_hand
     from manipcli.report.inertials import render_table
 
     if watch and collisions:
@@ -91,12 +91,21 @@ def check(
     if (overrides or seed is not None or sample is not None) and not failed and "task" not in kinds:
         raise InvalidInput([Diagnostic("USE052", "--set, --seed and --sample need a task; no file is a task")])
     names = [str(file) for file in files]
-    render = json.render_findings if format_ == "json" else text.render_findings
-    text_ = render(findings, names, strict=strict)
-    if format_ == "text" and kinds == ["robot"]:
-        rows = pipeline.inertials(files[0], package_path=tuple(package_path or ()), allow_outside=allow_outside)
-        text_ = f"{render_table(rows)}\n\n{text_}" if rows else text_
-    console.result(text_)
+    facts = None
+    if kinds == ["robot"]:
+        facts = pipeline.robot_facts(files[0], package_path=tuple(package_path or ()), allow_outside=allow_outside)
+    if format_ == "json":
+        more = {} if facts is None else {"tool": tool_hand.tool_object(facts.tool, facts.hand)}
+        console.result(json.render_findings(findings, names, strict=strict, more=more))
+    else:
+        parts = [text.render_findings(findings, names, strict=strict)]
+        if facts is not None:
+            parts = [
+                render_table(facts.inertials) if facts.inertials else "",
+                tool_hand.render_text(facts.tool, facts.hand),
+                *parts,
+            ]
+        console.result("\n\n".join(filter(None, parts)))
     if any(finding.code in UNREADABLE for finding in findings):
         return ExitCode.USAGE
     if "controllers" in kinds and "task" not in kinds:

@@ -89,13 +89,17 @@ class HandShape:
         return np.array([(X_PW @ self._kinematics.forward(q, link)).p for link in links])
 
     def tip(self, links: tuple[str, ...], fingers: Array) -> Array:
-        """(3,) in P: the tip of a finger, the same material points wherever the finger is."""
-        if links not in self._tips:
-            self._tips[links] = self._tip_of(links)
-        link, p_LT = self._tips[links]
+        """(3,) in P: the tip of a finger, the same material point wherever the finger is."""
+        link, p_LT = self.tip_point(links)
         q = self.whole(fingers)
         X_PL = self._kinematics.forward(q, self.hand.palm).inverse() @ self._kinematics.forward(q, link)
         return np.asarray(X_PL.apply(p_LT))
+
+    def tip_point(self, links: tuple[str, ...]) -> tuple[str, Array]:
+        """The link of the tip of a finger, and (3,) the tip in this link."""
+        if links not in self._tips:
+            self._tips[links] = self._tip_of(links)
+        return self._tips[links]
 
     def base(self, links: tuple[str, ...], fingers: Array) -> Array:
         """(3,) in P: the joint at which a finger begins."""

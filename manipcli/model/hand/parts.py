@@ -86,6 +86,20 @@ def guess_parts(robot: RobotModel, points: ShapePoints, kinematics: Kinematics) 
     return RobotParts(arm, hand, arm_evidence, hand_evidence, others)
 
 
+def hand_at(robot: RobotModel, points: ShapePoints, kinematics: Kinematics, link: str | None = None) -> Hand | None:
+    """The hand whose palm or one of whose fingers has this link; None: that of the longest chain, as in `guess_parts`.
+
+    Of a chain of hands, the last one.
+    """
+    tree = _Tree(robot, points, kinematics)
+    found = [hand for _, _, hand, *_ in sorted(tree.candidates(), key=lambda each: -each[0]) if hand is not None]
+    if link is None:
+        return found[0] if found else None
+    below = {hand.palm: robot.descendants(tree.top(hand.palm)) for hand in found}
+    around = [hand for hand in found if link in below[hand.palm]]
+    return min(around, key=lambda hand: len(below[hand.palm]), default=None)
+
+
 _Candidate = tuple[float, Arm | None, Hand | None, str, str]
 
 
@@ -104,7 +118,7 @@ class _Tree:
         hands: set[str] = set()
         for body in self._bodies():  # parents first
             chain = self._chain(body[0])
-            if any(self._top(joint.parent) in hands for joint in chain):
+            if any(self.top(joint.parent) in hands for joint in chain):
                 continue  # a part of a finger
             branches = self._branches(body)
             if branches:
@@ -192,7 +206,8 @@ class _Tree:
         )
         return Hand(palm, joints, tuple(tuple(links) for links in below)), why
 
-    def _top(self, link: str) -> str:
+    def top(self, link: str) -> str:
+        """The uppermost link of the rigid body of a link."""
         while link in self._above and not self._above[link].moves:
             link = self._above[link].parent
         return link
@@ -204,7 +219,7 @@ class _Tree:
             return None, ""
         X_WJ = self._kinematics.forward(self._zero, last.child)
         axis, before = X_WJ.R @ last.axis, self._kinematics.forward(self._zero, chain[-2].child).p
-        fixed = tuple(self._body(self._top(last.parent)))
+        fixed = tuple(self._body(self.top(last.parent)))
         own = self._points.at(self._zero, body)
         frames = np.array([self._kinematics.forward(self._zero, link).p for link in fixed])
         beside = np.vstack([self._points.at(self._zero, fixed), frames])
