@@ -49,6 +49,7 @@ OBJECTS = {
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
     "findings", "disagreements", "numbers", "motions", "motions.limited_by", "motions.clearance", "motions.bound_by",
     "motions.margins", "motions.manipulability", "candidates", "pairs", "grasps",
+    "tool", "tool.hand", "tool.hand.tips", "tool.hand.poses",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators", "limits"}
