@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,8 +26,7 @@ from manipcli.logs.measure_run import measured_run
 from manipcli.logs.part_of import part_until, task_part
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
-from manipcli.model.hand.tool_hand import ToolHand, tool_hand
-from manipcli.model.robot import LinkInertial, RobotModel, Tool
+from manipcli.model.robot import RobotModel
 from manipcli.model.self_collision import SelfCollisionMatrix
 from manipcli.model.self_collision_cache import self_collision_matrix
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
@@ -53,6 +52,7 @@ from manipcli.task.load_task import FileOptions, LoadOptions, load_task
 from manipcli.task.load_view import load_sight
 from manipcli.task.part import LIVE, LIVE_RUN
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
+from manipcli.task.robot_facts import RobotFacts, robot_facts
 from manipcli.task.task import Task
 from manipcli.task.variants import overrides_of, simulation_of
 from manipcli.task.vocabulary import meanings
@@ -86,31 +86,6 @@ __all__ = [
     "verify_log",
     "words",
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class RobotFacts:
-    """What a robot file results in, beyond what it states.
-
-    Attributes:
-        inertials: where the inertials of links come from, if not from the description.
-        tool: the tool frame as stated.
-        hand: the hand at the tool frame; None without fingers.
-    """
-
-    inertials: tuple[LinkInertial, ...]
-    tool: Tool | None
-    hand: ToolHand | None
-
-
-def robot_facts(path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False) -> RobotFacts:
-    """The facts about the robot of a file.
-
-    Raises:
-        InvalidInput: all errors of the file.
-    """
-    robot = load_sight(path, package_path=package_path, allow_outside=allow_outside).robot
-    return RobotFacts(robot.inertials, robot.tool, tool_hand(robot))
 
 
 def explain_task(path: Path, **options: Unpack[FileOptions]) -> tuple[Explanation, tuple[Diagnostic, ...]]:
