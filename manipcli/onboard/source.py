@@ -121,8 +121,8 @@ def read_source(
         read.append(replace(other, prefix=_prefix(arm.parts, other.parts)))
         attached = _attached(hand, arm.parts, read[1].prefix)
     mended, notes = _mended(read)
-    outer = {name: place for each in read for name, place in _outer_packages(each, allow_outside).items()}
     root = own_root(folder / "robot.yaml") or Path(os.path.realpath(folder))
+    outer = {name: place for each in read for name, place in _outer_packages(each, allow_outside, root).items()}
     notes += [
         f"package '{name}' is outside the project and has no package.xml: commands need --allow-outside, or "
         f"--package-path {shlex.quote(str(place.parent))}, or copy it into the project"
@@ -223,18 +223,24 @@ def _located(description: str, package_path: tuple[Path, ...]) -> Path:
         raise InvalidInput([Diagnostic("USE101", error.message, hint=error.hint)]) from error
 
 
-def _outer_packages(read: _Read, allow_outside: bool) -> dict[str, Path]:
-    """The packages that are only found with `--package-path`."""
-    alone = Packages(read.path, allow_outside=allow_outside)
-    found = {}
-    for name, folder in read.packages.found.items():
-        try:
-            same = alone.root(name) == folder
-        except NotFound:
-            same = False
-        if not same:
-            found[name] = folder
-    return found
+def _outer_packages(read: _Read, allow_outside: bool, root: Path) -> dict[str, Path]:
+    """The packages that commands find only by `packages:` or `--package-path`.
+
+    These are the ones of `--package-path`, and the ones around the description, which a log does not know.
+    """
+    alone, installed = Packages(read.path, allow_outside=allow_outside), Packages(None)
+    return {
+        name: folder
+        for name, folder in read.packages.found.items()
+        if not _finds(alone, name, folder) or (not _finds(installed, name, folder) and may_name(folder, name, root))
+    }
+
+
+def _finds(packages: Packages, name: str, folder: Path) -> bool:
+    try:
+        return packages.root(name) == folder
+    except NotFound:
+        return False
 
 
 def _placed(description: str, path: Path, folder: Path) -> str:
@@ -255,7 +261,7 @@ def _packages(outer: Mapping[str, Path], folder: Path) -> dict[str, Entry]:
     """`packages` for a robot file in the folder."""
     here = os.path.realpath(folder)
     rows: dict[str, Plain] = {name: os.path.relpath(root, here) for name, root in sorted(outer.items())}
-    return {"packages": Entry(rows, "as given by --package-path")} if rows else {}
+    return {"packages": Entry(rows, "for all commands, also those that read only a log")} if rows else {}
 
 
 def _mended(read: Sequence[_Read]) -> tuple[dict[str, Entry], list[str]]:

@@ -95,3 +95,21 @@ def test_a_hand_with_names_of_the_arm_gets_a_prefix(tmp_path: Path) -> None:
     assert source.robot.joint("hand_l3_attach").parent == "l5"
     assert source.entries["inertials"].value["links"].keys() == {"hand_l3", "hand_left", "hand_right"}
     assert not source.entries["attach"].check  # the user named the link
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_package_around_the_description_is_named_for_commands_that_read_a_log(tmp_path: Path, known: bool) -> None:
+    package = tmp_path / "ws" / "p_description"
+    (package / "urdf").mkdir(parents=True)
+    if known:
+        (package / "package.xml").write_text("<package><name>p_description</name></package>")
+    (package / "l1.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    text = small.robot(small.arm(LINKS)).replace(
+        '<link name="l1">', f'<link name="l1">{mesh("visual", "package://p_description/l1.obj")}'
+    )
+    (package / "urdf" / "small.urdf").write_text(text)
+    project = tmp_path / "project"
+    source = read_source(str(package / "urdf" / "small.urdf"), {}, project, package_path=(), allow_outside=False)
+    named = {"p_description": "../ws/p_description"}  # without package.xml, other commands would refuse this folder
+    assert ("packages" in source.entries) == known
+    assert not known or source.entries["packages"].value == named
