@@ -82,7 +82,8 @@ def sample_rows(rounds: int, few: int, many: int) -> list[Row]:
     gains, costs, shares = [], [], []
     with tempfile.TemporaryDirectory(prefix="manipcli-benchmark-") as name:
         folder = Path(name)
-        for _ in range(rounds):
+        for number in range(rounds):
+            print(f"round {number + 1} of {rounds}", file=sys.stderr, flush=True)
             short, one, two = sweep(few, 1, folder), sweep(many, 1, folder), sweep(many, 2, folder)
             own = phases(range(few, many), folder)
             gains.append(two.wall / one.wall)
@@ -183,7 +184,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one round of fewer samples")
     options = parser.parse_args()
     rounds, few, many = (1, 4, 8) if options.quick else (options.rounds, 10, 40)
-    print(markdown([*overhead_rows(rounds), *sample_rows(rounds, few, many)]))
+    for rows in (overhead_rows(rounds), sample_rows(rounds, few, many)):
+        print(markdown(rows), flush=True)  # the first table is there within a minute
 
 
 if __name__ == "__main__":

@@ -11,17 +11,20 @@ Only a process with one thread forks: a lock that another thread holds would sta
 from __future__ import annotations
 
 import array
+import atexit
 import gc
 import os
 import pickle
 import resource
 import select
 import socket
+import sys
+import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NoReturn, TypeAlias
 
 from manipcli.batch.job import Loading
 from manipcli.core import collector
@@ -86,7 +89,7 @@ Run: TypeAlias = "Callable[[int, Prepared | None], None]"
 
 
 def main(descriptor: int, *, run: Run | None = None) -> None:
-    """Serves on the socket with this descriptor. Returns in each child when its run has ended.
+    """Serves on the socket with this descriptor, until the other side closes it. Each child exits when its run ends.
 
     Args:
         descriptor: of the socket to the parent, SOCK_SEQPACKET.
@@ -105,11 +108,33 @@ def main(descriptor: int, *, run: Run | None = None) -> None:
             return
         request, descriptor = served
         if request.template is None:
-            run(descriptor, prepared)
-            return
+            _run_and_exit(run, descriptor, prepared)
         prepared = _prepared(request.template)
         if prepared is None:
             return
+
+
+def _run_and_exit(run: Run, descriptor: int, prepared: Prepared | None) -> NoReturn:
+    """Runs, and ends the process as the end of a program does, but without the destruction of all modules.
+
+    That would write to most pages of memory that the child shares with its parent, which copies them: 65 ms a run.
+    """
+    code = 0
+    try:
+        run(descriptor, prepared)
+    except SystemExit as end:
+        if isinstance(end.code, int | None):
+            code = end.code or 0
+        else:
+            sys.stderr.write(f"{end.code}\n")
+            code = 1
+    except BaseException:  # noqa: BLE001  # ends the process, and is reported as the interpreter does
+        traceback.print_exc()
+        code = 1
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def send(channel: socket.socket, message: Request | Answer, descriptors: Sequence[int] = ()) -> None:
