@@ -2,7 +2,7 @@
 
 - Throughput: wall time of a sweep with two workers against one.
 - Cost of a sample: processor time of one more sample (of a long sweep less a short one), less its own phases plan,
-  simulate and judge, against the phase simulate of PyBullet. The phases are those of `run --sample K --format json`.
+  simulate and judge (wall time of one at a time), against the phase simulate of PyBullet.
 - Overhead of a backend: wall time per sample of 1000 samples of which nothing is run, by the processes of this machine
   and by a Dask cluster of one worker, both with one sample at a time.
 
@@ -29,6 +29,7 @@ from benchmarks.processes import ENVIRONMENT, MANIPCLI, POUR, ROOT
 from benchmarks.sweep_faults import TASK
 from benchmarks.table import Row, markdown
 from manipcli.batch.job import Settings
+from manipcli.batch.process import run_jobs
 from manipcli.sweep.results import SampleResult
 from manipcli.sweep.sampling import Sampling
 
@@ -65,15 +66,13 @@ def sweep(samples: int, workers: int, folder: Path) -> Cost:
 
 
 def phases(samples: Sequence[int], folder: Path) -> dict[str, float]:
-    """Mean [s] of each phase of samples, each run alone."""
+    """Mean [s] of each phase of samples, run one at a time by the processes of a sweep."""
     total = dict.fromkeys(PHASES, 0.0)
-    for number in samples:
-        words = ["run", str(POUR), "--sample", str(number), "-q", "--force", "--log", str(folder / "run.mcap")]
-        command = [sys.executable, "-c", MANIPCLI, *words, "--format", "json"]
-        ran = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, check=False)
-        timing = json.loads(ran.stdout)["timing"]
+    sampling = Sampling(POUR, Settings(folder=folder / "phases", pictures=False))
+    for report in run_jobs(map(sampling.job, samples)):
+        assert report.run is not None
         for phase in PHASES:
-            total[phase] += timing[phase] / len(samples)
+            total[phase] += getattr(report.run.timing, phase) / len(samples)
     return total
 
 
