@@ -11,12 +11,14 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Final
+from typing import Annotated, Any, Final, cast
 
 import typer
+from typer.core import TyperCommand
 from typer.exceptions import TyperException
+from typer.main import get_command
 
-from manipcli.cli import console, option_defaults
+from manipcli.cli import command_help, console, option_defaults
 from manipcli.cli.commands import (
     action,
     at,
@@ -24,6 +26,7 @@ from manipcli.cli.commands import (
     check,
     check_urdf,
     diff,
+    docs,
     explain,
     export,
     graph,
@@ -70,11 +73,6 @@ _FULL = {
     errno.EFBIG: "the file size limit is exceeded",
 }
 
-_EXIT_CODES = (
-    "Exit codes: 0 passed, 1 failed or not plannable, 2 interrupted, 3 internal error, 4 usage or invalid file, "
-    "5 nothing to run."
-)
-
 _JARGON = (
     (": Value error, ", ": "),
     ("Input should be a valid integer.*", "expected a whole number"),
@@ -101,6 +99,7 @@ COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "check": check.check,
     "check-urdf": check_urdf.check_urdf,
     "explain": explain.explain,
+    "docs": docs.docs,
     "plan": plan.plan,
     "reach": reach.reach,
     "tune": tune.tune,
@@ -158,7 +157,7 @@ def _app(words: Sequence[str]) -> typer.Typer:
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    app.callback(epilog=_EXIT_CODES)(_root)
+    app.callback(epilog=command_help.epilog())(_root)
     called = _called(words)
     groups: dict[str, typer.Typer] = {}
     for name, function in COMMANDS.items():
@@ -168,8 +167,18 @@ def _app(words: Sequence[str]) -> typer.Typer:
             groups[group] = typer.Typer(rich_markup_mode=None, help=GROUPS[group])
             app.add_typer(groups[group], name=group)
         command = with_volume(function) if shown else _without_parameters(function)
-        (groups[group] if group else app).command(last)(command)
+        end = command_help.epilog(name) if shown else None
+        (groups[group] if group else app).command(last, epilog=end)(command)
     return app
+
+
+def command_named(name: str) -> TyperCommand:
+    """A command with its arguments and options, such as `topic echo`."""
+    words = name.split()
+    command: Any = get_command(_app(words))
+    for word in words:
+        command = command.commands[word]
+    return cast(TyperCommand, command)
 
 
 def _called(words: Sequence[str]) -> str | None:
@@ -287,7 +296,7 @@ def _fail(error: BaseException, *, format_: str, told: Sequence[str]) -> ExitCod
             known = error.known if isinstance(error, RecordingFailed) else {}
             console.result(json.render_errors(findings, "failed" if code is ExitCode.FAILED else "error", known=known))
         else:
-            console.error("\n".join(map(text.describe, findings)))
+            console.error(text.render_errors(findings))
     except OSError:
         return ExitCode.INTERNAL  # no stream is left to print to
     return code

@@ -21,6 +21,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from manipcli.core.version import __version__
+from manipcli.report.doc_pages import doc_files
 
 PACKAGE: Final = Path(__file__).parents[1]
 FOLDER: Final = "vendor"
@@ -72,15 +73,15 @@ def _address(text: str | None) -> str | None:
         return None
 
 
-def _files() -> list[Path]:
-    """The files of the package; where it is a checkout, those that git tracks, so that no other file gets out."""
+def _files(folder: Path) -> list[Path]:
+    """The files below a folder; where it is in a checkout, those that git tracks, so that no other file gets out."""
     try:
         command = ["git", "-c", "core.fsmonitor=", "ls-files", "-z"]
-        listed = subprocess.run(command, cwd=PACKAGE, capture_output=True, check=False).stdout
-        tracked = [PACKAGE / name for name in listed.decode("utf-8", "surrogateescape").split("\0") if name]
+        listed = subprocess.run(command, cwd=folder, capture_output=True, check=False).stdout
+        tracked = [folder / name for name in listed.decode("utf-8", "surrogateescape").split("\0") if name]
     except OSError:
         tracked = []
-    return sorted(path for path in tracked or PACKAGE.rglob("*") if path.is_file())
+    return sorted(path for path in tracked or folder.rglob("*") if path.is_file())
 
 
 def _wheel(own: metadata.Distribution) -> bytes:
@@ -88,9 +89,11 @@ def _wheel(own: metadata.Distribution) -> bytes:
     info = f"manipcli-{__version__}.dist-info"
     files = {
         f"manipcli/{path.relative_to(PACKAGE).as_posix()}": path.read_bytes()
-        for path in _files()
+        for path in _files(PACKAGE)
         if path.suffix not in LEFT_OUT and "__pycache__" not in path.parts
     }
+    pages = set(_files(PACKAGE.parent / "docs"))
+    files |= {f"manipcli/docs/{name}": path.read_bytes() for name, path in doc_files().items() if path in pages}
     for name in ("METADATA", "entry_points.txt", "licenses/LICENSE"):
         text = own.read_text(name)
         if text is not None:

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from manipcli.core.errors import Diagnostic
 from manipcli.core.version import __version__
 from manipcli.description.lint.check import Check
+from manipcli.report.doc_pages import code_url
 from manipcli.report.json import Json, dumps
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -32,11 +33,13 @@ def render(findings: Sequence[Diagnostic], checks: Iterable[Check]) -> str:
 
 
 def _rule(check: Check) -> Json:
+    url = code_url(check.code)
     return {
         "id": check.code,
         "name": check.name,
         "shortDescription": {"text": check.summary},
         "fullDescription": {"text": check.reason},
+        **({"helpUri": url} if url else {}),
         "defaultConfiguration": {"level": check.severity},
         "properties": {"tags": [check.tier]},
     }

@@ -13,6 +13,7 @@ from manipcli.core.text import number_of, one_line
 from manipcli.judge.self_contacts import self_contact_line
 from manipcli.judge.verdict import BlockOutcome, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.display_quantity import data_size, quantity
+from manipcli.report.doc_pages import more_about
 from manipcli.report.located import LOCATED, located_rows
 from manipcli.report.nesting import MARKS, block_line, nested
 from manipcli.report.rounds import first_of_rounds, round_of_finding
@@ -28,7 +29,7 @@ def render_run(report: RunReport, *, verbose: bool = False) -> str:
     """A run: verdict, speed and path of the log; the errors of a refused task."""
     if report.log is None:
         mark, verdict = FAIL, report.verdict
-        return "\n".join([*map(describe, verdict.errors), f"{mark} {verdict.task} {verdict.verdict}: nothing was run"])
+        return "\n".join([render_errors(verdict.errors), f"{mark} {verdict.task} {verdict.verdict}: nothing was run"])
     speed = (
         f"{report.verdict.simulated_time:.2f} s simulated, {report.wall_time:.2f} s real "
         f"({report.real_time_factor:.1f} x real time while simulating)"
@@ -89,7 +90,12 @@ def render_findings(findings: Sequence[Diagnostic], files: Sequence[str], *, str
     if warnings:
         summary += f", {number_of(warnings, 'warning')}"
     told = [describe(finding, more) for finding, more in first_of_rounds(findings, round_of_finding)]
-    return "\n".join([*told, summary])
+    return "\n".join([*told, *filter(None, [more_about(findings)]), summary])
+
+
+def render_errors(findings: Sequence[Diagnostic]) -> str:
+    """Findings that ended a command, and where their codes are explained."""
+    return "\n".join([*map(describe, findings), *filter(None, [more_about(findings)])])
 
 
 def describe(finding: Diagnostic, more: str = "") -> str:
@@ -140,7 +146,7 @@ def _causes(verdict: Verdict) -> list[str]:
     """Causes of a verdict other than passed: errors, then failed steps, then unmet expectations."""
     if verdict.verdict == "passed":
         return []
-    causes = [describe(finding) for finding in verdict.errors]
+    causes = [render_errors(verdict.errors)] if verdict.errors else []
     if not causes and verdict.ended_between:
         return [f"{FAIL} {verdict.text}"]
     causes += [

@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 import manipcli
 from manipcli.cli.app import COMMANDS, GROUPS, main
+from manipcli.cli.command_help import epilog
 from manipcli.cli.volume import with_volume
 from manipcli.core import collector
 from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
@@ -139,7 +140,8 @@ def test_an_error_becomes_a_message_and_an_exit_code(
 def test_an_error_in_a_file_says_where_and_hints(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
     pipeline.run_task = _raising(ERRORS[0][0])
     main(["run", "t.yaml"])
-    assert capsys.readouterr().err == "t.yaml:14:9: error[TASK203]: no such joint\n  hint: did you mean 'a'?\n"
+    more = "more about a code: manipcli explain TASK203"
+    assert capsys.readouterr().err == f"t.yaml:14:9: error[TASK203]: no such joint\n  hint: did you mean 'a'?\n{more}\n"
 
 
 def test_the_traceback_is_there_for_who_asks(
@@ -450,7 +452,7 @@ def test_the_help_of_a_command_is_as_if_all_were_shown(command: str, capsys: pyt
         whole.add_typer(inner, name=group)
     for name, function in COMMANDS.items():
         group, _, last = name.rpartition(" ")
-        groups.get(group, whole).command(last)(with_volume(function))
+        groups.get(group, whole).command(last, epilog=epilog(name))(with_volume(function))
     expected = CliRunner().invoke(whole, [*command.split(), "--help"], prog_name="manipcli").output
     assert main([*command.split(), "--help"]) == 0
     shown = capsys.readouterr().out

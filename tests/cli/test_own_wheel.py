@@ -44,6 +44,7 @@ def test_the_wheel_has_all_files_and_their_digests(monkeypatch: pytest.MonkeyPat
         files = {name: archive.read(name) for name in archive.namelist()}
     own = {f"manipcli/{path.relative_to(own_wheel.PACKAGE)}" for path in own_wheel.PACKAGE.rglob("*.py")}
     assert own <= files.keys()
+    assert "manipcli/docs/reference/task.md" in files and "manipcli/docs/reference/codes/TASK203.md" not in files
     (record,) = [name for name in files if name.endswith("/RECORD")]
     rows = {name: (digest, size) for name, digest, size in csv.reader(io.StringIO(files[record].decode()))}
     assert rows.keys() == files.keys()
@@ -108,11 +109,10 @@ def test_the_wheel_has_its_licence_and_the_version_of_its_files(monkeypatch: pyt
         assert archive.read("manipcli-7.8.9.dist-info/licenses/LICENSE") == b"free"
 
 
-def test_an_untracked_file_of_a_checkout_stays_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_untracked_file_of_a_checkout_stays_out(tmp_path: Path) -> None:
     for name in ("tracked.py", "own_notes.txt"):
         (tmp_path / name).write_text("x")
-    monkeypatch.setattr(own_wheel, "PACKAGE", tmp_path)
-    assert {path.name for path in own_wheel._files()} == {"tracked.py", "own_notes.txt"}  # an installed package
+    assert {path.name for path in own_wheel._files(tmp_path)} == {"tracked.py", "own_notes.txt"}  # an installed package
     for words in (["init", "-q"], ["add", "tracked.py"]):
         subprocess.run(["git", *words], cwd=tmp_path, check=True)
-    assert {path.name for path in own_wheel._files()} == {"tracked.py"}
+    assert {path.name for path in own_wheel._files(tmp_path)} == {"tracked.py"}

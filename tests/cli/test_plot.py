@@ -171,7 +171,7 @@ def test_what_a_hint_says_of_a_body_can_be_plotted(log: Path, capsys: pytest.Cap
     assert main(["plot", str(log), f"tf.{moves}.z", "--csv", "-"]) == 4
     hint = capsys.readouterr().err
     assert f"tf[{moves}].FIELD; fields: transform.translation.x, " in hint
-    for field in hint.split("fields: ")[1].split(", "):
+    for field in hint.split("fields: ")[1].splitlines()[0].split(", "):
         assert open_chart([log], [f"tf[{moves}].{field.strip()}"]).panels[0].labels == (moves,)
 
 

@@ -127,6 +127,7 @@ def test_findings_are_counted() -> None:
         "error[A1]: x",
         "warning[A2]: y",
         "  hint: z",
+        "more about a code: manipcli explain A1",
         "✗ failed: 2 files checked, 1 error, 1 warning",
     ]
     assert render_findings([], ["a"]) == "✓ passed: 1 file checked, 0 errors"
@@ -141,7 +142,7 @@ def test_what_is_the_same_in_the_rounds_of_a_loop_is_told_once_and_counted() -> 
     alone = [of("take", "e", 9), of("take", "f", 9), of("sort[0]/take", "a", 8)]
     warned = [of(f"sort[{k}]/take", "ab"[k], 7, "warning", 9 + k) for k in range(2)]
     lines = render_findings([*findings, *alone, *warned], ["a.yaml"]).splitlines()
-    assert lines == [f"{findings[0]}; and 3 more rounds", *map(str, alone), *map(str, warned), lines[-1]]
+    assert lines == [f"{findings[0]}; and 3 more rounds", *map(str, alone), *map(str, warned), *lines[-2:]]
     assert lines[-1].endswith("2 warnings")
 
 

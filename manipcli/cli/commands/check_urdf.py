@@ -61,8 +61,6 @@ def check_urdf(
     """Check a robot description, URDF or xacro.
 
     Checks schema, topology, physics, meshes, and readiness for simulation.
-
-    Exit codes: 0 no error, 1 errors (with --strict also warnings), 4 missing file or wrong option.
     """
     from manipcli.description.lint import inspection as describe
     from manipcli.report import description

@@ -25,8 +25,7 @@ def diff(
 ) -> ExitCode:
     """Compare two logs: outcomes of steps, differences of messages.
 
-    Exit codes: 0 the same, 1 different. Differences of files, seed and versions are shown, but do not change the exit
-    code.
+    Differences of files, seed and versions are shown, but do not change the exit code.
     """
     from manipcli.logs.diff import diff_logs
     from manipcli.report.logs import log_diff

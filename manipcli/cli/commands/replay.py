@@ -93,8 +93,7 @@ def replay(
 ) -> ExitCode:
     """Show a recorded run: robot and scene over time, curves.
 
-    Needs only the log and the packages of its meshes. Press Ctrl-C to stop. Exit codes of --verify: 0 identical,
-    1 different.
+    Needs only the log and the packages of its meshes. Press Ctrl-C to stop.
     """
     files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
     drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
