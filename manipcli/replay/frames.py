@@ -8,11 +8,12 @@ import numpy.typing as npt
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, to_si
-from manipcli.render.drawing import draw
+from manipcli.render.drawing import draw, floors_of
 from manipcli.render.placing import Placing, Poses
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
 from manipcli.replay.furniture import furniture
+from manipcli.replay.ground import ground_of
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.renderer import Image, Renderer
 
@@ -57,7 +58,13 @@ class Frames(Renderer):
         poses = self._poses(some)
         large = furniture(playback.scene, self._placing, poses)
         self.camera: Camera = framing(drawing, poses, aspect=size[0] / size[1], leave_out=large, towards=towards)
-        super().__init__(drawing, size=size, still=self._placing.still)
+        super().__init__(
+            drawing,
+            size=size,
+            still=self._placing.still,
+            ground=ground_of(drawing, self._poses(0), playback.scene),
+            hidden=floors_of(playback.scene),
+        )
 
     def at(self, time: float) -> Image:
         """The picture at the recorded time nearest to `time` [s]."""

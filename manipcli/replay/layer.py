@@ -12,8 +12,9 @@ from manipcli.core.geometry import matrix_from_quat
 from manipcli.render.drawing import Drawable, Drawing
 from manipcli.render.placing import Poses
 from manipcli.render.raster import Fragments, Raster
-from manipcli.render.shading import TO_LIGHT, shaded
+from manipcli.render.shading import TO_LIGHT
 from manipcli.replay.camera import Camera
+from manipcli.replay.lighting import lit
 
 FINER = 2
 """Factor of supersampling."""
@@ -32,6 +33,15 @@ class Window:
     def slices(self) -> tuple[slice, slice]:
         """Rows and columns."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
+
+    def around(self, margin: int, whole: Window) -> Window:
+        """The window with a margin on each side [pixel], within the whole picture."""
+        return Window(
+            max(self.left - margin, whole.left),
+            max(self.top - margin, whole.top),
+            min(self.right + margin, whole.right),
+            min(self.bottom + margin, whole.bottom),
+        )
 
     def divided(self, by: int) -> Window:
         """The window in pixels that are `by` times larger."""
@@ -84,4 +94,4 @@ class Layer:
 
     def coloured(self, seen: Fragments, where: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
         """(n, 3) colours of the pixels in a mask."""
-        return shaded(self._colours[seen.face[where]], seen.shade[where])
+        return lit(self._colours[seen.face[where]], seen.shade[where])

@@ -12,10 +12,14 @@ import numpy.typing as npt
 from manipcli.core.geometry import Array
 from manipcli.model.configuration import configuration
 from manipcli.model.robot import RobotModel
-from manipcli.render.drawing import Drawing, draw
+from manipcli.render.drawing import Drawing, draw, ground_height
 from manipcli.render.placing import Placing, Poses
+from manipcli.render.raster import Fragments
+from manipcli.render.shading import TO_LIGHT
 from manipcli.replay.camera import Camera, framing
+from manipcli.replay.ground import see_ground
 from manipcli.replay.layer import FINER, Layer, Window
+from manipcli.replay.outlines import REACH, outline_light
 from manipcli.replay.shadows import Shadows
 
 Image = npt.NDArray[np.uint8]
@@ -26,7 +30,8 @@ SKY = ((203, 213, 224), (246, 248, 250))
 SIZE = (960, 720)
 """Default size of a picture [pixel]."""
 
-
+GROUND = np.iinfo(np.int32).max
+"""Index of the ground among the triangles."""
 COARSE = (slice(None, None, FINER), slice(None, None, FINER))
 
 
@@ -64,6 +69,8 @@ class Renderer:
         still: frames that do not move between pictures of one camera; they are rendered once, and further pictures
             only where the other frames can be.
         shadows: draw shadows on what is still.
+        ground: height of the ground [m]; None without one.
+        hidden: frames that are not drawn, such as the floor that the ground replaces.
     """
 
     def __init__(
@@ -73,12 +80,18 @@ class Renderer:
         size: tuple[int, int] = SIZE,
         still: frozenset[str] = frozenset(),
         shadows: bool = True,
+        ground: float | None = None,
+        hidden: frozenset[str] = frozenset(),
     ) -> None:
         self._size = size
-        shown = [each for each in drawing.layer("visual") if each.rgba[3] > 0.0 and len(each.surface.faces)]
+        shown = [
+            each
+            for each in drawing.layer("visual")
+            if each.rgba[3] > 0.0 and len(each.surface.faces) and each.frame not in hidden
+        ]
         self._still = Layer(drawing, [drawable for drawable in shown if drawable.frame in still])
         self._moving = Layer(drawing, [drawable for drawable in shown if drawable.frame not in still])
-        self._shadows = shadows
+        self._shadows, self._ground = shadows, ground
         self._before: _Still | None = None
 
     def picture(self, poses: Poses, camera: Camera) -> Image:
@@ -96,7 +109,10 @@ class Renderer:
         if window is None:
             return image
         part, coarse = window.slices, window.divided(FINER).slices
-        seen = self._moving.see(poses, camera, whole).part(part)
+        seen = self._moving.see(poses, camera, whole)
+        around = window.around(REACH, whole)
+        depth = np.minimum(before.depth[around.slices], seen.depth[around.slices])
+        seen = seen.part(part)
         nearer = (seen.face >= 0) & (seen.depth <= before.depth[part])
         fine = before.fine[part].copy()
         if light is not None:
@@ -104,29 +120,53 @@ class Renderer:
             dark = (dimmed < 1.0) & ~nearer
             fine[dark] = (fine[dark] * dimmed[dark, None]).astype(np.uint8)
         fine[nearer] = self._moving.coloured(seen, nearer)
+        top, left = window.top - around.top, window.left - around.left
+        _darken(fine, outline_light(depth)[top : top + fine.shape[0], left : left + fine.shape[1]])
         image[coarse] = _averaged(fine)
         return image
 
     def _stand(self, poses: Poses, camera: Camera, whole: Window) -> _Still:
         """What does not move."""
+        size = whole.right, whole.bottom
         fine = np.repeat(sky(whole.bottom), whole.right, axis=1)
         seen = self._still.see(poses, camera, whole)
         there = seen.face >= 0
+        ground = None if self._ground is None else see_ground(self._ground, camera, size)
+        if ground is not None:
+            on_ground = np.isfinite(ground.depth) & ~(seen.depth < ground.depth)
+            there &= ~on_ground
+            share = ground.share[on_ground][:, None]
+            fine[on_ground] = ((1.0 - share) * fine[on_ground] + share * ground.colour[on_ground]).astype(np.uint8)
+            seen = Fragments(
+                np.where(on_ground, ground.depth, seen.depth),
+                np.where(on_ground, GROUND, seen.face),
+                np.where(on_ground, TO_LIGHT[2], seen.shade),
+                seen.slope,
+            )
         fine[there] = self._still.coloured(seen, there)
         depth = seen.depth.copy()
         shadows = Shadows(self._still, poses, camera, seen.part(COARSE), self._size) if self._shadows else None
-        return _Still(camera, fine, depth, _averaged(fine), shadows)
+        outlined = fine.copy()
+        _darken(outlined, outline_light(depth))
+        return _Still(camera, fine, depth, _averaged(outlined), shadows)
 
 
 @dataclass(frozen=True, slots=True)
 class _Still:
-    """The picture without what moves, at FINER times its size and averaged, its depth, and the shadows on it."""
+    """The picture without what moves: at FINER times its size without outlines, its depth, its average with outlines,
+    and the shadows on it."""
 
     camera: Camera
     fine: Image
     depth: Array
     image: Image
     shadows: Shadows | None
+
+
+def _darken(fine: Image, light: npt.NDArray[np.float32]) -> None:
+    """Multiply a picture by a factor of the brightness, in place."""
+    dark = light < 1.0
+    fine[dark] = (fine[dark] * light[dark, None]).astype(np.uint8)
 
 
 def _averaged(fine: Image) -> Image:
@@ -146,6 +186,7 @@ def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
         Parts that cannot be drawn, one line each.
     """
     drawing, poses = draw(robot), Placing(robot).start(configuration(robot))
-    picture = Renderer(drawing).picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))
+    ground = ground_height(drawing, poses, frozenset())
+    picture = Renderer(drawing, ground=ground).picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))
     path.write_bytes(png_bytes(picture))
     return drawing.missing

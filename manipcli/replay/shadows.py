@@ -14,9 +14,10 @@ import numpy.typing as npt
 from manipcli.core.geometry import Array
 from manipcli.render.placing import Poses
 from manipcli.render.raster import Fragments
-from manipcli.render.shading import AMBIENT, DIFFUSE, TO_LIGHT
+from manipcli.render.shading import TO_LIGHT
 from manipcli.replay.camera import Camera
 from manipcli.replay.layer import FINER, Layer, Window
+from manipcli.replay.lighting import shadow_loss
 
 TEXELS = 768
 """Width and height of the picture from the light [pixel]."""
@@ -24,8 +25,6 @@ AROUND = 1.6
 """Its radius, by the radius of what the camera of the picture sees at its target."""
 AWAY = 20.0
 """Distance of the light, in radii."""
-STRENGTH = 0.75
-"""Share of the light that a shadow takes; the rest comes from around."""
 MOVING_BIAS, STILL_BIAS = 0.5, 6.0
 """Least distance to what casts a shadow [texel]; larger where a surface could shade itself."""
 
@@ -61,8 +60,7 @@ class Shadows:
         self._pixels, u, v, self._z = pixels[inside], u[inside], v[inside], z[inside]
         self._column, self._row = u.astype(np.int32), v.astype(np.int32)
         self._right, self._down = (u - self._column).astype(np.float32), (v - self._row).astype(np.float32)
-        diffuse = DIFFUSE * seen.shade.reshape(-1)[self._pixels]
-        self._loss = (STRENGTH * diffuse / (AMBIENT + diffuse)).astype(np.float32)
+        self._loss = shadow_loss(seen.shade.reshape(-1)[self._pixels]).astype(np.float32)
         every = np.arange(len(self._pixels))
         depth = still.see(poses, self._camera, self._whole).depth
         self._still = self._shaded(depth, every, STILL_BIAS * texel)
