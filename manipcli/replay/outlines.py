@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 
-REACH = 2
+REACH = 3
 """Width of an outline [pixel of the finer picture]."""
 LOW, HIGH = 0.004, 0.02
 """Jump of the inverse depth, as a share of it, at which an outline begins and is complete."""
