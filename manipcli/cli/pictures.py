@@ -38,6 +38,7 @@ class Pictures:
     view: str | None
     fps: float | None
     speed: float | None
+    forces: bool | None = None
 
     def __post_init__(self) -> None:
         for option, value, drawn, needed in (
@@ -46,6 +47,7 @@ class Pictures:
             ("--speed", self.speed, self.video is not None, "--video"),
             ("--size", self.size, self.wanted, "--picture, --sheet or --video"),
             ("--view", self.view, self.wanted, "--picture, --sheet or --video"),
+            ("--forces", self.forces, self.wanted, "--picture, --sheet or --video"),
         ):
             if value is not None and not drawn:
                 hint = f"add {needed}"
@@ -104,7 +106,7 @@ class Pictures:
         from manipcli.replay.renderer import SIZE, png_bytes
 
         when = moment(playback, self.at or "end")
-        frames = Frames(playback, size=self._size(SIZE), towards=self._towards())
+        frames = Frames(playback, size=self._size(SIZE), towards=self._towards(), forces=self.forces)
         console.not_drawn(frames.missing)
         with whole_file(path) as partial:
             partial.write_bytes(png_bytes(frames.at(when)))
@@ -115,7 +117,7 @@ class Pictures:
         from manipcli.replay.renderer import png_bytes
 
         with whole_file(path) as partial:
-            image = contact_sheet(playback, size=self._size(TILE), towards=self._towards())
+            image = contact_sheet(playback, size=self._size(TILE), towards=self._towards(), forces=self.forces)
             partial.write_bytes(png_bytes(image))
 
     def _video(self, path: Path, playback: Playback) -> None:
@@ -125,7 +127,7 @@ class Pictures:
         fps, speed = self._pace
         video = Video.of(playback, fps=fps, speed=speed)
         began = time.monotonic()
-        frames = Frames(playback, size=self._size(SIZE), towards=self._towards())
+        frames = Frames(playback, size=self._size(SIZE), towards=self._towards(), forces=self.forces)
         console.not_drawn(frames.missing)
         try:
             write_video(path, frames, video, progress=_progress_line(began) if console.is_live() else None)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.text import escape
+from manipcli.replay.happening import Mood, happening
 from manipcli.replay.playback import Playback
 from manipcli.replay.renderer import Image
 
@@ -26,6 +27,7 @@ FAILED: Rgb = (190, 45, 38)
 TRACK: Rgb = (186, 196, 208)
 NOW: Rgb = (47, 111, 176)
 CAPTION_COLOURS = (INK, QUIET, DONE, FAILED, TRACK, NOW)
+MOODS: dict[Mood, Rgb] = {"plain": (66, 76, 88), "good": DONE, "bad": FAILED}
 TEXT_SHARE = 0.042
 """Height of the text relative to that of the picture."""
 
@@ -44,7 +46,10 @@ def text_size(height: int) -> int:
 
 
 def caption(image: Image, playback: Playback, time: float) -> Image:
-    """The picture with the active step and the time at the top, and the timeline at the bottom."""
+    """The picture with two lines at the top, and the timeline at the bottom.
+
+    The first line has the step, the task and the time, the second what happens there.
+    """
     from PIL import Image as PillowImage
     from PIL import ImageDraw
 
@@ -56,7 +61,12 @@ def caption(image: Image, playback: Playback, time: float) -> Image:
     left = []
     if step is not None:
         left = [(f"{playback.steps.index(step) + 1}/{playback.total}", QUIET), (step.label, INK)]
-    write_line(pen, (margin, canvas.width - margin, margin + size / 2), size, left, [(f"{time:.2f} s", INK)])
+    left.append((playback.name, QUIET))
+    ends = margin, canvas.width - margin
+    write_line(pen, (*ends, margin + size / 2), size, left, [(f"{time:.2f} s", INK)])
+    text, mood = happening(playback, time)
+    small = max(round(0.8 * size), 9)
+    write_line(pen, (*ends, margin + 1.35 * size + small / 2), small, [(text, MOODS[mood])])
     if playback.end > playback.start:
         _timeline(pen, playback, time, (canvas.width, canvas.height), margin)
     return np.asarray(canvas)

@@ -51,13 +51,16 @@ def columns_of(count: int) -> int:
     return min(count, 3 if count <= 9 and count != 4 else 4)
 
 
-def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM) -> Image:
+def contact_sheet(
+    playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM, forces: bool | None = None
+) -> Image:
     """The sheet.
 
     Args:
         playback: the run.
         size: width and height of each picture [pixel].
         towards: direction from the scene to the camera.
+        forces: draw contact forces; None: in steps that failed.
     """
     from PIL import Image as PillowImage
     from PIL import ImageDraw as Drawing
@@ -72,7 +75,7 @@ def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: 
     whole = PillowImage.new("RGB", (columns * (size[0] + GAP) + GAP, head + rows * (high + GAP)), PAPER)
     pen = Drawing.Draw(whole)
     _heading(pen, playback, whole.width, head, letter)
-    frames = Frames(playback, size=size, towards=towards, captions=False)
+    frames = Frames(playback, size=size, towards=towards, captions=False, forces=forces)
     for k, tile in enumerate(shown):
         row, column = divmod(k, columns)
         left, top = GAP + column * (size[0] + GAP), head + row * (high + GAP)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,8 +14,11 @@ from manipcli.render.drawing import draw, floors_of
 from manipcli.render.placing import Placing, Poses
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
+from manipcli.replay.force_overlay import draw_forces
+from manipcli.replay.forces import Forces
 from manipcli.replay.furniture import furniture
 from manipcli.replay.ground import ground_of
+from manipcli.replay.happening import failed_step
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.renderer import Image, Renderer
 
@@ -36,7 +41,8 @@ class Frames(Renderer):
         playback: the run.
         size: width and height [pixel].
         towards: direction from the scene to the camera, which has the whole run in view.
-        captions: draw step, time and timeline.
+        captions: draw step, time, what happens, and the timeline.
+        forces: draw contact forces; None: in steps that failed, since there they often are the reason.
 
     Attributes:
         camera: the camera.
@@ -45,10 +51,16 @@ class Frames(Renderer):
     """
 
     def __init__(
-        self, playback: Playback, *, size: tuple[int, int], towards: Vector = FROM, captions: bool = True
+        self,
+        playback: Playback,
+        *,
+        size: tuple[int, int],
+        towards: Vector = FROM,
+        captions: bool = True,
+        forces: bool | None = None,
     ) -> None:
         self.playback = playback
-        self._captions = captions
+        self._captions, self._forced = captions, forces
         self._placing = Placing(playback.robot, playback.scene)
         drawing = draw(playback.robot, playback.scene)
         self.missing = drawing.missing
@@ -69,8 +81,14 @@ class Frames(Renderer):
     def at(self, time: float) -> Image:
         """The picture at the recorded time nearest to `time` [s]."""
         k = self.playback.index(time)
-        image = self.picture(self._poses(k), self.camera)
-        return caption(image, self.playback, float(self.playback.times[k])) if self._captions else image
+        image, now = self.picture(self._poses(k), self.camera), float(self.playback.times[k])
+        if self._forced or (self._forced is None and failed_step(self.playback, now) is not None):
+            image = draw_forces(image, self.camera, self._forces, k)
+        return caption(image, self.playback, now) if self._captions else image
+
+    @cached_property
+    def _forces(self) -> Forces:
+        return Forces(self.playback, self.playback.poses())
 
     def _poses(self, k: int | Numbers) -> Poses:
         run = self.playback

@@ -63,6 +63,14 @@ def replay(
             help="View of pictures: iso, front, back, left, right, top, or AZIMUTH,ELEVATION [default: iso].",
         ),
     ] = None,
+    forces: Annotated[
+        bool | None,
+        typer.Option(
+            "--forces/--no-forces",
+            help="Draw contact forces in pictures [default: in steps that failed].",
+            show_default=False,
+        ),
+    ] = None,
     fps: Annotated[
         float | None, typer.Option("--fps", metavar="N", help="Frames of a video per second [default: 25].")
     ] = None,
@@ -96,7 +104,7 @@ def replay(
     Needs only the log and the packages of its meshes. Press Ctrl-C to stop.
     """
     files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
-    drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
+    drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed), ("--forces", forces))
     shows = (
         *files,
         *drawn,
@@ -127,7 +135,7 @@ def replay(
 
         check_outputs(*files, reads=(log,))
         pictures = Pictures(
-            picture=picture, at=at, sheet=sheet, video=video, size=size, view=view, fps=fps, speed=speed
+            picture=picture, at=at, sheet=sheet, video=video, size=size, view=view, fps=fps, speed=speed, forces=forces
         )
         playback = open_playback(
             log,
