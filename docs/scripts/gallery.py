@@ -188,9 +188,8 @@ def _example(entry: Entry) -> bool:
 def _index(group: Sequence[Entry]) -> str:
     rows = [group[k : k + COLUMNS] for k in range(0, len(group), COLUMNS)]
     cells = [[f"[![{e.name}](gallery/{e.name}.webp)](#{e.name})<br>[{e.name}](#{e.name})" for e in row] for row in rows]
-    filled = [row + [""] * (COLUMNS - len(row)) for row in cells]
-    lines = [" | ".join(row).strip() for row in filled]
-    return "\n".join([f"|{' |' * COLUMNS}", f"|{'---|' * COLUMNS}", *(f"| {line} |" for line in lines)])
+    lines = [f"| {' | '.join(row + [''] * (COLUMNS - len(row)))} |" for row in cells]
+    return "\n".join([lines[0], f"|{'---|' * COLUMNS}", *lines[1:]])
 
 
 def _sections(group: Iterable[Entry], verdicts: Mapping[str, str]) -> str:
