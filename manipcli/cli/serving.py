@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 from manipcli.cli import console
 
 
-def stay(url: str, *, open_: bool, meanwhile: Callable[[], object] | None = None) -> None:
-    """Prints the address, with `open_` opens it in a browser, and returns on Ctrl-C.
-
-    `meanwhile` is called in the waiting; by default nothing is done.
-    """
+def stay(url: str, *, open_: bool) -> None:
+    """Prints the address, with `open_` opens it in a browser, and returns on Ctrl-C."""
     try:  # Ctrl-C may come as soon as the address is printed
         console.result(url)
         console.talk("Press Ctrl-C to stop.")
@@ -20,6 +16,6 @@ def stay(url: str, *, open_: bool, meanwhile: Callable[[], object] | None = None
             import webbrowser
 
             webbrowser.open(url)
-        (meanwhile or threading.Event().wait)()
+        threading.Event().wait()
     except KeyboardInterrupt:
         console.talk("")

@@ -58,7 +58,15 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """An error, a warning or a note about an input file."""
+    """An error, a warning or a note about an input file. As text: its place, severity, code and message.
+
+    Attributes:
+        code: `TASK203`; `manipcli explain` explains it.
+        message: what is wrong.
+        place: file, line and column; None for a finding about no file.
+        hint: what to do; None without a hint.
+        severity: `error`, `warning` or `note`.
+    """
 
     code: str
     message: str

@@ -18,7 +18,7 @@ from manipcli.model.state import Contact, WorldState
 
 @dataclass(frozen=True, slots=True)
 class TaskEvent:
-    """`kind`: step_started, step_ended, phase_started, goal_sent, goal_ended, ...; `place`: file:line of the step."""
+    """`kind`: step_started, step_ended, ..., all in docs/reference/messages.md; `place`: file:line of the step."""
 
     time: float
     kind: str

@@ -119,7 +119,7 @@ def load_task(path: Path, *, sample: int | None = None, **options: Unpack[FileOp
         options: see `FileOptions`.
 
     Raises:
-        InvalidInput: as `load_written`. Also if the sample does not exist, or a drawn value is refused.
+        InvalidInput: a file or an override is invalid, the sample does not exist, or a drawn value is refused.
     """
     return load_written(path, **options).sample(sample)
 

@@ -226,7 +226,8 @@ def test_a_log_whose_reader_goes_away_is_lost(task: Path) -> None:
         told = run.stderr.read().decode()
         assert run.wait(60) == 3
     assert told.rstrip().endswith(
-        "error[LOG201]: standard output: the log is incomplete: its reader closed the pipe before the end"
+        "error[LOG201]: standard output: the log is incomplete: its reader closed the pipe before the end\n"
+        "more about a code: manipcli explain LOG201"
     )
 
 

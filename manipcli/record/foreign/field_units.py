@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 from manipcli.core.errors import InvalidInput
 from manipcli.description.located_xml import parse_document
@@ -11,23 +12,36 @@ from manipcli.record.foreign.topic_fields import Way
 JointUnits = Mapping[str, str]
 """Position unit of each joint of known type: rad or m."""
 
-_OF_JOINTS = {
+OF_JOINTS: Final = {
     "sensor_msgs/JointState": {"position": "", "velocity": "/s", "effort": "force"},
     "trajectory_msgs/JointTrajectoryPoint": {
         "positions": "", "velocities": "/s", "accelerations": "/s²", "effort": "force",
     },
 }  # fmt: skip
 _FORCE = {"rad": "N m", "m": "N"}
-_BY_NAME = {
+BY_NAME: Final = {
     "manipcli_msgs/Contact": {"force": "N", "distance": "m"},
     "manipcli_msgs/ContactPoint": {"force": "N"},
     "sensor_msgs/Temperature": {"temperature": "°C"},
     "sensor_msgs/FluidPressure": {"fluid_pressure": "Pa"},
     "sensor_msgs/BatteryState": {"voltage": "V", "current": "A", "temperature": "°C"},
-    "sensor_msgs/Range": {"range": "m"},
+    "sensor_msgs/Range": {"field_of_view": "rad", "min_range": "m", "max_range": "m", "range": "m", "variance": "m²"},
+    "sensor_msgs/LaserScan": {
+        "angle_min": "rad",
+        "angle_max": "rad",
+        "angle_increment": "rad",
+        "time_increment": "s",
+        "scan_time": "s",
+        "range_min": "m",
+        "range_max": "m",
+        "ranges": "m",
+    },
+    "manipcli_msgs/ContactSwitch": {"force": "N", "threshold": "N"},
+    "manipcli_msgs/Taxels": {"width": "m", "height": "m", "force": "N"},
+    "manipcli_msgs/TaxelShear": {"width": "m", "height": "m", "x": "N", "y": "N"},
     "builtin_interfaces/Time": {"sec": "s"},
 }
-_VECTORS = {
+VECTORS: Final = {
     "translation": "m", "position": "m", "linear": "m/s", "angular": "rad/s", "force": "N", "torque": "N m",
     "friction": "N",
     "angular_velocity": "rad/s", "linear_acceleration": "m/s²", "magnetic_field": "T",
@@ -45,8 +59,8 @@ def unit_of(way: Way, label: str, joints: JointUnits) -> str:
         joints: units of the joints.
     """
     holder, last = way.holder.name, way.parts[-1].name
-    if holder in _OF_JOINTS:
-        kind = _OF_JOINTS[holder].get(last)
+    if holder in OF_JOINTS:
+        kind = OF_JOINTS[holder].get(last)
         unit = joints.get(label.rpartition(" ")[2])
         if kind is None or unit is None:
             return ""
@@ -54,10 +68,10 @@ def unit_of(way: Way, label: str, joints: JointUnits) -> str:
     if holder in _OF_VECTORS and len(way.parts) > 1:
         above = [part.name for part in way.parts[:-1]]
         accelerates = any(name in ("accel", "acceleration", "accelerations") for name in above)
-        return (_ACCELERATIONS if accelerates else _VECTORS).get(above[-1], "")
+        return (_ACCELERATIONS if accelerates else VECTORS).get(above[-1], "")
     if way.is_time:
         return "s"
-    return _BY_NAME.get(holder, {}).get(last, "")
+    return BY_NAME.get(holder, {}).get(last, "")
 
 
 def joint_units(urdf: bytes) -> JointUnits:
