@@ -49,7 +49,7 @@ from manipcli.task.bare_task import bare_task
 from manipcli.task.controller_rows import checked_controllers, controllers_of
 from manipcli.task.explanation import Explanation, explained
 from manipcli.task.load_task import FileOptions, LoadOptions, load_task
-from manipcli.task.load_view import load_sight
+from manipcli.task.load_view import Sight, load_sight
 from manipcli.task.part import LIVE, LIVE_RUN
 from manipcli.task.plan_task import Plan, plan_task, refused, unplanned
 from manipcli.task.robot_facts import RobotFacts, robot_facts
@@ -61,6 +61,7 @@ __all__ = [
     "Diagnostic",
     "Plan",
     "RobotFacts",
+    "Sight",
     "Task",
     "bare_task",
     "check_files",

@@ -12,6 +12,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -164,3 +165,21 @@ def test_the_readme_begins_with_two_commands_that_stand_alone() -> None:
     assert commands[0].endswith("manipcli run tasks/pour.yaml")
     assert commands[1].endswith("python -m pytest -n auto")
     assert all("pip install -e " in command for command in commands)
+
+
+def test_the_readme_is_short_and_shows_the_task_as_it_is() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    (shown,) = re.findall(r"^```yaml\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    task = (ROOT / "tasks" / "pour.yaml").read_text(encoding="utf-8").splitlines(keepends=True)
+    assert shown == "".join(line for line in task if not line.startswith("#"))
+
+
+@pytest.mark.slow
+def test_the_readme_shows_what_its_first_command_prints(pour_run: Any, call_cli: Any) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```text\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    printed = call_cli("judge", pour_run.log, cwd=ROOT).out
+    # Numbers may differ between machines, and only `run` has the wall time.
+    words = [re.findall(r"[A-Za-z_]{3,}", part[: part.index("s simulated")]) for part in (shown, printed)]
+    assert words[0] == words[1]

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 
 from manipcli.cli import console
 
 
-def stay(url: str, *, open_: bool) -> None:
-    """Prints the address, with `open_` opens it in a browser, and returns on Ctrl-C."""
+def stay(url: str, *, open_: bool, meanwhile: Callable[[], object] | None = None) -> None:
+    """Prints the address, with `open_` opens it in a browser, and returns on Ctrl-C.
+
+    `meanwhile` is called in the waiting; by default nothing is done.
+    """
     try:  # Ctrl-C may come as soon as the address is printed
         console.result(url)
         console.talk("Press Ctrl-C to stop.")
@@ -16,6 +20,6 @@ def stay(url: str, *, open_: bool) -> None:
             import webbrowser
 
             webbrowser.open(url)
-        threading.Event().wait()
+        (meanwhile or threading.Event().wait)()
     except KeyboardInterrupt:
         console.talk("")

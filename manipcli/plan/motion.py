@@ -132,6 +132,7 @@ class Motion:
         begins: the state in which it begins, for reports; None where nothing moves.
         allowed: pairs of parts that may touch in it, besides the hand and what it holds.
         searched: the path planner whose path around obstacles it follows; "" for a path that was not searched.
+        straight: the straight motion that was not free, where one was searched instead; for pictures.
         tolerances: of the trajectory, instead of the controller's.
         takes: the object that is attached to the tool at its end, for robots with a `holding`.
         lets_go: what is attached to the tool is freed at its beginning.
@@ -150,6 +151,7 @@ class Motion:
     begins: PlanningState | None = None
     allowed: frozenset[Pair] = frozenset()
     searched: str = ""
+    straight: JointTrajectory | None = None
     tolerances: GoalTolerances | None = None
     takes: str | None = None
     lets_go: bool = False

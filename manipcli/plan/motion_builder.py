@@ -342,7 +342,7 @@ class MotionBuilder:
         free = free_trajectory(self._planner, self._now, query, straight, grip, limits, label, self._verb, goals, end)
         self._accept(label, free, grip)
         if free is not straight and (search := self._planner.searching()) is not None:
-            self._motions[-1] = replace(self._motions[-1], searched=search.spec.type)
+            self._motions[-1] = replace(self._motions[-1], searched=search.spec.type, straight=straight)
 
     def _timed(
         self, label: str, walk: Walk, speed: float, *, insist: bool = False, leaving: Leaving = "nothing"

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Rgb = tuple[int, int, int]
 
+PAPER: Rgb = (255, 255, 255)
 INK: Rgb = (30, 36, 44)
 QUIET: Rgb = (96, 107, 120)
 DONE: Rgb = (47, 132, 79)
@@ -63,10 +64,10 @@ def caption(image: Image, playback: Playback, time: float) -> Image:
         left = [(f"{playback.steps.index(step) + 1}/{playback.total}", QUIET), (step.label, INK)]
     left.append((playback.name, QUIET))
     ends = margin, canvas.width - margin
-    write_line(pen, (*ends, margin + size / 2), size, left, [(f"{time:.2f} s", INK)])
+    write_line(pen, (*ends, margin + size / 2), size, left, [(f"{time:.2f} s", INK)], halo=True)
     text, mood = happening(playback, time)
     small = max(round(0.8 * size), 9)
-    write_line(pen, (*ends, margin + 1.35 * size + small / 2), small, [(text, MOODS[mood])])
+    write_line(pen, (*ends, margin + 1.35 * size + small / 2), small, [(text, MOODS[mood])], halo=True)
     if playback.end > playback.start:
         _timeline(pen, playback, time, (canvas.width, canvas.height), margin)
     return np.asarray(canvas)
@@ -78,6 +79,8 @@ def write_line(
     size: int,
     left: Sequence[tuple[str, Rgb]],
     right: Sequence[tuple[str, Rgb]] = (),
+    *,
+    halo: bool = False,
 ) -> None:
     """Write words into one line; `left` is truncated if it does not fit.
 
@@ -86,14 +89,16 @@ def write_line(
         place: left end, right end and vertical centre of the line [pixel].
         size: height of the text [pixel].
         left, right: words and their colours, from the end of the line inwards.
+        halo: white around the letters, for text before a dark thing.
     """
+    border = max(round(size / 12.0), 1) if halo else 0
     x, end, y = place
     for word, colour in right:
-        pen.text((end, y), word, fill=colour, font=font(size), anchor="rm")
+        pen.text((end, y), word, fill=colour, font=font(size), anchor="rm", stroke_width=border, stroke_fill=PAPER)
         end -= pen.textlength(f"{word}  ", font=font(size))
     for word, colour in left:
         text = _cut(pen, word, size, end - x)
-        pen.text((x, y), text, fill=colour, font=font(size), anchor="lm")
+        pen.text((x, y), text, fill=colour, font=font(size), anchor="lm", stroke_width=border, stroke_fill=PAPER)
         x += pen.textlength(f"{text}  ", font=font(size))
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.replay.camera import FROM, Vector
-from manipcli.replay.caption import DONE, FAILED, INK, QUIET, Rgb, font, text_size, write_line
+from manipcli.replay.caption import DONE, FAILED, INK, PAPER, QUIET, font, text_size, write_line
 from manipcli.replay.frames import Frames, clearest_time
 from manipcli.replay.playback import Playback
 from manipcli.replay.renderer import Image
@@ -22,7 +22,6 @@ TILE = (480, 360)
 GAP = 8
 MOMENTS = 6
 """Number of pictures of a run without steps."""
-PAPER: Rgb = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True)

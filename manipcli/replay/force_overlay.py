@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.replay.camera import Camera
-from manipcli.replay.caption import INK, font, text_size
+from manipcli.replay.caption import INK, PAPER, font, text_size
 from manipcli.replay.forces import LEAST, LONGEST, Forces, Push
 from manipcli.replay.renderer import Image
 from manipcli.replay.strokes import Rgb, arrow, stroke
@@ -17,7 +17,6 @@ from manipcli.replay.strokes import Rgb, arrow, stroke
 NORMAL: Final[Rgb] = (204, 32, 32)
 FRICTION: Final[Rgb] = (226, 122, 0)
 """Colours of the arrows, those of the page."""
-PAPER: Final[Rgb] = (255, 255, 255)
 NUMBERED: Final = 6
 """Most pairs of parts with a number: those with the largest forces."""
 ROUND: Final = 1.0, 2.0, 5.0

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, to_si
 from manipcli.render.drawing import draw, floors_of
@@ -85,6 +86,11 @@ class Frames(Renderer):
         if self._forced or (self._forced is None and failed_step(self.playback, now) is not None):
             image = draw_forces(image, self.camera, self._forces, k)
         return caption(image, self.playback, now) if self._captions else image
+
+    def between(self, start: float, end: float, tint: tuple[int, int, int]) -> tuple[Image, Array]:
+        """The picture at `start` [s] with a ghost of the state at `end`, without captions; and its depth (h, w) [m]."""
+        first, last = (self._poses(self.playback.index(time)) for time in (start, end))
+        return self.with_ghost(first, last, self.camera, tint)
 
     @cached_property
     def _forces(self) -> Forces:

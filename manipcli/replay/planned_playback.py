@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.plan.candidates import Dropped
 from manipcli.plan.motion import Motion
 from manipcli.plan.planned_states import PlannedStates, planned_states
+from manipcli.plan.sweep import first_hit
 from manipcli.replay.ghost import Ghost, ghost_of
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
 from manipcli.task.plan_steps import PlannedStep
@@ -50,10 +51,7 @@ def refused_playback(plan: Plan, name: str, refusal: NotPlannable) -> tuple[Play
         name: of the task.
         refusal: why it has no plan.
     """
-    last: BaseException | None = refusal
-    while isinstance(last, NotPlannable) and not last.motions:  # the reported one has none, its cause has
-        last = last.__cause__
-    tried = Dropped("", last) if isinstance(last, NotPlannable) else None
+    tried = _last_tried(refusal)
     ghost = _run(plan, _motions(tried), tried, 0.0) if tried is not None else None
     times = np.array([0.0, _STILL]) if ghost is None else ghost.times
     n, step = len(plan.start.position), str(refusal.step or "")
@@ -80,6 +78,72 @@ def planned_ghosts(plan: Plan, shown: Playback) -> tuple[tuple[Ghost, ...], int]
     for step, at, one, motions in tried[:MOST_GHOSTS]:
         found.append(ghost_of(_name(step, one), _run(plan, motions, one, at.start), shown))
     return tuple(found), len(tried) - len(found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TriedPath:
+    """A path of the tool that was tried and dropped.
+
+    Attributes:
+        step: id of the step.
+        points: (T, 3) [m] of the tool in the world.
+        at: index of the point at which two parts come nearer than the clearance of planning; None if they do not.
+        between: these parts, `hand and wall`.
+    """
+
+    step: str
+    points: Array
+    at: int | None = None
+    between: str = ""
+
+
+def tried_paths(plan: Plan) -> tuple[TriedPath, ...]:
+    """The tool paths of the straight motions and the candidates that were tried and dropped; equal ones once."""
+    found: list[TriedPath] = []
+    for step in plan.merged.steps:
+        for motion in step.plan.motions:
+            if motion.straight is not None:
+                straight = replace(motion, trajectory=motion.straight, grip=None, duration=motion.straight.duration)
+                found.append(_tried(plan, step.id, (straight,), Dropped("", NotPlannable(""))))
+        found += [_tried(plan, step.id, motions, one) for one in step.dropped if (motions := _motions(one))]
+    return _distinct(found)
+
+
+def refused_path(plan: Plan, refusal: NotPlannable) -> tuple[TriedPath, ...]:
+    """The tool path of what was planned of a refused step; none if nothing was."""
+    tried = _last_tried(refusal)
+    return () if tried is None else (_tried(plan, str(refusal.step or ""), _motions(tried), tried),)
+
+
+def _tried(plan: Plan, step: str, motions: Sequence[Motion], one: Dropped) -> TriedPath:
+    run = _run(plan, motions, one, 0.0)
+    last = motions[-1]
+    path, begins = run.tool_path(), run.end - last.duration
+    state = last.begins
+    if state is None:
+        return TriedPath(step, path)
+    hit = first_hit(plan.planner, state, plan.planner.query(state, last.allowed), last.trajectory, last.grip)
+    if hit is None:
+        return TriedPath(step, path)
+    parts = " and ".join(name.removeprefix("robot/") for name in (hit.a, hit.b))
+    return TriedPath(step, path, run.index(begins + hit.time), parts)
+
+
+def _distinct(paths: Sequence[TriedPath]) -> tuple[TriedPath, ...]:
+    kept: list[TriedPath] = []
+    for path in paths:
+        same = (one for one in kept if one.points.shape == path.points.shape)
+        if not any(np.allclose(path.points, one.points, atol=1e-3) for one in same):
+            kept.append(path)
+    return tuple(kept)
+
+
+def _last_tried(refusal: NotPlannable) -> Dropped | None:
+    """The refusal with the motions that were planned before it: the reported one has none, its cause has."""
+    last: BaseException | None = refusal
+    while isinstance(last, NotPlannable) and not last.motions:
+        last = last.__cause__
+    return Dropped("", last) if isinstance(last, NotPlannable) else None
 
 
 def _name(step: PlannedStep, one: Dropped) -> str:

@@ -30,6 +30,8 @@ SKY = ((203, 213, 224), (246, 248, 250))
 SIZE = (960, 720)
 """Default size of a picture [pixel]."""
 
+GHOST, APART = 0.5, 2e-3
+"""Opacity of a ghost, and the distance [m] by which it must be before the rest to be seen."""
 GROUND = np.iinfo(np.int32).max
 """Index of the ground among the triangles."""
 COARSE = (slice(None, None, FINER), slice(None, None, FINER))
@@ -125,6 +127,23 @@ class Renderer:
         image[coarse] = _averaged(fine)
         return image
 
+    def with_ghost(self, poses: Poses, ghost: Poses, camera: Camera, tint: tuple[int, int, int]) -> tuple[Image, Array]:
+        """The picture of one state with what moves also where it is in another, translucent; and its depth (h, w) [m],
+        infinite where nothing is."""
+        image = self.picture(poses, camera)
+        assert self._before is not None  # it has just been drawn
+        whole = Window(0, 0, FINER * self._size[0], FINER * self._size[1])
+        depth = np.minimum(self._before.depth, self._moving.see(poses, camera, whole).depth)
+        seen = self._moving.see(ghost, camera, whole)
+        there = (seen.face >= 0) & (seen.depth < depth - APART)
+        share = np.where(there, GHOST, 0.0).astype(np.float32)
+        colour = np.zeros((*there.shape, 3), dtype=np.float32)
+        colour[there] = 0.5 * (self._moving.coloured(seen, there) + np.array(tint, dtype=np.float32))
+        _darken(colour, outline_light(np.where(there, seen.depth, np.inf)))
+        fine = image.repeat(FINER, axis=0).repeat(FINER, axis=1)
+        blended = (1.0 - share[..., None]) * fine + share[..., None] * colour
+        return _averaged(blended.round().astype(np.uint8)), depth[COARSE]
+
     def _stand(self, poses: Poses, camera: Camera, whole: Window) -> _Still:
         """What does not move."""
         size = whole.right, whole.bottom
@@ -163,10 +182,10 @@ class _Still:
     shadows: Shadows | None
 
 
-def _darken(fine: Image, light: npt.NDArray[np.float32]) -> None:
+def _darken(fine: Image | npt.NDArray[np.float32], light: npt.NDArray[np.float32]) -> None:
     """Multiply a picture by a factor of the brightness, in place."""
     dark = light < 1.0
-    fine[dark] = (fine[dark] * light[dark, None]).astype(np.uint8)
+    fine[dark] = (fine[dark] * light[dark, None]).astype(fine.dtype)
 
 
 def _averaged(fine: Image) -> Image:

@@ -160,10 +160,42 @@ def test_pictures_and_pages_are_written_and_reproducible(
     path = written(MOVES)
     files = [(tmp_path / f"{k}.svg", tmp_path / f"{k}.html") for k in range(2)]
     for picture, page in files:
-        assert main(["plan", str(path), "--allow-outside", "--picture", str(picture), "--html", str(page)]) == 0
+        assert main(["plan", str(path), "--allow-outside", "--curves", str(picture), "--html", str(page)]) == 0
     assert files[0][0].read_bytes() == files[1][0].read_bytes()
     assert files[0][1].read_bytes() == files[1][1].read_bytes()
     assert "planned, not simulated" in files[0][1].read_text()
+
+
+@pytest.mark.slow
+def test_the_scene_is_drawn_with_and_without_a_plan(
+    written: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / "scene.png"
+    words = ["--allow-outside", "--picture", str(picture), "--view", "front"]
+    assert main(["plan", str(written(MOVES)), *words]) == 0
+    planned_bytes = picture.read_bytes()
+    assert planned_bytes.startswith(b"\x89PNG")
+    assert main(["plan", str(written(FAR)), *words]) == 1
+    assert picture.read_bytes() != planned_bytes
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["--picture", "a.svg"], "USE063", "`--curves FILE`"),
+        (["--view", "top"], "USE062", "add --picture"),
+        (["--picture", "a.png", "--view", "below"], "REPLAY010", "iso, front"),
+        (["--curves", "a.webp"], "USE061", ".svg"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(
+    written: Write, capsys: pytest.CaptureFixture[str], words: list[str], code: str, says: str
+) -> None:
+    assert main(["plan", str(written(MOVES)), "--allow-outside", *words]) == 4
+    told = capsys.readouterr().err
+    assert f"error[{code}]" in told
+    assert says in told
 
 
 def test_to_needs_export(written: Write, capsys: pytest.CaptureFixture[str]) -> None:

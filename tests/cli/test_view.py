@@ -73,3 +73,32 @@ def test_what_cannot_be_shown_is_refused(
 @pytest.mark.parametrize("port", ["-1", "70000", "x"])
 def test_a_port_is_a_number(port: str) -> None:
     assert main(["view", "one.urdf", "--port", port]) == 4
+
+
+@pytest.mark.slow
+def test_a_changed_file_is_shown_and_one_with_errors_is_reported(tmp_path: Path) -> None:
+    path = tmp_path / "one.urdf"
+    path.write_text(LINK)
+    command = [sys.executable, "-m", "manipcli", "view", str(path), "--port", "0"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        url = process.stdout.readline().strip()
+        path.write_text(LINK.replace("</robot>", '<joint name="j"/></robot>'))
+        lines = [process.stderr.readline() for _ in range(2)]
+        while "changed: one.urdf" not in lines[-2]:
+            lines.append(process.stderr.readline())
+        assert "one.urdf:1:" in lines[-1]
+        path.write_text(LINK.replace("1 1 1", "2 1 1"))
+        while "changed: one.urdf" not in (line := process.stderr.readline()):
+            assert "one.urdf:1:" in line or "hint" in line
+        with urlopen(url, timeout=120) as answer:
+            assert answer.status == 200
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert "error" not in told
+    assert "Traceback" not in told

@@ -455,6 +455,22 @@ def test_long_names_leave_the_page_as_wide_as_it_is(browser: Page, playback: Pla
     assert browser.complaints == []
 
 
+def test_hundreds_of_steps_are_on_the_track(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    first, length = playback.steps[0], (playback.end - playback.start) / 360
+    begins = [playback.start + k * length for k in range(360)]
+    steps = tuple(replace(first, id=f"s_{k}", start=t, end=t + length, phases=()) for k, t in enumerate(begins))
+    path = tmp_path / "run.html"
+    path.write_text(player_page(replace(playback, steps=steps)), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player')?.player")
+    track = "document.querySelector('.track').getBoundingClientRect()"
+    right = "Math.max(...[...document.querySelectorAll('.track .step')].map((e) => e.getBoundingClientRect().right))"
+    assert browser.evaluate(f"{right} - {track}.right") < 1.5
+    middle = "document.querySelectorAll('.track .step')[180].getBoundingClientRect()"
+    assert browser.evaluate(f"Math.abs(({middle}.left - {track}.left) / {track}.width - 0.5)") < 0.01
+    assert browser.complaints == []
+
+
 @pytest.mark.slow
 def test_the_page_that_is_served_plays(browser: Page, playback: Playback) -> None:
     with PageServer(player_page(playback), port=0) as server:

@@ -38,3 +38,16 @@ def test_a_click_on_a_sample_shows_its_command_beside_the_plots(tmp_path: Path, 
         assert browser.evaluate(f"(({{top, bottom}}) => top >= 0 && bottom <= innerHeight)({box})")
     assert browser.requests == [page.as_uri()]
     assert browser.complaints == []
+
+
+def test_labels_of_plots_are_not_cut(tmp_path: Path, browser: Page) -> None:
+    sampling = cube(tmp_path, "")
+    results = tuple(result(k, 0.0012345 * (k - 5), passed=k >= 5) for k in range(12))
+    page = tmp_path / "page.html"
+    page.write_text(render_page(Analysis(Sweep(sampling, results, 12, "", 0.0, 0)), tmp_path))
+    browser.ask("Emulation.setDeviceMetricsOverride", width=1200, height=700, deviceScaleFactor=1, mobile=False)
+    browser.open(page.as_uri())
+    browser.wait_for("document.querySelectorAll('#map g').length == 12")
+    texts = "[...document.querySelectorAll('svg.plot text')]"
+    assert browser.evaluate(f"Math.max(...{texts}.map((one) => one.textContent.length))") == len("−0.006172")
+    assert browser.evaluate(f"Math.min(...{texts}.map((one) => one.getBBox().x))") >= 0.0

@@ -20,11 +20,16 @@ from manipcli.cli.options import (
     TaskFile,
     check_design,
 )
-from manipcli.cli.outputs import check_outputs
+from manipcli.cli.outputs import check_outputs, check_picture
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, NotPlannable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from manipcli.pipeline import Plan
+    from manipcli.replay.camera import Vector
+    from manipcli.replay.planned_playback import TriedPath
+    from manipcli.replay.playback import Playback
 
 Export = Literal["jointtrajectory"]
 
@@ -37,7 +42,19 @@ def plan(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", metavar="FILE", help="Draw each joint's motion with its limits: .svg, .png or .pdf."),
+        typer.Option("--picture", metavar="FILE.png", help="Draw the scene with the tool's path and dropped ones."),
+    ] = None,
+    view: Annotated[
+        str | None,
+        typer.Option(
+            "--view",
+            metavar="VIEW",
+            help="With --picture: iso, front, back, left, right, top, or AZIMUTH,ELEVATION [default: least hidden].",
+        ),
+    ] = None,
+    curves: Annotated[
+        Path | None,
+        typer.Option("--curves", metavar="FILE", help="Draw each joint's motion with its limits: .svg, .png or .pdf."),
     ] = None,
     html: Annotated[
         Path | None,
@@ -77,12 +94,13 @@ def plan(
     check_design(design, sample)
     if folder is not None and export is None:
         raise InvalidInput([Diagnostic("USE084", "--to has no effect without --export")])
-    check_outputs(("--csv", csv), ("--picture", picture), ("--html", html), reads=(task,))
+    check_outputs(("--csv", csv), ("--picture", picture), ("--curves", curves), ("--html", html), reads=(task,))
+    towards = _view_of(view, picture)
     kind = None
-    if picture is not None:
+    if curves is not None:
         from manipcli.replay.figure import kind_of
 
-        kind = kind_of(picture)
+        kind = kind_of(curves)
     loaded = pipeline.load_task(
         task,
         overrides=tuple(overrides or ()),
@@ -100,6 +118,8 @@ def plan(
     except NotPlannable as refusal:
         if html is not None:
             _write_refused_page(pipeline.unplanned(loaded), loaded.spec.task, html, refusal)
+        if picture is not None:
+            _draw_refused(pipeline.unplanned(loaded), loaded.spec.task, picture, refusal, towards)
         if format_ != "json":
             if sum(group.count for group in refusal.candidates) > 1:
                 from manipcli.report.plan_text import render_refused
@@ -117,11 +137,13 @@ def plan(
 
         with whole_file(csv) as partial, partial.open("w", encoding="utf-8", newline="") as stream:
             write_csv([motion for part in planned.stretches for motion in part.motions], stream)
-    if picture is not None and kind is not None:
+    if picture is not None:
+        _draw(planned, name, picture, towards)
+    if curves is not None and kind is not None:
         from manipcli.core.whole_file import write_whole
         from manipcli.replay.plan_figure import plan_figure
 
-        write_whole(picture, plan_figure(planned, name, kind))
+        write_whole(curves, plan_figure(planned, name, kind))
     if html is not None:
         _write_page(planned, name, html)
     if export is not None:
@@ -138,6 +160,49 @@ def plan(
 
         console.result(render_text(name, planned, every=why))
     return ExitCode.PASSED
+
+
+def _view_of(view: str | None, picture: Path | None) -> Vector | None:
+    """The direction of `--view`; None without one.
+
+    Raises:
+        InvalidInput: there is no such view, it has no effect, or the picture is not a .png file.
+    """
+    from manipcli.replay.camera import direction
+
+    if picture is not None and picture.suffix.lower() in (".svg", ".pdf"):
+        hint = "`--curves FILE` draws the joints' motions as .svg, .png or .pdf"
+        raise InvalidInput([Diagnostic("USE063", f"'{picture}' is not a .png file", hint=hint)])
+    check_picture(picture)
+    if view is not None and picture is None:
+        raise InvalidInput([Diagnostic("USE062", "--view has no effect without --picture", hint="add --picture")])
+    return None if view is None else direction(view)
+
+
+def _draw(planned: Plan, name: str, path: Path, towards: Vector | None) -> None:
+    from manipcli.replay.planned_playback import planned_playback, tried_paths
+
+    _write_picture(path, planned_playback(planned, name), tried_paths(planned), towards)
+
+
+def _draw_refused(nothing: Plan, name: str, path: Path, refusal: NotPlannable, towards: Vector | None) -> None:
+    from manipcli.replay.planned_playback import refused_path, refused_playback
+
+    playback, _ = refused_playback(nothing, name, refusal)
+    _write_picture(path, playback, refused_path(nothing, refusal), towards, refused=str(refusal))
+    console.talk(f"written: {path}, the start of the task and what was tried")
+
+
+def _write_picture(
+    path: Path, playback: Playback, tried: Sequence[TriedPath], towards: Vector | None, *, refused: str = ""
+) -> None:
+    from manipcli.core.whole_file import write_whole
+    from manipcli.replay.plan_picture import plan_picture
+    from manipcli.replay.renderer import png_bytes
+
+    image, missing = plan_picture(playback, tried, refused=refused, towards=towards)
+    console.not_drawn(missing)
+    write_whole(path, png_bytes(image))
 
 
 def _write_page(planned: Plan, name: str, path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from manipcli.live.offer import Offer
@@ -22,7 +22,9 @@ from manipcli.live.page.service_calls import (
 from manipcli.live.page.snapshot import Snapshot
 from manipcli.live.play_state import PLAYING
 from manipcli.model.robot import RobotModel
-from manipcli.replay.view.view import add_layers, joint_slider
+from manipcli.replay.view.joint_panel import rows
+from manipcli.replay.view.joint_slider import JointSlider, units_of
+from manipcli.replay.view.layer_panel import add_layers
 from manipcli.replay.view.viser_scene import ViserScene
 
 if TYPE_CHECKING:
@@ -59,7 +61,7 @@ class Panel:
         period: float,
     ) -> None:
         self._client, self._offer, self._controls = client, offer, controls
-        self._sliders: dict[Drive, list[viser.GuiSliderHandle[float]]] = {}
+        self._sliders: dict[Drive, list[JointSlider]] = {}
         self._switches: dict[str, viser.GuiCheckboxHandle] = {}
         self._folder = folder
         self._period = period
@@ -122,14 +124,14 @@ class Panel:
 
         return clicked
 
-    def _slider(self, gui: viser.GuiApi, robot: RobotModel, drive: Drive, joint: str) -> viser.GuiSliderHandle[float]:
-        slider = joint_slider(gui, robot.joint(joint), 0.0)
+    def _slider(self, gui: viser.GuiApi, robot: RobotModel, drive: Drive, joint: str) -> JointSlider:
+        slider = JointSlider(gui, robot.joint(joint), 0.0)
 
         async def slid(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # not the page itself, which shows where the robot is
                 self._controls.slide(drive, joint, slider.value, time.monotonic())
 
-        slider.on_update(slid)
+        slider.handle.on_update(slid)
         return slider
 
     def _switch(self, name: str, active: bool) -> viser.GuiCheckboxHandle:
@@ -163,11 +165,9 @@ class Panel:
                 obstacle = bool(snapshot.obstacle(drive.controller))
                 follows = self._controls.follows(drive, snapshot, now)
                 for slider, k in zip(sliders, drive.columns, strict=True):
-                    slider.disabled = obstacle or slider.max <= slider.min
-                    value = round(slider.step * round(float(snapshot.state.position[k]) / slider.step), 9)
-                    value = min(max(value, slider.min), slider.max)
-                    if follows and abs(value - slider.value) > 0.5 * slider.step:
-                        slider.value = value  # type: ignore[misc]  # viser's setter hides from mypy
+                    slider.handle.disabled = obstacle or slider.handle.max <= slider.handle.min
+                    if follows:
+                        slider.follow(float(snapshot.state.position[k]))
 
     def show_controllers(self, states: Mapping[str, str]) -> None:
         """Set the switches to the states of the controllers."""
@@ -188,16 +188,4 @@ class Panel:
 
 def units(robot: RobotModel, drive: Drive) -> str:
     """Of the sliders of a drive."""
-    found = {"m" if robot.joint(name).type == "prismatic" else "rad" for name in drive.joints}
-    return ", ".join(sorted(found, reverse=True))
-
-
-def rows(names: Sequence[str], most: int) -> list[list[str]]:
-    """Names in rows of at most `most` characters, at least one in each."""
-    found: list[list[str]] = []
-    for name in names:
-        if found and sum(map(len, found[-1])) + len(name) <= most and len(found[-1]) < 4:
-            found[-1].append(name)
-        else:
-            found.append([name])
-    return found
+    return units_of([robot.joint(name) for name in drive.joints])

@@ -17,7 +17,7 @@ from manipcli.render.drawing import WORLD, draw, floors_of
 from manipcli.render.placing import Poses
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.playback import Playback
-from manipcli.replay.rerun.verdict_page import verdict_page
+from manipcli.replay.verdict_page import verdict_page
 
 if TYPE_CHECKING:
     from foxglove import layouts as fl

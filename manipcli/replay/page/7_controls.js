@@ -75,9 +75,11 @@ function buildTrack() {
     return piece;
   };
   run.steps.forEach((step, k) => {
-    const piece = put("step" + (step.outcome === "done" ? "" : " bad"), step.start, step.end);
+    // A narrow step has no room for its padding and name.
+    const narrow = (step.end - step.start) / length < 0.03;
+    const piece = put(`step${step.outcome === "done" ? "" : " bad"}${narrow ? " narrow" : ""}`, step.start, step.end);
     piece.dataset.step = k;
-    piece.textContent = placed(step).short.replace(/^else\//, "");
+    if (!narrow) piece.textContent = placed(step).short.replace(/^else\//, "");
     piece.title = `${step.label}: ${step.outcome}${step.text ? "\n" + step.text : ""}`;
     for (const phase of step.phases)
       element(piece, "div", "phase").style.left = `${(100 * (phase.start - step.start)) / (step.end - step.start || 1)}%`;

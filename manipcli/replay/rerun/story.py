@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.rerun.timelines import Timelines
-from manipcli.replay.rerun.verdict_page import verdict_page
+from manipcli.replay.verdict_page import verdict_page
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -1,36 +1,37 @@
-"""Interactive page of `manipcli view`: a robot or the start scene of a task, joint sliders, named poses, layers."""
+"""Interactive page of `manipcli view`: a robot or the start scene of a task, joints, layers, camera, tool."""
 
 from __future__ import annotations
 
-import math
-import threading
-from functools import partial
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.description.elements import Joint
-from manipcli.model.configuration import configuration, with_mimics, zero_configuration
-from manipcli.model.robot import RobotModel
+from manipcli.model.configuration import configuration, with_mimics
+from manipcli.model.hand.tool_hand import ToolHand, tool_hand
+from manipcli.model.hand.words import opening_text
+from manipcli.model.hand.words import pose_text as millimetres_and_degrees
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel, Tool
 from manipcli.render.drawing import draw, floors_of
 from manipcli.render.placing import Placing
-from manipcli.replay.view.viser_scene import Shown, ViserScene
+from manipcli.replay.view.camera_panel import CameraPanel
+from manipcli.replay.view.collisions import Collisions, list_html, status_html
+from manipcli.replay.view.joint_panel import JointPanel, pose_text
+from manipcli.replay.view.layer_panel import add_layers
+from manipcli.replay.view.masses import Masses
+from manipcli.replay.view.tool_marks import ToolMarks, tool_pose_text
+from manipcli.replay.view.viser_scene import ViserScene
 from manipcli.replay.view.viser_server import LocalServer
 from manipcli.scene.scene import Scene
 
 if TYPE_CHECKING:
     import viser
 
-STEPS = 400
-"""Approximate number of positions of a slider."""
-ZERO = "zero"
-WIDE = {"continuous": math.pi, "revolute": math.pi, "prismatic": 1.0}
-"""Range of the slider of a joint without limits [rad or m]."""
-
 
 class View(LocalServer):
-    """A served page with a robot, its scene and a joint panel. A context manager that stops the server.
+    """A served page with a robot and its scene. A context manager that stops the server.
 
     Args:
         robot: the robot.
@@ -39,144 +40,135 @@ class View(LocalServer):
         port: see `LocalServer`.
 
     Attributes:
+        robot: the shown robot.
         joints: the joint panel.
+        camera: the panel of the camera.
+        collisions: what collides.
+        hand: the hand at the tool; None without fingers.
         missing: parts that cannot be drawn, one line each.
     """
 
     def __init__(
         self, robot: RobotModel, scene: Scene | None = None, *, q: Array | None = None, port: int | None
     ) -> None:
-        drawing, placing = draw(robot, scene), Placing(robot, scene)
-        position = configuration(robot) if q is None else q
         super().__init__(robot.name, port=port)
-        self.robot = robot
-        self.missing = drawing.missing
         try:
-            shown = ViserScene(self.viser, drawing, placing.start(position), floors=floors_of(scene))
-            with self.viser.gui.add_folder("Show"):
-                add_layers(self.viser.gui, shown)
-            self.joints = JointPanel(self.viser, robot, shown, placing, position)
+            self._build(robot, scene, configuration(robot) if q is None else q)
+            self.viser.on_client_connect(self._came)
         except BaseException:
             self.stop()
             raise
 
+    def replace(self, robot: RobotModel, scene: Scene | None = None, *, q: Array | None = None) -> None:
+        """Show another state of the files; joints of the same names keep their positions, the camera stays.
 
-def slider_range(joint: Joint) -> tuple[float, float]:
-    """Lower and upper end of the slider of a joint [rad or m]."""
-    lower, upper, reach = joint.limits.lower, joint.limits.upper, WIDE[joint.type]
-    if lower is None and upper is not None:
-        return min(-reach, upper - reach), upper
-    if lower is not None and upper is None:
-        return lower, max(reach, lower + reach)
-    return (-reach if lower is None else lower, reach if upper is None else upper)
+        Args:
+            robot, scene, q: as for the constructor.
+        """
+        before = dict(zip(self.robot.joint_names, self.joints.position, strict=True))
+        start = configuration(robot) if q is None else q
+        kept = [
+            joint.limits.nearest(before.get(joint.name, value))
+            for joint, value in zip(robot.moving_joints, start, strict=True)
+        ]
+        with self.viser.atomic():
+            self.viser.scene.reset()
+            self.viser.gui.reset()
+            self._build(robot, scene, start)
+        self.joints.go(with_mimics(robot, np.array(kept)))
+
+    def notify(self, title: str, text: str) -> None:
+        """Show a message in all browsers."""
+        for client in self.viser.get_clients().values():
+            client.add_notification(title, text, color="red", auto_close_seconds=20.0)
+
+    def _build(self, robot: RobotModel, scene: Scene | None, q: Array) -> None:
+        drawing, self._placing, floors = draw(robot, scene), Placing(robot, scene), floors_of(scene)
+        self.robot, self.missing = robot, drawing.missing
+        self._kinematics = Kinematics(robot)
+        self._poses = self._placing.start(q)
+        self._scene = ViserScene(self.viser, drawing, self._poses, floors=floors)
+        self.hand = tool_hand(robot)
+        self._tool = robot.tool if robot.tool is not None else (None if self.hand is None else self.hand.tool)
+        self.collisions = Collisions(robot, scene)
+        self._masses = Masses(self.viser, self._scene, robot, scene)
+        self._marks = None if self._tool is None else ToolMarks(self.viser, self._scene, self._tool, self.hand)
+        gui = self.viser.gui
+        self._status = gui.add_html("")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Joints"):
+            self.joints = JointPanel(gui, robot, q, self._moved)
+        with tabs.add_tab("Show"):
+            self._add_layers(gui)
+        with tabs.add_tab("Camera"):
+            tool = self._tool_place if self._tool is not None else None
+            self.camera = CameraPanel(self.viser, drawing, floors, lambda: self._poses, tool)
+        with tabs.add_tab("Poses"):
+            self._add_readout(gui)
+        self._list = gui.add_html("")
+        self._moved(q)
+
+    def _came(self, client: viser.ClientHandle) -> None:
+        """Frame the scene for a narrow screen; the first view is for a wide one."""
+        if client.camera.aspect < 1.0:
+            self.camera.view(client, "iso")
+
+    def _add_layers(self, gui: viser.GuiApi) -> None:
+        marks, masses = self._marks, self._masses
+        if marks is not None:
+            hint = "Axes of the tool frame, finger tips (orange), the gap between the fingers (violet)."
+            tool = gui.add_checkbox("tool, finger tips", True, hint=hint)
+            tool.on_update(lambda _: marks.show(tool.value))
+        add_layers(gui, self._scene)
+        centres = gui.add_checkbox("centres of mass", False, hint="Best with `transparent`; red: of the whole robot.")
+        centres.on_update(lambda _: masses.show(centres.value))
+        dark = gui.add_checkbox("dark", False)
+        dark.on_update(lambda _: self._darken(dark.value))
+
+    def _darken(self, dark: bool) -> None:
+        self.darken(dark)
+        self._scene.darken(dark)
+
+    def _add_readout(self, gui: viser.GuiApi) -> None:
+        hint = "For `poses:` of the robot file, in rad and m."
+        self._joint_text = gui.add_text("joints as YAML", "", multiline=True, hint=hint)
+        if self._tool is not None:
+            hint = "In the world, in m and rad, for `pose:` of a step `move`."
+            self._tool_text = gui.add_text("tool pose as YAML", "", multiline=True, hint=hint)
+            gui.add_html(tool_html(self._tool, self.hand, stated=self.robot.tool is not None))
+
+    def _tool_place(self) -> Array:
+        """(3,) [m] the tool in the world."""
+        assert self._tool is not None
+        frame = list(self._scene.paths).index(f"robot/{self._tool.link}")
+        return self._poses.X_WF(frame).apply(self._tool.X_LT.p)
+
+    def _moved(self, q: Array) -> None:
+        """Show a configuration: poses, collisions, the gap of the hand, and both as text."""
+        self._poses = self._placing.start(q)
+        hits = self.collisions.at(q)
+        gap = self.hand.gap_at(q) if self.hand is not None and self.hand.measured else None
+        with self.viser.atomic():
+            self._scene.place(self._poses)
+            self._scene.mark(frozenset(name for hit in hits for name in (hit.a, hit.b)))
+            self._masses.place(self._poses)
+            if self._marks is not None:
+                self._marks.place(q)
+            self._status.content = status_html(hits, gap)
+            self._list.content = list_html(hits)
+            self._joint_text.value = pose_text(self.robot, q)  # type: ignore[misc]  # viser's setter hides from mypy
+            if self._tool is not None:
+                X_WT = self._kinematics.forward(q, self._tool.link) @ self._tool.X_LT
+                self._tool_text.value = tool_pose_text(X_WT)  # type: ignore[misc]
 
 
-def pose_text(robot: RobotModel, q: Array) -> str:
-    """A configuration as YAML for `poses:` of a robot file: a list per group, or by joint name without groups."""
-    value = {name: f"{number:.4g}" for name, number in zip(robot.joint_names, q, strict=True)}
-    if robot.groups:
-        parts = [f"{group.name}: [{', '.join(value[name] for name in group.joints)}]" for group in robot.groups]
-    else:
-        parts = [f"{joint.name}: {value[joint.name]}" for joint in robot.moving_joints if joint.independent]
-    return "\n".join(parts)
-
-
-def add_layers(gui: viser.GuiApi, scene: ViserScene) -> None:
-    """Add a checkbox for each layer."""
-
-    def add(label: str, layer: Shown, hint: str | None = None) -> None:
-        box = gui.add_checkbox(label, layer == "visual", hint=hint)
-        box.on_update(lambda _: scene.show(layer, box.value))
-
-    add("visual meshes", "visual")
-    clear = gui.add_checkbox("transparent", False, hint="Show frames and centres of mass inside the links.")
-    clear.on_update(lambda _: scene.see_through(clear.value))
-    add("collision shapes", "collision", "Convex hulls of the meshes, as in planner and physics.")
-    add("inertia boxes", "inertia", "Uniform box with the mass and inertia of each link.")
-    add("frames", "frames", "x red, y green, z blue.")
-    add("names", "names")
-
-
-def joint_slider(gui: viser.GuiApi, joint: Joint, value: float) -> viser.GuiSliderHandle[float]:
-    """Add a slider of a joint over its range, at `value` or the nearest end [rad or m]."""
-    low, high = slider_range(joint)
-    step = 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / STEPS))
-    return gui.add_slider(joint.name, low, high, step, min(max(value, low), high), disabled=high <= low)
-
-
-class JointPanel:
-    """Sliders of the independent joints and buttons of the named poses, which move the scene.
-
-    Args:
-        server: the viser server.
-        robot: the robot.
-        scene: the shown scene.
-        placing: computes the frames.
-        q: (n,) initial joint positions.
-
-    Attributes:
-        sliders: sliders by the index of the joint in joint vectors.
-
-    The page calls back in threads of the server; a lock serialises the movements.
-    """
-
-    def __init__(
-        self, server: viser.ViserServer, robot: RobotModel, scene: ViserScene, placing: Placing, q: Array
-    ) -> None:
-        self._robot, self._scene, self._placing = robot, scene, placing
-        self._lock = threading.Lock()
-        self.sliders: dict[int, viser.GuiSliderHandle[float]] = {}
-        self._q = q
-        with server.gui.add_folder("Poses"):
-            for name in dict.fromkeys((*(pose.name for pose in robot.poses), ZERO)):
-                server.gui.add_button(name).on_click(partial(self._clicked, name))
-        with server.gui.add_folder("Joints [rad, m]"):
-            for k, joint in enumerate(robot.moving_joints):
-                if joint.independent:
-                    self.sliders[k] = self._slider(server, joint, k)
-        self._text = server.gui.add_text(
-            "as YAML",
-            pose_text(robot, q),
-            multiline=True,
-            hint="For `poses:` of the robot file or a `move` step.",
-        )
-
-    def _slider(self, server: viser.ViserServer, joint: Joint, k: int) -> viser.GuiSliderHandle[float]:
-        slider = joint_slider(server.gui, joint, float(self._q[k]))
-        slider.on_update(lambda _: self._slid(k, slider.value))
-        return slider
-
-    @property
-    def position(self) -> Array:
-        """(n,) shown joint positions."""
-        return self._q
-
-    def _clicked(self, name: str, _: object) -> None:
-        self.go(self.named(name))
-
-    def named(self, name: str) -> Array:
-        """(n,) joint positions of a named pose; joints that it does not name keep their position."""
-        known = any(pose.name == name for pose in self._robot.poses)
-        return configuration(self._robot, name, rest=self._q) if known else zero_configuration(self._robot)
-
-    def go(self, q: Array) -> None:
-        """Show a configuration and set the sliders to it."""
-        with self._lock:
-            self._place(q)
-        # Each assignment calls `_slid`, which finds the joint at this value already.
-        for k, slider in self.sliders.items():
-            slider.value = float(q[k])  # type: ignore[misc]  # viser's setter hides from mypy
-
-    def _slid(self, k: int, value: float) -> None:
-        """Move one joint to its slider; the other sliders are not read, since they can still be moving."""
-        with self._lock:
-            q = np.array(self._q)
-            if not math.isfinite(value) or value == q[k]:
-                return
-            q[k] = self._robot.moving_joints[k].limits.nearest(value)
-            self._place(with_mimics(self._robot, q))
-
-    def _place(self, q: Array) -> None:
-        self._q = q
-        self._scene.place(self._placing.start(q))
-        self._text.value = pose_text(self._robot, q)  # type: ignore[misc]  # viser's setter hides from mypy
+def tool_html(tool: Tool, hand: ToolHand | None, *, stated: bool) -> str:
+    """The tool frame and the opening of the hand, for the panel."""
+    lines = [
+        f"<b>tool</b> in link '{escape(tool.link)}': {millimetres_and_degrees(tool.X_LT)}",
+        "+z is the approach direction" + ("" if stated else "; measured on the hand, the robot file states none"),
+    ]
+    if hand is not None:
+        lines += [f"<b>tips</b> {escape(', '.join(tip.link for tip in hand.tips))}"]
+        lines += [f"<b>opening</b> {escape(opening_text(hand))}"]
+    return f'<div style="padding: 0 0.8em; font-size: 0.85em">{"<br>".join(lines)}</div>'

@@ -25,6 +25,10 @@ GRID = 0.1
 """Cell size of the ground grid [m]."""
 STILL = 2e-5
 """[m], and of quaternions: what moved less is not sent. A robot at rest sends nothing."""
+DARK = 0.18
+"""Brightness of the dark background relative to the light one."""
+MARKED = (224, 49, 49)
+"""Colour of parts that collide."""
 BRIGHTNESS = 0.7
 """Intensity of the environment light; 1 looks washed out."""
 
@@ -52,12 +56,16 @@ class ViserScene:
         self._nodes: list[viser.FrameHandle] = []
         self._layers: dict[Shown, list[_Node]] = {layer: [] for layer in get_args(Shown)}
         self._solid: list[tuple[viser.MeshHandle, float]] = []
+        self._named: list[tuple[str, viser.FrameHandle, viser.LabelHandle]] = []
+        self._meshes: list[tuple[str, viser.MeshHandle, tuple[int, int, int]]] = []
+        self._shown: set[Shown] = {"visual"}
+        self._found, self._marked = "", frozenset[str]()
         camera = framing(drawing, poses, leave_out=floors).further(1.2)
         self._length = AXES * float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
         # viser includes its lighting presets: no download.
         server.scene.configure_environment_map("warehouse", environment_intensity=BRIGHTNESS)
-        server.scene.set_background_image(np.repeat(sky(64), 64, axis=1))
-        paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
+        self.darken(False)
+        self.paths = paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
         with server.atomic():
             for frame in drawing.frames:
                 self._nodes.append(server.scene.add_frame(paths[frame], show_axes=False))
@@ -100,8 +108,7 @@ class ViserScene:
         name = self._server.scene.add_label(
             f"{path}_name", label, position=X.p, visible=False, font_screen_scale=0.75, anchor="bottom-left"
         )
-        self._layers["frames"].append(axes)
-        self._layers["names"].append(name)
+        self._named.append((label, axes, name))
 
     def _mesh(self, path: str, drawable: Drawable) -> None:
         clear = drawable.rgba[3]
@@ -117,6 +124,7 @@ class ViserScene:
             receive_shadow=False,  # only on the ground: shadow maps flicker on thin walls
         )
         self._layers[drawable.layer].append(mesh)
+        self._meshes.append((drawable.frame, mesh, _rgb(drawable.rgba)))
         if drawable.layer == "visual":
             self._solid.append((mesh, clear))
 
@@ -129,8 +137,50 @@ class ViserScene:
 
     def show(self, layer: Shown, shown: bool) -> None:
         """Show or hide a layer: surfaces, the axes of all frames and marks, or their names."""
+        if shown:
+            self._shown.add(layer)
+        else:
+            self._shown.discard(layer)
         for node in self._layers[layer]:
             node.visible = shown
+        if layer in ("frames", "names"):
+            self._show_frames()
+
+    def find(self, text: str) -> None:
+        """Of frames and names, show only those that have `text` in their name."""
+        self._found = text.strip().lower()
+        self._show_frames()
+
+    def _show_frames(self) -> None:
+        for label, axes, name in self._named:
+            found = self._found in label.lower()
+            axes.visible = found and "frames" in self._shown
+            name.visible = found and "names" in self._shown
+
+    def resize(self, factor: float) -> None:
+        """Draw the axes of frames `factor` times as long as at first."""
+        length = factor * self._length
+        for _, axes, _ in self._named:
+            axes.axes_length, axes.axes_radius, axes.origin_radius = length, length / 24.0, length / 14.0
+
+    def darken(self, dark: bool) -> None:
+        """A dark or a light background, in all browsers."""
+        background = np.repeat(sky(64), 64, axis=1)
+        self._server.scene.set_background_image((background * (DARK if dark else 1.0)).astype(np.uint8))
+
+    def wireframe(self, on: bool) -> None:
+        """Draw the edges of the triangles of all surfaces instead of the surfaces."""
+        for _, mesh, _ in self._meshes:
+            mesh.wireframe = on
+
+    def mark(self, frames: frozenset[str]) -> None:
+        """Draw the surfaces of these frames in red, all others in their own colours."""
+        if frames == self._marked:
+            return
+        changed, self._marked = frames ^ self._marked, frames
+        for frame, mesh, rgb in self._meshes:
+            if frame in changed:
+                mesh.color = MARKED if frame in frames else rgb
 
     def see_through(self, clear: bool) -> None:
         """Make the visual meshes transparent or opaque."""

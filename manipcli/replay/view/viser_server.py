@@ -86,7 +86,7 @@ class LocalServer:
         if port and server.get_port() != port:
             self.stop()
             raise unusable_port(port, option=option)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self.darken(False)
         server.gui.main_panel.dock_right()
 
     def __enter__(self) -> Self:
@@ -94,6 +94,10 @@ class LocalServer:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.stop()
+
+    def darken(self, dark: bool) -> None:
+        """Dark or light colours of the panel, in all browsers."""
+        self.viser.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
 
     @property
     def port(self) -> int:

@@ -3,6 +3,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const byId = (id) => document.getElementById(id);
   if (!byId("small")) return;
+  const LETTER = 7;  // width of a letter of a label
   const SVG = "http://www.w3.org/2000/svg";
   const drawn = new Map();  // marks of each sample, in all plots
   let chosen = null;
@@ -50,8 +51,11 @@
 
   /** A scatter plot; `x` and `y` give a number or null. */
   function plot(width, height, x, y, lines) {
-    const left = 52, bottom = 24, top = 8, right = 10;
+    const bottom = 24, top = 8, right = 10;
     const shown = data.samples.filter((s) => x(s) !== null && y(s) !== null);
+    // The labels of y are as wide as their text.
+    const ends = shown.length ? [Math.min(...shown.map(y)), Math.max(...shown.map(y))].map(short) : [];
+    const left = Math.max(52, 12 + LETTER * Math.max(0, ...ends.map((text) => text.length)));
     const whole = svg("svg", { class: "plot", viewBox: `0 0 ${width} ${height}` });
     if (!shown.length) return whole;
     const [x0, x1] = range([...shown.map(x), ...(lines.nominal === undefined ? [] : [lines.nominal])]);

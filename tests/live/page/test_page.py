@@ -12,6 +12,7 @@ from queue import SimpleQueue
 from threading import Thread
 from urllib.parse import parse_qs, urlsplit
 
+import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -94,16 +95,16 @@ def test_a_slider_commands_and_follows_the_robot(served: Served) -> None:
     with Visitor(served.page.port, TOKEN) as visitor:
         served.live(visitor, lambda: "arm_controller" in visitor.labels("Checkbox"))
         slider = visitor.labels("Slider")["joint_2"]
-        visitor.set(slider, 0.5)
+        visitor.set(slider, 28.6)  # degrees
         sent: list[Command] = []
         visitor.until(lambda: sent.extend(served.tick()) or sent)
         assert [command.name for command in sent] == ["/arm_controller/joint_trajectory"]
-        assert json.loads(sent[0].json)["points"][0]["positions"][1] == pytest.approx(0.5)
+        assert json.loads(sent[0].json)["points"][0]["positions"][1] == pytest.approx(np.radians(28.6))
 
         served.publisher.state.position[0] = -0.25  # another client moves the robot, after this motion
         served.ticks += 10_000
         first = visitor.labels("Slider")["joint_1"]
-        served.live(visitor, lambda: visitor.inputs[first]["value"] == pytest.approx(-0.25))
+        served.live(visitor, lambda: visitor.inputs[first]["value"] == pytest.approx(np.degrees(-0.25), abs=0.051))
 
         sent.clear()
         visitor.set(visitor.labels("Checkbox")["hand_controller"], value=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -18,10 +19,12 @@ from manipcli.task.load_view import load_sight
 ROOT = Path(__file__).parents[3]
 SCALE = 0.5
 """Pixels of the screen for one of the page."""
-CLICK = """(label => {
-  const found = [...document.querySelectorAll("label, button")].find(e => e.textContent.trim() === label);
-  if (found) found.click();
-  return !!found;
+PLACE = """(label => {
+  const found = [...document.querySelectorAll("label, button, [role=tab]")].find(
+    e => e.textContent.trim() === label && e.getBoundingClientRect().width > 0);
+  if (!found) return null;
+  const box = found.getBoundingClientRect();
+  return JSON.stringify([box.x + box.width / 2, box.y + box.height / 2]);
 })"""
 
 
@@ -36,6 +39,15 @@ class Page(Protocol):
     def wait_for(self, script: str, seconds: float = 120.0) -> None: ...
     def screenshot(self) -> bytes: ...
     def ask(self, method: str, **parameters: object) -> dict[str, object]: ...
+
+
+def _click(page: Page, label: str) -> None:
+    """Tabs follow the mouse, not `click()`."""
+    page.wait_for(f"{PLACE}({label!r}) !== null")
+    x, y = json.loads(str(page.evaluate(f"{PLACE}({label!r})")))
+    page.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    for kind in ("mousePressed", "mouseReleased"):
+        page.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
 
 def _pixels(page: Page) -> np.ndarray:
@@ -74,12 +86,20 @@ def test_the_page_shows_the_robot_and_obeys_its_panel(browser: Page) -> None:
         assert [name for name in names if name not in shown] == []
         assert not any(joint.name in shown.split() for joint in sight.robot.joints if joint.mimic is not None)
 
-        assert browser.evaluate(f"{CLICK}('zero')")
+        _click(browser, "zero")
         _until(browser, lambda image: np.abs(image - home).max(axis=2).mean() > 5.0)
         assert view.joints.position == pytest.approx(view.joints.named("zero"))
 
-        assert browser.evaluate(f"{CLICK}('collision shapes')")
+        assert "no collision" in shown
+        assert "opening 88.0 mm" in shown  # as `check` prints it
+        _click(browser, "Show")
+        _click(browser, "collision shapes")
         _until(browser, _is_orange)
+
+        _click(browser, "Camera")
+        isometric = _until(browser, _is_orange)
+        _click(browser, "top")
+        _until(browser, lambda image: np.abs(image - isometric).max(axis=2).mean() > 5.0)
 
         outside = [url for url in browser.requests if not url.split(":", 1)[1].startswith(f"//127.0.0.1:{view.port}")]
         assert [url for url in outside if not url.startswith(("data:", "blob:"))] == []

@@ -18,7 +18,9 @@ from websockets.typing import Origin, Subprotocol
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.description.elements import Joint, JointLimits
-from manipcli.replay.view.view import View, pose_text, slider_range
+from manipcli.replay.view.joint_panel import pose_text
+from manipcli.replay.view.joint_slider import slider_range
+from manipcli.replay.view.view import View
 from manipcli.task.load_view import load_sight
 
 ROOT = Path(__file__).parents[3]
@@ -109,7 +111,7 @@ def test_a_slider_moves_its_joint_and_what_follows_it(page: View) -> None:
     assert [joint.name for joint in page.robot.moving_joints] == ["drive", "mimic"]
     assert list(page.joints.sliders) == [0]  # a mimic joint has none
     page.joints.go(page.joints.named("zero"))
-    page.joints.sliders[0].value = 0.04  # type: ignore[misc]
+    page.joints.sliders[0].value = 0.04
     _until(lambda: page.joints.position == pytest.approx([0.04, -2 * 0.04 + 0.5]))
     page.joints.go(frozen([0.1, 0.3]))
     assert page.joints.position == pytest.approx([0.1, 0.3])
