@@ -46,7 +46,7 @@ def status_html(hits: tuple[CollisionHit, ...], gap: float | None) -> str:
     if gap is not None:
         first += f' &middot; <span style="color: {GAP}">opening {gap_text(gap)} mm</span>'
     colour = BAD if hits else GOOD
-    return f'<div style="padding: 0 0.8em; color: {colour}">{first}<br><small>{second}</small></div>'
+    return f'<div style="padding: 0 0.8em 0.5em; color: {colour}">{first}<br><small>{second}</small></div>'
 
 
 def list_html(hits: tuple[CollisionHit, ...]) -> str:

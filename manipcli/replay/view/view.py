@@ -52,6 +52,7 @@ class View(LocalServer):
         self, robot: RobotModel, scene: Scene | None = None, *, q: Array | None = None, port: int | None
     ) -> None:
         super().__init__(robot.name, port=port)
+        self._dark = False
         try:
             self._build(robot, scene, configuration(robot) if q is None else q)
             self.viser.on_client_connect(self._came)
@@ -74,6 +75,7 @@ class View(LocalServer):
         with self.viser.atomic():
             self.viser.scene.reset()
             self.viser.gui.reset()
+            self.viser.gui.main_panel.dock_right()
             self._build(robot, scene, start)
         self.joints.go(with_mimics(robot, np.array(kept)))
 
@@ -106,6 +108,7 @@ class View(LocalServer):
         with tabs.add_tab("Poses"):
             self._add_readout(gui)
         self._list = gui.add_html("")
+        self._scene.darken(self._dark)
         self._moved(q)
 
     def _came(self, client: viser.ClientHandle) -> None:
@@ -122,10 +125,11 @@ class View(LocalServer):
         add_layers(gui, self._scene)
         centres = gui.add_checkbox("centres of mass", False, hint="Best with `transparent`; red: of the whole robot.")
         centres.on_update(lambda _: masses.show(centres.value))
-        dark = gui.add_checkbox("dark", False)
+        dark = gui.add_checkbox("dark", self._dark)
         dark.on_update(lambda _: self._darken(dark.value))
 
     def _darken(self, dark: bool) -> None:
+        self._dark = dark
         self.darken(dark)
         self._scene.darken(dark)
 
