@@ -206,7 +206,7 @@ class _Tuner:
         self._refuse_hopeless(tuned)
         raised = [each.joint for each in tuned if each.frequency > self._wish.bandwidth * (1.0 + 1e-9)]
         if raised:
-            self.notes += (f"Gains raised so that a finger reaches its full effort over its travel: {listed(raised)}.",)
+            self.notes += (f"Gains raised so that a finger reaches its full effort over half its travel: {listed(raised)}.",)
         if margin < MARGIN:
             self._check_margin(margin)
         return tuned
@@ -274,14 +274,17 @@ class _Tuner:
         return tuple(tuned)
 
     def _pressing(self, controller: str, joint: str) -> float:
-        """The p gain that gives the full effort of a hand joint over its travel; 0 for others, and if unknown."""
+        """The p gain that gives the full effort of a hand joint over half its travel; 0 for others, and if unknown.
+
+        An object that stops a finger on its way leaves it the rest of the travel to press with.
+        """
         spec, limits = self._file.spec.controllers[controller], self._robot.joint(joint).limits
         hand = CONTROLLERS[spec.type].hand
         if hand is None:
             return 0.0
         effort = min((each for each in (limits.effort, hand(spec).max_effort) if each), default=0.0)
         lower, upper = limits.range
-        return effort / (upper - lower) if 0.0 < upper - lower < np.inf else 0.0
+        return 2.0 * effort / (upper - lower) if 0.0 < upper - lower < np.inf else 0.0
 
     def _step_of(self, joint: str) -> float:
         return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)

@@ -85,9 +85,9 @@ def test_gains_are_those_of_the_formulas(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("bandwidth", "limit", "p"),
-    [(1.0, "", 40.0 / 4.0), (1.0, ", max_effort: 20", 20.0 / 4.0), (4.0, "", INERTIA * (2 * math.pi * 4.0) ** 2)],
+    [(1.0, "", 40.0 / 2.0), (1.0, ", max_effort: 20", 20.0 / 2.0), (5.0, "", INERTIA * (2 * math.pi * 5.0) ** 2)],
 )
-def test_the_joint_of_a_hand_presses_with_its_effort_over_its_travel_at_least(
+def test_the_joint_of_a_hand_presses_with_its_effort_over_half_its_travel_at_least(
     tmp_path: Path, bandwidth: float, limit: str, p: float
 ) -> None:
     robot, controllers = pendulum(tmp_path)
