@@ -206,7 +206,9 @@ class _Tuner:
         self._refuse_hopeless(tuned)
         raised = [each.joint for each in tuned if each.frequency > self._wish.bandwidth * (1.0 + 1e-9)]
         if raised:
-            self.notes += (f"Gains raised so that a finger reaches its full effort over half its travel: {listed(raised)}.",)
+            self.notes += (
+                f"Gains raised so that a finger reaches its full effort over half its travel: {listed(raised)}.",
+            )
         if margin < MARGIN:
             self._check_margin(margin)
         return tuned

@@ -495,7 +495,7 @@ def test_types_that_manipcli_does_not_serve_are_left_out_and_unknown_ones_are_er
     "word",
     [
         "ur_controllers/GPIOController",
-        "ur_controllers/ScaledJointTrajectoryController",
+        "ur_controllers/PassthroughTrajectoryController",
         "robotiq_controllers/RobotiqActivationController",
         "franka_example_controllers/JointImpedanceExampleController",
         "pr2_controllers/Mover",
@@ -533,6 +533,24 @@ def test_the_type_of_a_vendor_is_left_out_with_a_warning_and_its_parameters_are_
 def test_a_slip_in_a_type_of_ros_is_an_error_with_the_right_name(word: str, near: str) -> None:
     (line,) = refused(f"x: {{type: {word}, joints: [a]}}")
     assert line.endswith(f"error[CTRL203]: controller 'x': unknown type '{word}' | did you mean '{near}'?")
+
+
+@pytest.mark.parametrize(
+    ("word", "plain"),
+    [
+        ("ur_controllers/ScaledJointTrajectoryController", "joint_trajectory_controller/JointTrajectoryController"),
+        ("position_controllers/ScaledJointTrajectoryController", "position_controllers/JointTrajectoryController"),
+        ("velocity_controllers/ScaledJointTrajectoryController", "velocity_controllers/JointTrajectoryController"),
+    ],
+)
+def test_a_trajectory_controller_with_a_speed_slider_is_one_at_full_speed(word: str, plain: str) -> None:
+    form = "x: {{type: {}, joints: [a], gains: {{a: {{p: 1}}}}, constraints: {{goal_time: 0.5}}{}}}"
+    scaled, findings = loaded(form.format(word, ", speed_scaling_interface_name: speed_scaling/speed_scaling_factor"))
+    wanted, others = loaded(form.format(plain, ""))
+    assert scaled == wanted
+    assert others == ()
+    (line,) = told(findings)
+    assert "note[CTRL214]: x: ROS parameter 'speed_scaling_interface_name' is not supported" in line
 
 
 def test_what_else_stands_in_such_files_is_left_out() -> None:

@@ -51,11 +51,15 @@ JOINT_TRAJECTORY: Final = Table(
         "pos_vel_controllers/JointTrajectoryController": {"command_interfaces": "position velocity"},
         "pos_vel_acc_controllers/JointTrajectoryController": {"command_interfaces": "position velocity acceleration"},
         "joint_trajectory_controller/JointTrajectoryController": {},
+        # Universal Robots': the same, slowed down by the arm's own speed slider, which is at 100 % here.
+        "ur_controllers/ScaledJointTrajectoryController": {},
+        "position_controllers/ScaledJointTrajectoryController": {"command_interfaces": "position"},
+        "velocity_controllers/ScaledJointTrajectoryController": {"command_interfaces": "velocity"},
     },
     parameters=Block(
         known=_ANY | {"hold_trajectory_duration", "velocity_ff"}
         | {"set_last_command_interface_value_as_state_on_activation"},
-        quiet=_EVERYWHERE | {"action_monitor_rate"},
+        quiet=_EVERYWHERE | {"action_monitor_rate", "speed_scaling_interface_name"},
         renamed={"open_loop_control": "interpolate_from_desired_state"},
         unwritten=frozenset({"open_loop_control"}),
         inner={
@@ -226,17 +230,20 @@ UNSERVED_TYPES: Final = frozenset(
         "motion_primitives_controllers/MotionPrimitivesForwardController",
         "omni_wheel_drive_controller/OmniWheelDriveController",
         "pose_broadcaster/PoseBroadcaster",
-        "position_controllers/ScaledJointTrajectoryController",
         "range_sensor_broadcaster/RangeSensorBroadcaster",
         "state_interfaces_broadcaster/StateInterfacesBroadcaster",
         "tricycle_controller/TricycleController",
         "tricycle_steering_controller/TricycleSteeringController",
-        "velocity_controllers/ScaledJointTrajectoryController",
     }
 )
 """ROS controllers that manipcli does not support: left out with a warning."""
 
-PACKAGES: Final = frozenset(word.partition("/")[0] for word in (*BY_TYPE, *UNSERVED_TYPES)) | {"gripper_controllers"}
+VENDORS: Final = frozenset({"ur_controllers"})
+"""Packages of vendors, of which some types are served."""
+
+PACKAGES: Final = frozenset(word.partition("/")[0] for word in (*BY_TYPE, *UNSERVED_TYPES)) - VENDORS | {
+    "gripper_controllers"
+}
 """ROS's own packages of controllers, whose types are all listed. Any other package is a vendor's."""
 
 MANAGER: Final = Block(
