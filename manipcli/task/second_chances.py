@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.description.packages import Packages
@@ -33,6 +33,9 @@ from manipcli.task.spring_checks import spring_findings
 from manipcli.task.task_files import finder
 from manipcli.task.vary import bind
 from manipcli.task.vocabulary import controllers_spec, robot_spec, task_spec
+
+LEFT_OUT: Final = "CTRL214"
+"""Code of findings about what is left out of a file of ROS."""
 
 T = TypeVar("T")
 
@@ -88,6 +91,10 @@ def every_finding(
             errors.found += compliance_findings(task, robot.file, controllers_file, robot.model)
         varied, wrong = bind(task, robot.file, controllers_file)
         errors.found += (*wrong, *out_of_range(Files(task, robot.file, controllers_file), varied))
+    if errors.found and controllers_file is not None:
+        # A controller that was left out is why no step can use its joints.
+        left_out = (finding for finding in controllers_file.findings if finding.code == LEFT_OUT)
+        errors.found += [finding for finding in left_out if finding.message.startswith("controller '")]
     return errors.refusal(first)
 
 

@@ -170,3 +170,14 @@ def test_an_update_rate_that_does_not_divide_the_control_rate_is_an_error(tmp_pa
     faster = ROS_2.replace("state_interfaces:", "update_rate: 2000\n      state_interfaces:")
     assert "CTRL163" in errors(tmp_path, faster)[0]
     assert errors(tmp_path, text.replace("300", "250")) == []
+
+
+def test_a_controller_of_a_vendor_is_named_where_steps_lack_it(tmp_path: Path) -> None:
+    vendor = ROS_2.replace("joint_trajectory_controller/JointTrajectoryController", "acme_controllers/Mover")
+    with pytest.raises(InvalidInput) as refused:
+        load_task(task_file(tmp_path, vendor), allow_outside=True)
+    told = [(finding.code, finding.severity) for finding in refused.value.findings]
+    assert ("TASK232", "error") in told
+    assert told.count(("CTRL214", "warning")) == 1
+    (left_out,) = (finding for finding in refused.value.findings if finding.code == "CTRL214")
+    assert "'arm_controller': type 'acme_controllers/Mover'" in left_out.message
