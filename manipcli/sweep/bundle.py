@@ -24,6 +24,8 @@ from manipcli.task.load_task import WrittenTask
 from manipcli.task.task_files import MARKS
 
 PACKAGE: Final = "package.xml"
+PYTHON: Final = "__init__.py"
+"""Mark of a Python package, by which meshes of an installed one are named."""
 _LEVELS: Final = 6
 _PACKAGE_URI: Final = "package://"
 _PROGRAM: Final = (".py", ".pyc", ".so", ".pth")
@@ -105,7 +107,7 @@ def bundle_of(written: WrittenTask, opened: list[Path], path: Path) -> Bundle:
             contents[key], files[str(real)] = data, key
     marks = []
     for folder in {folder for file in files for folder in Path(file).parents[:_LEVELS]}:
-        for mark in MARKS:
+        for mark in (*MARKS, PYTHON):
             if (folder / mark).exists() and str(folder / mark) not in files:
                 if mark == PACKAGE:
                     data = (folder / mark).read_bytes()

@@ -56,6 +56,19 @@ def test_a_task_loads_to_the_same_from_its_bundle(tmp_path: Path) -> None:
     assert "vary.simulation.settle.uniform was [0.0, 0.1], is [0.0, 0.2]" in changes(identity(written), identity(other))
 
 
+def test_meshes_of_an_installed_package_have_the_same_names_on_a_worker(tmp_path: Path) -> None:
+    task = tmp_path / "tasks" / "held.yaml"
+    task.parent.mkdir()
+    shutil.copytree(ROOT / "robots" / "panda", tmp_path / "robots" / "panda")
+    shutil.copytree(ROOT / "controllers", tmp_path / "controllers")
+    task.write_text(TASK.replace("arm7_hand3", "panda"))
+    sampling = Sampling(task, Settings())
+    there, packages = bundled(sampling, task).unpack(tmp_path / "worker")
+    loaded = Sampling(there, Settings(package_path=packages)).written
+    assert changes(identity(sampling.written), identity(loaded)) == ""
+    assert any(key.startswith("mesh package://pybullet_data/") for key in identity(loaded))
+
+
 def test_an_absolute_path_cannot_travel(tmp_path: Path) -> None:
     task = tmp_path / "held.yaml"
     task.write_text(TASK.replace("..", str(ROOT)))
