@@ -23,6 +23,7 @@ from typing import Final
 from PIL import Image, ImageDraw
 
 from benchmarks.browser import PROGRAM, Page, started
+from manipcli.cli.app import main as main_of_manipcli
 from manipcli.logs.replay import open_playback
 from manipcli.logs.report import log_page
 from manipcli.pipeline import run_task
@@ -31,6 +32,7 @@ from manipcli.report.html.render_page import render_page
 
 ROOT: Final = Path(__file__).parents[1]
 TASK: Final = ROOT / "examples" / "02_pick_a_block" / "task.yaml"
+SWEPT: Final = ROOT / "tasks" / "push.yaml"
 SIZES: Final = {"desk": (1280, 800), "tablet": (768, 1024), "phone": (360, 740)}
 SCHEMES: Final = ("light", "dark")
 READY: Final = (
@@ -99,6 +101,9 @@ STATES: Final = (
     State("replay in the report", "report", (_shown("#replay"),)),
     State("numbers in the report", "report", (_shown("#grasps"),)),
     State("report of a passed run", "report_passed"),
+    State("sweep", "sweep"),
+    State("plots of the sweep", "sweep", (_shown("#small"),)),
+    State("sample of the sweep", "sweep", ("document.querySelector('#small g').dispatchEvent(new Event('click'))",)),
 )
 
 
@@ -142,8 +147,8 @@ def visit(browser: Page, url: str, state: State, size: tuple[int, int], scheme: 
 
 
 def pages(folder: Path) -> dict[str, str]:
-    """The pages of a run that passes and of one that does not: their URLs."""
-    found = {}
+    """The pages of a run that passes, of one that does not, and of a sweep: their URLs."""
+    found = {"sweep": _sweep(folder)}
     for name, overrides in (("passed", []), ("failed", ["scene.block.friction=0.01"])):
         log = folder / f"{name}.mcap"
         run = run_task(TASK, log=log, overrides=overrides)
@@ -154,6 +159,14 @@ def pages(folder: Path) -> dict[str, str]:
             file.write_text(text, "utf-8")
             found[page] = file.as_uri()
     return found
+
+
+def _sweep(folder: Path) -> str:
+    page = folder / "sweep.html"
+    words = ["--samples", "8", "--html", page, "--folder", folder / "sweep"]
+    if main_of_manipcli(["sweep", str(SWEPT), *map(str, words)]) not in (0, 1):
+        raise SystemExit("the sweep of the states did not run")
+    return page.as_uri()
 
 
 def frame_rates(browser: Page, urls: Sequence[str], *, seconds: float = 3.0, rounds: int = 3) -> list[float]:
