@@ -23,6 +23,7 @@ RUNS: Final = {
 """Logs, by name."""
 PICTURES: Final = {
     "planning_limits": "plan examples/04_own_robot/task.yaml --curves {out}",
+    "planning_paths": "plan tasks/clutter.yaml --picture {out}",
     "contact_forces": "plot {pour} contacts.force -o {out}",
     "control_errors": (
         f"plot {{pour}} {ARM}.error.positions[joint_2],{ARM}.error.positions[joint_4],{ARM}.error.positions[joint_6] "
