@@ -42,7 +42,8 @@ CLOCK: Final = (
     (re.compile(r"\d+(\.\d+)? s real\b"), "0 s real"),
     (re.compile(r"\d+(\.\d+)? x real time"), "0 x real time"),
     (re.compile(r"(::\S+) +\d+\.\d+ s\b"), r"\1 0 s"),
-    (re.compile(r"\bin \d+\.\d+s\b"), "in 0s"),
+    (re.compile(r"\b(passed|failed|invalid|crashed) in \d+(\.\d+)? s\b"), r"\1 in 0 s"),  # of `manipcli test`
+    (re.compile(r"=+ (.*) in \d+\.\d+s =+"), r"\1 in 0 s"),  # of pytest
 )
 """Times that differ from run to run, and what they are compared as."""
 LARGEST_PICTURE: Final = 80_000

@@ -95,6 +95,10 @@ def test_a_failure_is_shown_with_its_exit_status(tmp_path: Path, shown: str) -> 
             "✓ passed   tasks/a.yaml::a       2.08 s  duration: 2.5 s to spare",
             False,
         ),
+        ("✓ 2 passed in 12.6 s, 1 process", "✓ 2 passed in 8 s, 1 process", True),
+        ("✓ 2 passed in 12.6 s, 1 process", "✓ 1 passed in 12.6 s, 1 process", False),
+        ("==== 2 passed in 25.52s ====", "===== 2 passed in 5.52s =====", True),
+        ("==== 2 passed in 25.52s ====", "==== 1 passed in 25.52s ====", False),
     ],
 )
 def test_times_of_the_clock_alone_are_equal(one: str, other: str, equal: bool) -> None:
