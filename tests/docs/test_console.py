@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).parents[2]
 
@@ -192,14 +193,20 @@ def test_write_keeps_the_dots(shown: list[str], written: list[str]) -> None:
 
 
 def test_a_picture_that_a_command_made_is_put_beside_its_page(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "```console\n$ echo drawn > a.png\n```\n\n![A drawing](a.png)\n")
+    draw = "from PIL import Image; Image.linear_gradient('L').save('a.png')"
+    page = page_of(tmp_path, f'```console\n$ python -c "{draw}"\n```\n\n![A drawing](a.png)\n')
     assert console.main([str(page)]) == 0
     assert not (tmp_path / "a.png").exists()
     assert console.main(["--write", str(page)]) == 0
-    assert (tmp_path / "a.png").read_text() == "drawn\n"
+    with Image.open(tmp_path / "a.png") as shown:
+        assert shown.size == (256, 256)
+        ramp = [shown.convert("L").getpixel((128, y)) for y in range(256)]
+    assert max(abs(value - y) for y, value in enumerate(ramp)) <= 4  # two levels of grey share a colour, of 128
 
 
 def test_a_large_picture_is_refused(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "```console\n$ head -c 90000 /dev/zero > a.png\n```\n\n![A drawing](a.png)\n")
-    with pytest.raises(console.PageError, match=r"a\.png has 90000 bytes, more than 80000"):
+    page = page_of(tmp_path, "```console\n$ head -c 90000 /dev/zero > a.webp\n```\n\n![A drawing](a.webp)\n")
+    with pytest.raises(console.PageError, match=r"a\.webp has 90000 bytes, more than 80000"):
+        console.run(page, write=[page])
+    with pytest.raises(console.PageError, match=r"a\.webp has 90000 bytes, more than 80000"):
         console.run(page)
