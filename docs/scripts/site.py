@@ -32,6 +32,7 @@ PARTS: Final = {
 FILES: Final = "files"
 _TEXT: Final = {".yaml": "yaml", ".py": "python", ".xacro": "xml", ".urdf": "xml", ".xml": "xml", ".toml": "toml"}
 WORKER: Final = Path(__file__).with_name("file_worker.js")
+STYLE: Final = Path(__file__).with_name("site.css")
 _SHIM: Final = "https://unpkg.com/iframe-worker/shim"
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 
@@ -98,6 +99,7 @@ def _toml(value: object) -> str:
 def _stage(target: Path) -> None:
     """Copies docs/, and below `files/` what its pages link to outside."""
     shutil.copytree(DOCS, target, ignore=shutil.ignore_patterns("scripts", "__pycache__"))
+    shutil.copy(STYLE, target)
     waiting = [path.relative_to(target) for path in sorted(target.rglob("*.md"))]
     sources = {page: DOCS / page for page in waiting}
     while waiting:

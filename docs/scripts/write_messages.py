@@ -111,12 +111,12 @@ def page() -> str:
     """The whole text."""
     rows, types = [], []
     for topic, kind, meaning, when in _topics():
-        rows.append(f"| `{topic}` | [{kind}](#{_anchor(kind)}) | {meaning} | {when} |")
+        rows.append(f"| `{topic}`<br>[{kind}](#{_anchor(kind)}) | {meaning} | {when} |")
         types.append(kind)
     events = [f"| `{kind}` | {meaning} |" for kind, meaning in EVENTS.items()]
     parts = [
         INTRODUCTION,
-        "| topic | type | what it holds | when |\n|---|---|---|---|",
+        "| topic and type | what it holds | when |\n|---|---|---|",
         *rows,
         "\n## Events\n\n`kind` of `/task/events`; `place` is the place of the step in its file, `file:line:column`.\n",
         "| kind | meaning |\n|---|---|",
