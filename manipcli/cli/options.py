@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from pathlib import Path
@@ -139,6 +140,8 @@ def pose_numbers(word: str) -> tuple[float, ...]:
         except (ValueError, UnitError) as error:
             cause = error.cause if isinstance(error, UnitError) else f"'{part}' is not a number"
             raise InvalidInput([Diagnostic("INIT003", f"'{word}' is not a pose: {cause}", hint=hint)]) from error
+        if not math.isfinite(value):
+            raise InvalidInput([Diagnostic("INIT003", f"'{word}' is not a pose: '{part}' is not finite", hint=hint)])
         found.append(value)
     return tuple(found)
 
