@@ -1,7 +1,7 @@
 """The pages of the documentation that are installed with manipcli, and their addresses in messages.
 
 An address works without a network: `manipcli docs task#vary`. MANIPCLI_DOCS_URL, the address of a built site, turns
-addresses into those of its pages.
+addresses into those of its pages; a value that is not an address has no effect.
 """
 
 from __future__ import annotations
@@ -17,16 +17,22 @@ from manipcli.core.errors import Diagnostic
 
 URL: Final = "MANIPCLI_DOCS_URL"
 _PACKAGE: Final = Path(__file__).parents[1]
+_SITE: Final = re.compile(r"(https?|file)://[!-~]+")
 _FENCE: Final = re.compile(r"^ *(`{3,}|~{3,})[^\n]*\n.*?^ *\1 *$", re.MULTILINE | re.DOTALL)
 _HEADING: Final = re.compile(r"^(#{1,6}) +(.*?)[ #]*$", re.MULTILINE)
 
 
 def doc_pages() -> dict[str, Path]:
-    """The pages by name, part by part: `task`, `how-to/gripper` where two have the name `gripper`; a README.md has the
-    name of its folder. Pages of codes are left out."""
+    """The pages by name, part by part: `task`; where several have the name `live`, that of the reference has it, and
+    the others are `how-to/live`. A README.md has the name of its folder. Pages of codes are left out."""
     paths = {name.removesuffix(".md").removesuffix("/README"): path for name, path in doc_files().items()}
     times = Counter(name.rpartition("/")[2] for name in paths)
-    return {(last if times[last := name.rpartition("/")[2]] == 1 else name): path for name, path in paths.items()}
+
+    def short(name: str) -> str:
+        last = name.rpartition("/")[2]
+        return last if times[last] == 1 or name == f"reference/{last}" else name
+
+    return {short(name): path for name, path in paths.items()}
 
 
 def doc_files() -> dict[str, Path]:
@@ -78,8 +84,8 @@ def address(name: str = "", *, subject: str = "") -> str:
         name: `page` or `page#anchor`.
         subject: what `manipcli docs` also takes for it; "" for the name.
     """
-    base = os.environ.get(URL, "").rstrip("/")
-    if not base:
+    base = _site()
+    if base is None:
         return f"manipcli docs {subject or name}".rstrip()
     page, mark, anchor = name.partition("#")
     path = doc_pages().get(page, _folder() / "index.md")
@@ -89,8 +95,14 @@ def address(name: str = "", *, subject: str = "") -> str:
 
 def code_url(code: str) -> str | None:
     """The page of a code on the site of MANIPCLI_DOCS_URL; None without one."""
-    base = os.environ.get(URL, "").rstrip("/")
-    return f"{base}/reference/codes/{code}.html" if base else None
+    base = _site()
+    return None if base is None else f"{base}/reference/codes/{code}.html"
+
+
+def _site() -> str | None:
+    """The address in MANIPCLI_DOCS_URL without `/` at its end; None without one."""
+    given = os.environ.get(URL, "").strip()
+    return given.rstrip("/") if _SITE.fullmatch(given) else None
 
 
 def more_about(findings: Sequence[Diagnostic]) -> str | None:

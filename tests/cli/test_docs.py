@@ -9,7 +9,7 @@ import pytest
 
 from manipcli.cli.app import COMMANDS, main
 from manipcli.cli.command_help import page_of
-from manipcli.report.doc_pages import URL, doc_pages, section_of
+from manipcli.report.doc_pages import URL, address, code_url, doc_pages, section_of
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "reference"
@@ -26,11 +26,18 @@ def test_a_page(capsys: pytest.CaptureFixture[str]) -> None:
         assert printed(capsys, "docs", name) == (PAGES / "task.md").read_text(encoding="utf-8")
 
 
-def test_a_part_of_a_page_ends_at_the_next_heading_of_its_level(capsys: pytest.CaptureFixture[str]) -> None:
-    text = printed(capsys, "docs", "task#vary")
+@pytest.mark.parametrize("name", ["task#vary", "task.md#vary"])
+def test_a_part_of_a_page_ends_at_the_next_heading_of_its_level(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = printed(capsys, "docs", name)
     assert text.startswith("## vary\n")
     assert "\n## " not in text.removeprefix("## ")
     assert text in (PAGES / "task.md").read_text(encoding="utf-8")
+
+
+def test_of_pages_with_one_name_that_of_the_reference_has_it() -> None:
+    pages = doc_pages()
+    assert pages["live"] == PAGES / "live.md"
+    assert pages["how-to/live"] == ROOT / "docs" / "how-to" / "live.md"
 
 
 def test_a_comment_in_code_is_no_heading() -> None:
@@ -58,6 +65,9 @@ def test_all_pages_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (("tsak",), "there is no page 'tsak'", "did you mean 'task'?"),
         (("plto",), "there is no page 'plto'", "did you mean 'plot'?"),
         (("TASK203",), "there is no page 'TASK203'", "run `manipcli explain TASK203`"),
+        (("task203",), "there is no page 'task203'", "run `manipcli explain TASK203`"),
+        (("ZZZ",), "there is no page 'ZZZ'", "hint: pages: "),
+        (("",), "there is no page ''", "hint: pages: "),
         (("task#varry",), "page 'task' has no heading '#varry'", "did you mean 'vary'?"),
     ],
 )
@@ -76,8 +86,8 @@ def test_the_help_of_a_command_names_a_page_that_there_is(
     assert printed(capsys, *end.removeprefix("Docs: manipcli ").split()).startswith("#")
     monkeypatch.setenv(URL, f"{SITE}/")
     page, _, anchor = page_of(command).partition("#")
-    address = f"{SITE}/reference/{page}.html{f'#{anchor}' if anchor else ''}"
-    assert printed(capsys, *command.split(), "--help").splitlines()[-1].strip() == f"Docs: {address}"
+    url = f"{SITE}/reference/{page}.html{f'#{anchor}' if anchor else ''}"
+    assert printed(capsys, *command.split(), "--help").splitlines()[-1].strip() == f"Docs: {url}"
 
 
 def test_findings_end_with_where_a_code_is_explained(
@@ -97,6 +107,12 @@ def test_findings_end_with_where_a_code_is_explained(
     assert f"more about a code: {SITE}/reference/codes/TASK231.html\n" in capsys.readouterr().out
     assert main(["check", str(task), "--format", "json"]) == 1
     assert SITE not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("value", [" ", "/", "site", "javascript:alert(1)", "https://a b", "https://a\nb", "https://"])
+def test_a_value_that_is_no_address_has_no_effect(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(URL, value)
+    assert (code_url("TASK231"), address("task#vary")) == (None, "manipcli docs task#vary")
 
 
 def test_wrong_usage_has_no_such_line(capsys: pytest.CaptureFixture[str]) -> None:

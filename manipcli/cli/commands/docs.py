@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import re
+from typing import Annotated, Final
 
 import typer
 
 from manipcli.cli import console
 from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
+
+_CODE: Final = re.compile(r"[A-Z]+[0-9]{3}")
 
 
 def docs(
@@ -44,13 +47,14 @@ def _text(wanted: str) -> str:
     from manipcli.report.doc_pages import anchors_of, doc_pages, section_of
 
     pages = doc_pages()
-    name, _, anchor = wanted.removesuffix(".md").partition("#")
+    name, _, anchor = wanted.partition("#")
+    name = name.removesuffix(".md")
     if name not in pages and wanted in EXIT_CODES:
         name, _, anchor = page_of(wanted).partition("#")
     if name not in pages:
-        hint = did_you_mean(wanted, [*pages, *EXIT_CODES], kind="pages")
-        if hint is None or wanted.upper() == wanted:
-            hint = f"a code: run `manipcli explain {wanted}`"
+        hint = did_you_mean(name, [*pages, *EXIT_CODES], kind="pages")
+        if _CODE.fullmatch(name.upper()):
+            hint = f"a code: run `manipcli explain {name.upper()}`"
         raise InvalidInput([Diagnostic("USE204", f"there is no page '{wanted}'", hint=hint)])
     text = pages[name].read_text(encoding="utf-8").rstrip()
     if not anchor:
