@@ -96,7 +96,7 @@ def test_a_hand_alone_opens_and_closes(folder: Path) -> None:
         (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "0 0 1 cm"], "INIT003", "1 value"),
         (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "0, 0, 1 kg"], "INIT003", "'1 kg' is a mass"),
         (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "1e400, 0, 0"], "INIT003", "not finite"),
-        (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "0, 0, 1e999 mm"], "INIT003", "exceeds the largest number"),
+        (["--robot", "bare.urdf", "--hand", "hand.urdf", "--hand-pose", "0, 0, 1e999 mm"], "INIT003", "largest number"),
     ],
 )
 def test_bad_input_is_named_and_nothing_is_written(
