@@ -33,7 +33,7 @@ Every command has `-v`, `--verbose` (say more on stderr), `-q`, `--quiet` (print
 | `MANIPCLI_BOUNDS=seconds=60` | Limits of size and time for descriptions. |
 | `MANIPCLI_URL` | Address of the server for `topic`, `service`, `action` and `param`, instead of `--url`. |
 | `MANIPCLI_NO_DEFAULTS=1` | Read no `manipcli.toml`. |
-| `MANIPCLI_DOCS_URL` | Address of a built site of these pages; then named by help and findings: `http`, `https` or `file`. |
+| `MANIPCLI_DOCS_URL` | Address (`http`, `https`, `file`) of a built site; help and findings then name its pages. |
 | `MANIPCLI_KERNELS=off` | Run the control tick in Python instead of compiled code; results are the same. |
 | `MANIPCLI_DEBUG=1` | Print the traceback of an error. |
 | `NO_COLOR`, `FORCE_COLOR` | Never, or always, colour the output. |
