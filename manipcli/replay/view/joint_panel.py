@@ -104,7 +104,7 @@ def _grouped(robot: RobotModel) -> Iterator[tuple[str, tuple[Joint, ...]]]:
         yield f"{'other joints' if robot.groups else 'joints'} [{units_of(others)}]", others
 
 
-def pose_text(robot: RobotModel, q: Array) -> str:
+def configuration_text(robot: RobotModel, q: Array) -> str:
     """A configuration as YAML for `poses:` of a robot file: a list per group, or by joint name without groups."""
     joints = robot.moving_joints
     value = {joint.name: _number(joint, float(number)) for joint, number in zip(joints, q, strict=True)}

@@ -10,15 +10,14 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.model.configuration import configuration, with_mimics
 from manipcli.model.hand.tool_hand import ToolHand, tool_hand
-from manipcli.model.hand.words import opening_text
-from manipcli.model.hand.words import pose_text as millimetres_and_degrees
+from manipcli.model.hand.words import opening_text, pose_text
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.render.drawing import draw, floors_of
 from manipcli.render.placing import Placing
 from manipcli.replay.view.camera_panel import CameraPanel
 from manipcli.replay.view.collisions import Collisions, list_html, status_html
-from manipcli.replay.view.joint_panel import JointPanel, pose_text
+from manipcli.replay.view.joint_panel import JointPanel, configuration_text
 from manipcli.replay.view.layer_panel import add_layers
 from manipcli.replay.view.masses import Masses
 from manipcli.replay.view.tool_marks import ToolMarks, tool_pose_text
@@ -160,7 +159,7 @@ class View(LocalServer):
                 self._marks.place(q)
             self._status.content = status_html(hits, gap)
             self._list.content = list_html(hits)
-            self._joint_text.value = pose_text(self.robot, q)  # type: ignore[misc]  # viser's setter hides from mypy
+            self._joint_text.value = configuration_text(self.robot, q)  # type: ignore[misc]  # viser's setter hides from mypy
             if self._tool is not None:
                 X_WT = self._kinematics.forward(q, self._tool.link) @ self._tool.X_LT
                 self._tool_text.value = tool_pose_text(X_WT)  # type: ignore[misc]
@@ -169,7 +168,7 @@ class View(LocalServer):
 def tool_html(tool: Tool, hand: ToolHand | None, *, stated: bool) -> str:
     """The tool frame and the opening of the hand, for the panel."""
     lines = [
-        f"<b>tool</b> in link '{escape(tool.link)}': {millimetres_and_degrees(tool.X_LT)}",
+        f"<b>tool</b> in link '{escape(tool.link)}': {pose_text(tool.X_LT)}",
         "+z is the approach direction" + ("" if stated else "; measured on the hand, the robot file states none"),
     ]
     if hand is not None:

@@ -18,7 +18,7 @@ from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.replay.camera import FIELD, VIEWS
 from manipcli.replay.view.camera_panel import NARROW
-from manipcli.replay.view.joint_panel import pose_text
+from manipcli.replay.view.joint_panel import configuration_text
 from manipcli.replay.view.tool_marks import gap_line
 from manipcli.replay.view.view import View
 from manipcli.replay.view.viser_scene import MARKED
@@ -188,8 +188,8 @@ def test_a_changed_robot_keeps_the_positions_of_its_joints(tmp_path: Path) -> No
 def test_a_printed_configuration_is_within_the_limits(page: View, limit: float) -> None:
     joint = replace(page.robot.joints[0], limits=JointLimits(lower=limit, upper=limit))
     robot = replace(page.robot, joints=(joint, *page.robot.joints[1:]))
-    number = yaml.safe_load(pose_text(robot, frozen([limit, *np.zeros(7)])))["j_l1"]
+    number = yaml.safe_load(configuration_text(robot, frozen([limit, *np.zeros(7)])))["j_l1"]
     assert number == pytest.approx(limit, abs=1e-5)
     upper = replace(joint, limits=JointLimits(lower=limit - 1.0, upper=limit))
     robot = replace(page.robot, joints=(upper, *page.robot.joints[1:]))
-    assert yaml.safe_load(pose_text(robot, frozen([limit, *np.zeros(7)])))["j_l1"] <= limit
+    assert yaml.safe_load(configuration_text(robot, frozen([limit, *np.zeros(7)])))["j_l1"] <= limit

@@ -18,7 +18,7 @@ from websockets.typing import Origin, Subprotocol
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.description.elements import Joint, JointLimits
-from manipcli.replay.view.joint_panel import pose_text
+from manipcli.replay.view.joint_panel import configuration_text
 from manipcli.replay.view.joint_slider import slider_range
 from manipcli.replay.view.view import View
 from manipcli.task.load_view import load_sight
@@ -154,4 +154,4 @@ def test_a_slider_goes_from_limit_to_limit(
 
 
 def test_the_posture_is_told_as_a_robot_file_has_it(page: View) -> None:
-    assert pose_text(page.robot, frozen([0.04, 0.42])) == "drive: 0.04"
+    assert configuration_text(page.robot, frozen([0.04, 0.42])) == "drive: 0.04"
