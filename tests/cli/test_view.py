@@ -6,12 +6,20 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 from urllib.request import urlopen
 
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.cli.commands.view import _follow
+from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError
+from manipcli.core.opened_files import opened_by
+from manipcli.pipeline import Sight, load_sight
+from manipcli.replay.view.view import View
 
 ROOT = Path(__file__).parents[2]
 LINK = '<robot name="one"><link name="base"><visual><geometry><box size="1 1 1"/></geometry></visual></link></robot>'
@@ -102,3 +110,36 @@ def test_a_changed_file_is_shown_and_one_with_errors_is_reported(tmp_path: Path)
     assert process.returncode == 0
     assert "error" not in told
     assert "Traceback" not in told
+
+
+def test_a_change_is_given_to_the_page_and_an_error_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "one.urdf"
+    path.write_text(LINK)
+    sight, opened = opened_by(lambda: load_sight(path))
+    shown: list[object] = []
+    notes: list[str] = []
+    page = SimpleNamespace(
+        replace=lambda robot, scene, q: shown.append(robot), notify=lambda title, text: notes.append(text)
+    )
+    answers: list[Sight | ManipcliError] = [sight, InvalidInput([Diagnostic("URDF080", "the description has no link")])]
+
+    def load() -> Sight:
+        answer = answers.pop(0)
+        if isinstance(answer, ManipcliError):
+            raise answer
+        return answer
+
+    def two_changes(show: Callable[[tuple[Path, ...]], object], ignored: object) -> None:
+        show(())  # nothing changed since it was loaded
+        assert shown == []
+        show((path,))
+        show((path,))
+
+    monkeypatch.setattr("manipcli.cli.commands.view.watch", two_changes)
+    _follow(cast(View, page), load, path, opened)
+    assert shown == [sight.robot]
+    assert len(notes) == 1
+    assert "no link" in notes[0]
+    assert "manipcli explain URDF080" in capsys.readouterr().err

@@ -89,8 +89,7 @@ def _follow(page: View, load: Callable[[], Sight], path: Path, opened: OpenedFil
                 sight = load()
                 page.replace(sight.robot, sight.scene, q=sight.q)
             except ManipcliError as error:
-                for finding in error.findings:
-                    console.error(text.describe(finding))
+                console.error(text.render_errors(error.findings))
                 page.notify("not shown", str(error))
             except Exception as error:  # noqa: BLE001 (a file that is being written must not end the page)
                 console.error(f"✗ not shown: {type(error).__name__}: {error}")
