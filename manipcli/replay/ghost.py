@@ -1,8 +1,9 @@
-"""Ghosts of a replay: other runs of the same robot and scene, drawn translucent over the first run."""
+"""Ghosts of a replay: other runs of the same robot and scene, or its plan, drawn translucent over the run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,17 +13,21 @@ from manipcli.replay.playback import Playback
 
 @dataclass(frozen=True, slots=True)
 class Ghost:
-    """Another run at the T times of a playback.
+    """Another run, or the plan, at the T times of a playback.
 
     Attributes:
         name: shown at its switch.
         position: (T, n) joint positions.
         body: (T, m, 7) positions [m] and quaternions (x, y, z, w) of the movable bodies.
+        kind: what it is; the plan has its own colour.
+        visible: starts and ends [s] between which it is drawn; None: always.
     """
 
     name: str
     position: Array
     body: Array
+    kind: Literal["run", "planned"] = "run"
+    visible: tuple[tuple[float, float], ...] | None = None
 
 
 def ghost_of(name: str, run: Playback, shown: Playback) -> Ghost:

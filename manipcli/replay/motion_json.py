@@ -38,7 +38,13 @@ def motion_json(playback: Playback, ghosts: Sequence[Ghost], pack: Pack) -> Json
         "path": pack.add(path[rows], "f") if len(rows) > 1 and len(path) else None,
         "route": pack.add(path[_route(path, rows)], "f") if len(rows) > 1 and len(path) else None,
         "ghosts": [
-            {"name": one.name, "position": pack.add(one.position[rows], "f"), "body": pack.add(one.body[rows], "f")}
+            {
+                "name": one.name,
+                "kind": one.kind,
+                "visible": one.visible,
+                "position": pack.add(one.position[rows], "f"),
+                "body": pack.add(one.body[rows], "f"),
+            }
             for one in ghosts
         ],
     }

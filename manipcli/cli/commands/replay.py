@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -18,6 +19,7 @@ from manipcli.core.text import listed
 
 if TYPE_CHECKING:
     from manipcli.cli.pictures import Pictures
+    from manipcli.replay.ghost import Ghost
     from manipcli.replay.playback import Playback
 
 
@@ -78,6 +80,10 @@ def replay(
         float | None,
         typer.Option("--speed", metavar="X", help="Seconds of the run per second of a video [default: 1]."),
     ] = None,
+    planned: Annotated[
+        bool,
+        typer.Option("--planned", help="Plan the task again, and draw the planned robot on the page, too."),
+    ] = False,
     robot: Annotated[
         str | None,
         typer.Option("--robot", metavar="NAMESPACE", help="Show only this robot of a log with several."),
@@ -108,6 +114,7 @@ def replay(
     shows = (
         *files,
         *drawn,
+        ("--planned", planned or None),
         ("--robot", robot),
         ("--port", port),
         ("--open", open_ or None),
@@ -116,7 +123,7 @@ def replay(
     verifies = (("--allow-different", allow_different or None), ("--format json", format_ == "json" or None))
     _refuse(shows if verify else verifies, verify=verify)
     if rerun:
-        _check_rerun((("--port", port), ("--open", open_ or None)))
+        _check_rerun((("--planned", planned or None), ("--port", port), ("--open", open_ or None)))
     with Interrupts() as interrupts:
         if verify:
             from manipcli.cli.commands.verify import verify as verified
@@ -137,14 +144,13 @@ def replay(
         pictures = Pictures(
             picture=picture, at=at, sheet=sheet, video=video, size=size, view=view, fps=fps, speed=speed, forces=forces
         )
-        playback = open_playback(
-            log,
-            rate=pictures.rate,
-            space=None if robot is None else f"/{robot.strip('/')}",
-            package_path=tuple(package_path or ()),
-            allow_outside=allow_outside,
-        )
-        _show(log, playback, pictures, html, rerun=rerun, port=port, open_=open_)
+        if planned and pictures.wanted and html is None:
+            raise InvalidInput([Diagnostic("USE062", "--planned has no effect without --html", hint="add --html")])
+        where: Where = {"package_path": tuple(package_path or ()), "allow_outside": allow_outside}
+        space = None if robot is None else f"/{robot.strip('/')}"
+        playback = open_playback(log, rate=pictures.rate, space=space, **where)
+        playback, ghosts = _with_plan(log, playback, where) if planned else (playback, ())
+        _show(log, playback, ghosts, pictures, html, rerun=rerun, port=port, open_=open_)
     return ExitCode.PASSED
 
 
@@ -176,8 +182,31 @@ def _check_rerun(page: Sequence[tuple[str, object]]) -> None:
     check_display()
 
 
+class Where(TypedDict):
+    """Where meshes are searched."""
+
+    package_path: tuple[Path, ...]
+    allow_outside: bool
+
+
+def _with_plan(log: Path, playback: Playback, where: Where) -> tuple[Playback, tuple[Ghost, ...]]:
+    """The playback with notes about its plan, and the planned ghost if there is one."""
+    from manipcli.logs.planned_ghost import open_planned_ghost
+
+    ghost, notes = open_planned_ghost(log, playback, **where)
+    return replace(playback, notes=(*playback.notes, *notes)), () if ghost is None else (ghost,)
+
+
 def _show(
-    log: Path, playback: Playback, pictures: Pictures, html: Path | None, *, rerun: bool, port: int | None, open_: bool
+    log: Path,
+    playback: Playback,
+    ghosts: Sequence[Ghost],
+    pictures: Pictures,
+    html: Path | None,
+    *,
+    rerun: bool,
+    port: int | None,
+    open_: bool,
 ) -> None:
     """Prints what is missing and writes the requested files; without any, serves the page until Ctrl-C."""
     if playback.lost is not None:
@@ -188,7 +217,7 @@ def _show(
     if pages:
         from manipcli.replay.player import player_page
 
-        page = player_page(playback)
+        page = player_page(playback, ghosts=ghosts)
     if html is not None:
         from manipcli.core.whole_file import write_whole
 

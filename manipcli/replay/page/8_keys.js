@@ -65,7 +65,7 @@ async function begin() {
   measured = array(run.position);
   wanted = run.reference ? array(run.reference) : null;
   bodies = array(run.body);
-  ghosts = run.ghosts.map(({ name, position, body }) => ({ name, position: array(position), body: array(body) }));
+  ghosts = run.ghosts.map((ghost, k) => ({ ...ghost, position: array(ghost.position), body: array(ghost.body), ...ghostLook(ghost, k) }));
   if (run.pushes) [pushFirst, pushes, pushPair] = ["first", "rows", "pair"].map((name) => array(run.pushes[name]));
   if (run.pushes) pushTimes = array(run.pushes.times);
   for (const table of run.curves) {

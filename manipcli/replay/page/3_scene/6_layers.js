@@ -34,11 +34,11 @@ function buildLayers() {
     }
     return groups.get(name);
   };
-  // A switch for each other run, in its colour.
-  ghosts.forEach((ghost, k) => {
-    shows[`run-${k}`] = true;
-    switches.push(["ghosts", `run-${k}`, ghost.name, "another run", () => true, `rgb(${GHOSTS[k % GHOSTS.length].slice(0, 3).map((c) => Math.round(255 * c)).join(" ")})`]);
-  });
+  // A switch for each other run and for the plan, in its colour.
+  for (const { key, name, title, colour } of ghosts) {
+    shows[key] = true;
+    switches.push(["ghosts", key, name, title, () => true, `rgb(${colour.slice(0, 3).map((c) => Math.round(255 * c)).join(" ")})`]);
+  }
   for (const [name, key, text, title, there, colour] of switches) {
     if (!there()) continue;
     const box = choice(group(name), text, shows[key], (on) => { shows[key] = on; refresh(); });

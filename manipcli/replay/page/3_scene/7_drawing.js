@@ -1,11 +1,20 @@
 // Rendering of the scene at a time.
 
-// Reference, and other runs.
+// Other runs, the plan, and the reference.
 const GHOSTS = [[0.93, 0.42, 0.05, 0.42], [0.13, 0.6, 0.33, 0.42], [0.6, 0.2, 0.7, 0.42]];
+const PLANNED = [0.04, 0.62, 0.45, 0.42];
 const GHOST = [0.16, 0.45, 0.95, 0.38], PATH = [0.93, 0.42, 0.05], EDGES = [0.1, 0.14, 0.2, 1];
 const INERTIA = [0.2, 0.45, 0.9, 0.4], MASS = [0.85, 0.1, 0.75, 1], NORMAL = [0.86, 0.1, 0.2, 1], FRICTION = [0.95, 0.6, 0.05, 1];
 // Called at the end of each drawing with the matrix of the camera.
 const overlays = [];
+
+// Switch and colour of the k-th ghost.
+const ghostLook = ({ kind }, k) => kind === "planned"
+  ? { key: "planned", title: "as planned before the run; each step begins when it began in the run", colour: PLANNED }
+  : { key: `run-${k}`, title: "another run", colour: GHOSTS[k % GHOSTS.length] };
+
+// Whether there is a ghost at t: the plan has none during steps that were not planned.
+const ghostAt = ({ visible }, t) => !visible || visible.some(([from, to]) => from <= t && t <= to);
 
 function solid(mesh, model, colour, wire = false) {
   gl.uniform4fv(programs.solid.colour, colour);
@@ -202,10 +211,8 @@ function draw(t) {
   drawClear(last, back);
   if (shows.ghost && wanted) translucent(poses(wanted, t), run.drawables.filter((drawable) => drawable.robot), GHOST);
   const moving = (drawable) => drawable.robot || run.frames[drawable.frame].body !== undefined;
-  ghosts.forEach((ghost, k) => {
-    if (!shows[`run-${k}`]) return;
-    translucent(poses(ghost.position, t, ghost.body), run.drawables.filter(moving), GHOSTS[k % GHOSTS.length]);
-  });
+  for (const ghost of ghosts)
+    if (shows[ghost.key] && ghostAt(ghost, t)) translucent(poses(ghost.position, t, ghost.body), run.drawables.filter(moving), ghost.colour);
   if (path && path.count > 0) drawPath(all, t, ratio, [wide, high]);
   gl.depthMask(true);
   for (const overlay of overlays) overlay(all);
