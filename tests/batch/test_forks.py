@@ -106,6 +106,16 @@ def test_every_end_of_a_child_costs_one_run_and_is_reported_as_of_a_new_process(
     assert not any(report.notes for report in reports)
 
 
+def test_a_child_ends_with_its_exit_functions_and_its_whole_output(tmp_path: Path) -> None:
+    ended = tmp_path / "ended"
+    leaves = f"import atexit, pathlib\natexit.register(pathlib.Path({str(ended)!r}).touch)\nprint('said')"
+    report = run(jobs(tmp_path, leaves, "end()"))[0]
+    assert len(pids(tmp_path)) == 2 + 1  # forked
+    assert report.output is not None
+    assert Path(report.output).read_text() == "said\n"
+    assert ended.exists()
+
+
 def test_a_child_has_its_own_session_and_output_and_no_files_of_others(tmp_path: Path) -> None:
     stays = f"while not os.path.exists({str(tmp_path / 'done')!r}): time.sleep(0.01)\nend()"
     told = (
