@@ -93,7 +93,8 @@ def _triangle(image: Image, corners: Sequence[Array], colour: Rgb) -> None:
         return
     x, y = np.arange(left, right) + 0.5, np.arange(top, bottom)[:, None] + 0.5
     inside = np.full((bottom - top, right - left), np.inf)
-    area = np.cross(points[1] - points[0], points[2] - points[0])
+    (ax, ay), (bx, by) = points[1] - points[0], points[2] - points[0]
+    area = ax * by - ay * bx
     for a, b in ((0, 1), (1, 2), (2, 0)):
         edge = points[b] - points[a]
         signed = (edge[0] * (y - points[a][1]) - edge[1] * (x - points[a][0])) / max(float(np.hypot(*edge)), 1e-9)

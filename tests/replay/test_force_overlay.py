@@ -51,6 +51,15 @@ def test_arrows_are_along_the_projected_forces() -> None:
         assert along(before, colour, start, tip) < 0.1
 
 
+def test_a_pair_has_its_force_as_a_number_at_the_tip_of_its_arrow() -> None:
+    frames = Frames(pressed(), size=LARGE, captions=False, forces=True)
+    bare = Frames(pressed(), size=LARGE, captions=False, forces=False)
+    x, y = (round(value) for value in seen_at(frames.camera, (0.0, -0.15, -0.05 + LONGEST), LARGE))
+    beside = slice(y - 6, y + 7), slice(x + 8, x + 40)
+    dark, before = (np.count_nonzero(each.at(0.5)[beside].max(axis=2) < 90) for each in (frames, bare))
+    assert dark > before + 20
+
+
 def test_forces_are_drawn_in_failed_steps_unless_asked_for() -> None:
     playback = pressed()
     images = {
