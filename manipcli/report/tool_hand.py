@@ -17,7 +17,8 @@ def render_text(tool: Tool | None, hand: ToolHand | None) -> str:
     shown = hand.tool if hand is not None else tool
     if shown is None:
         return ""
-    proposed = "" if tool is not None else "; measured on the hand, not stated: `tool:` of a robot file states it"
+    origin = "measured on the hand" if hand is not None and hand.measured else "guessed for a hand without shapes"
+    proposed = "" if tool is not None else f"; {origin}, not stated: `tool:` of a robot file states it"
     rows["tool"] = f"frame in link '{shown.link}', {pose_text(shown.X_LT)}; its +z is the approach direction{proposed}"
     if hand is not None:
         name, opened = hand.widest_pose()

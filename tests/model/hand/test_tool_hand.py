@@ -105,7 +105,8 @@ def test_without_a_stated_tool_the_frame_is_that_of_init(robot: RobotModel) -> N
     assert not hand.stated
     assert (hand.tool.link, hand.along_y, hand.out_along_z) == ("p", True, True)
     assert hand.tool.X_LT.p == pytest.approx([0.02 + small.FINGER - 0.012, 0.0, 0.0], abs=1e-3)
-    assert "not stated" in render_text(None, hand)
+    assert "measured on the hand, not stated" in render_text(None, hand)
+    assert "guessed for a hand without shapes" in render_text(None, replace(hand, measured=False))
 
 
 def test_of_two_hands_that_of_the_tool_counts(tmp_path: Path) -> None:
