@@ -46,6 +46,12 @@ CLOCK: Final = (
     (re.compile(r"=+ (.*) in \d+\.\d+s =+"), r"\1 in 0 s"),  # of pytest
 )
 """Times that differ from run to run, and what they are compared as."""
+ELSEWHERE: Final = 0.25
+"""Share by which numbers of a simulation differ on a processor that rounds differently."""
+NOISE: Final = 0.02
+"""Numbers below are equal where numbers may differ: angles and distances of things at rest."""
+COUNTS: Final = 100
+"""Whole numbers below are counts, of steps or samples."""
 LARGEST_PICTURE: Final = 80_000
 """[bytes]"""
 
@@ -53,6 +59,7 @@ _FENCE = re.compile(r"^( *)(`{3,})([\w+-]*)(.*)$")
 _TITLE = re.compile(r"""\btitle=(["'])(.+?)\1""")
 _DIRECTIVE = re.compile(r"<!-- console: (after|with) (.+?) -->")
 _PICTURE = re.compile(r"!\[[^\]]*\]\(([^)#?:]+)\)")
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")
 _STATUS = re.compile(r"^\[exit status (\d+)\]$")
 
 
@@ -85,9 +92,9 @@ class Ran:
     command: Command
     printed: tuple[str, ...]
 
-    @property
-    def agrees(self) -> bool:
-        return matches(self.command.shown, self.printed)
+    def agrees(self, share: float = 0.0) -> bool:
+        """Whether the page shows this; `share`: see `matches`."""
+        return matches(self.command.shown, self.printed, share=share)
 
 
 class PageError(Exception):
@@ -128,17 +135,44 @@ def commands(fence: Fence) -> list[Command]:
         while fence.lines[last].endswith("\\") and last + 1 < end:
             last += 1
         text = "\n".join([fence.lines[start][2:], *fence.lines[start + 1 : last + 1]])
-        first = fence.first + last + 1
-        found.append(Command(text, fence.lines[last + 1 : end], first, fence.first + end, fence.indent))
+        span = fence.first + last + 1, fence.first + end
+        found.append(Command(text, fence.lines[last + 1 : end], *span, fence.indent))
     return found
 
 
-def matches(shown: Sequence[str], printed: Sequence[str]) -> bool:
-    """Whether a page shows what was printed: `...` is any lines but an exit status, times are equal."""
+def matches(shown: Sequence[str], printed: Sequence[str], *, share: float = 0.0) -> bool:
+    """Whether a page shows what was printed: `...` is any lines but an exit status, times are equal.
+
+    Args:
+        shown, printed: lines.
+        share: by which numbers may differ, of the larger one. Spaces may then differ, too.
+    """
     if _status(shown) != _status(printed):
         return False
-    pattern = "".join(r"(?:.*\n)*?" if line == "..." else re.escape(_timeless(line)) + r"\n" for line in shown)
-    return re.fullmatch(pattern, "".join(f"{_timeless(line)}\n" for line in printed)) is not None
+    ends = {0}  # how many of the printed lines the shown ones so far can be
+    for line in shown:
+        if line == "...":
+            ends = {*range(min(ends, default=len(printed) + 1), len(printed) + 1)}
+        else:
+            ends = {end + 1 for end in ends if end < len(printed) and _same(line, printed[end], share)}
+    return len(printed) in ends
+
+
+def _same(one: str, other: str, share: float) -> bool:
+    one, other = _timeless(one), _timeless(other)
+    if one == other or not share:
+        return one == other
+    words = [" ".join(_NUMBER.sub(" # ", text).split()) for text in (one, other)]
+    numbers = zip(_NUMBER.findall(one), _NUMBER.findall(other), strict=False)
+    return words[0] == words[1] and all(_close(a, b, share) for a, b in numbers)
+
+
+def _close(one: str, other: str, share: float) -> bool:
+    """Whether two numbers may be those of two processors; counts are equal."""
+    larger = max(abs(float(one)), abs(float(other)))
+    if larger < COUNTS and "." not in one + other:
+        return one == other
+    return larger < NOISE or abs(float(one) - float(other)) <= share * larger
 
 
 def _timeless(line: str) -> str:
@@ -329,8 +363,8 @@ def _rewritten(text: str, ran: Sequence[Ran]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def differences(page: Path, ran: Sequence[Ran]) -> list[str]:
-    """One text for each command whose output is not the one that the page shows."""
+def differences(page: Path, ran: Sequence[Ran], *, share: float = 0.0) -> list[str]:
+    """One text for each command whose output is not the one that the page shows; `share`: see `matches`."""
     return [
         "\n".join(
             [
@@ -339,7 +373,7 @@ def differences(page: Path, ran: Sequence[Ran]) -> list[str]:
             ]
         )
         for one in ran
-        if not one.agrees
+        if not one.agrees(share)
     ]
 
 

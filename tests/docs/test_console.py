@@ -63,6 +63,26 @@ def test_a_wrong_output_fails_at_its_line(tmp_path: Path, shown: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("shown", "printed", "equal"),
+    [
+        ("passes with 9.9 mm to spare", "passes with 10.4 mm to spare", True),
+        ("passes with 9.9 mm to spare", "passes with 14.1 mm to spare", False),
+        ("passes with 9.9 mm to spare", "fails with 9.9 mm to spare", False),
+        ("near   9.9 mm  2 s", "near  10.1 mm  2 s", True),  # a table whose columns are wider
+        ("tilted by 0.0012 deg", "tilted by 0.0021 deg", True),
+        ("-0.5 m", "0.5 m", False),
+        ("all 4 steps done", "all 5 steps done", False),
+        ("6 of 5948 ticks", "6 of 6100 ticks", True),
+        ("a step pick_1", "a step pick_2", False),
+    ],
+)
+def test_elsewhere_numbers_that_are_measured_may_differ_by_a_share(shown: str, printed: str, equal: bool) -> None:
+    assert console.matches([shown], [printed], share=console.ELSEWHERE) is equal
+    assert console.matches([shown], [printed]) is False
+    assert console.matches(["...", shown, "..."], ["one", printed, "two"], share=console.ELSEWHERE) is equal
+
+
+@pytest.mark.parametrize(
     "shown", ["...", "one\n...", "...\nfour", "one\n...\nthree\n...", "one\n...\ntwo\nthree\nfour"]
 )
 def test_dots_are_any_lines(tmp_path: Path, shown: str) -> None:

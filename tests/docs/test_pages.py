@@ -46,11 +46,15 @@ def _runnable() -> list[Path]:
 
 
 @pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize("page", _runnable(), ids=_name)
 def test_the_commands_of_a_page_print_what_it_shows(page: Path) -> None:
+    """Measured numbers within a share: another processor rounds differently, and contact amplifies it."""
     ran = console.run(page)
     told = f"run `python docs/scripts/console.py --write {_name(page)}` and review the difference"
-    found = [text for each, commands in ran.items() for text in console.differences(each, commands)]
+    found = [
+        text for each, commands in ran.items() for text in console.differences(each, commands, share=console.ELSEWHERE)
+    ]
     assert found == [], "\n\n".join([told, *found])
 
 
