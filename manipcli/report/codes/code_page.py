@@ -92,7 +92,7 @@ def similar(code: str) -> tuple[str, ...]:
 def render_text(page: CodePage) -> str:
     """The page for a terminal."""
     blocks = [f"{page.code}: {page.title}", page.what, page.why]
-    for title, example in (("This gets it:", page.bad), ("This does not:", page.good)):
+    for title, example in ((f"This raises {page.code}:", page.bad), ("This is right:", page.good)):
         if example:
             blocks.append(_indented(title, example))
     blocks += [_indented(f"with {name}:", text.strip()) for name, text in page.files.items()]
@@ -106,7 +106,7 @@ def _indented(title: str, text: str) -> str:
 def render_markdown(page: CodePage) -> str:
     """The page for the docs."""
     blocks = [f"# {page.code}: {page.title}", page.what, page.why]
-    for title, example in (("This gets it:", page.bad), ("This does not:", page.good)):
+    for title, example in ((f"This raises {page.code}:", page.bad), ("This is right:", page.good)):
         if example:
             blocks.append(f"{title}\n\n```{_LANGUAGE[page.kind]}\n{example}\n```")
     for name, text in page.files.items():
