@@ -224,12 +224,17 @@ def test_a_number_of_yaml_that_has_no_value_is_told_where_it_stands(tmp_path: Pa
     assert "sqrt(-1)" in finding.message
 
 
-def test_yaml_that_grows_by_merging_is_refused_at_once(tmp_path: Path) -> None:
+def test_yaml_that_grows_by_merging_is_refused_or_merged_at_once(tmp_path: Path) -> None:
+    """PyYAML merges each key once from 6.0.4 on; before, each line here is ten times the one above."""
     (tmp_path / "d.yaml").write_text(
         "a0: &a0 {x: 1}\n" + "".join(f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 10)}]}}\n" for k in range(1, 12))
     )
-    (finding,) = refused(tmp_path, "<link name=\"${len(load_yaml('d.yaml'))}\"/>").findings
-    assert finding.code == "XACRO004"
+    body = "<link name=\"${load_yaml('d.yaml')['a11']['x']}\"/>"
+    if tuple(map(int, yaml.__version__.split(".")[:3])) < (6, 0, 4):
+        (finding,) = refused(tmp_path, body).findings
+        assert finding.code == "XACRO004"
+    else:
+        assert names(expand(tmp_path, body)) == ["1"]
     (tmp_path / "d.yaml").write_text("a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n")
     body = '<xacro:property name="d" value="${load_yaml(\'d.yaml\')}"/><link name="${d.b.x}_${d.b.y}"/>'
     assert names(expand(tmp_path, body)) == ["1_3"]
