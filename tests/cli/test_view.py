@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -89,9 +90,13 @@ def test_a_changed_file_is_shown_and_one_with_errors_is_reported(tmp_path: Path)
     path.write_text(LINK)
     command = [sys.executable, "-m", "manipcli", "view", str(path), "--port", "0"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
-    ) as process:
+    with (
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        ) as process,
+        ExitStack() as ended,
+    ):
+        ended.callback(process.kill)  # also where an assertion fails: Popen waits for its end
         assert process.stdout is not None
         assert process.stderr is not None
         url = process.stdout.readline().strip()
@@ -102,7 +107,7 @@ def test_a_changed_file_is_shown_and_one_with_errors_is_reported(tmp_path: Path)
         assert "one.urdf:1:" in lines[-1]
         path.write_text(LINK.replace("1 1 1", "2 1 1"))
         while "changed: one.urdf" not in (line := process.stderr.readline()):
-            assert "one.urdf:1:" in line or "hint" in line
+            assert "one.urdf:1:" in line or "hint" in line or "more about a code" in line
         with urlopen(url, timeout=120) as answer:
             assert answer.status == 200
         process.send_signal(signal.SIGINT)
