@@ -159,6 +159,8 @@ def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Diagnostic:
     line, column = (mark.line, mark.column) if mark is not None else (0, 0)
     lines = _BREAK.split(text)
     excerpt = lines[line] if line < len(lines) else ""
+    if "maximum nesting depth" in problem:  # libyaml's own limit, which it may reach before the limit here is seen
+        return Diagnostic("YAML108", f"nested deeper than {MAX_DEPTH}", Place(name, line + 1, column + 1))
     if "cannot start any token" in problem:
         character = excerpt[column : column + 1]
         if character == "\t":
