@@ -52,9 +52,11 @@ class _Feed(threading.Thread):
         self._error: OSError | None = None
 
     def run(self) -> None:
+        over = False
         while (file := self._opened()) is None:
-            if self._finished.wait(PERIOD):
+            if over:  # it was over before this look: there is no log
                 return
+            over = self._finished.wait(PERIOD)
         try:
             with file, self._stdout:
                 waiting = True
